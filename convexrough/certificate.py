@@ -1,0 +1,277 @@
+"""Judge loads from any source: how far from the solution they can be, and which asperities touch.
+
+Knows no solver. Every bound holds for the exact solution of the scene whose data are the given
+float64 numbers, and includes the rounding of everything computed here. The mathematics is derived
+in docs/theory.md; in short, for loads P with residual e (the gap where loaded, its negative part
+where not), a box 0 <= P <= B that holds every solution, H = diag(2/3 k B^(-1/3)), and mu > 0 with
+Hessian >= mu H on that box,
+
+    || P - P* ||_H  <=  || e ||_{H^-1} / mu  =:  eps,
+
+so |P_i - P*_i| <= eps / sqrt(h_i), and A P is off by at most eps sqrt(sum_j A_ij^2 / h_j). At the
+solution delta* = D - A P* is the indentation where positive and minus the gap where negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks, hertz
+from convexrough.checks import Array, frozen
+from convexrough.errors import InputError
+from convexrough.influence import ROUNDOFF, DenseInfluence
+from convexrough.normal import SAFETY, NormalProblem
+from convexrough.scene import Scene
+
+Scope = Literal["global", "local", "none"]
+
+#: Roundoffs lost in k P^(2/3) and in adding it, A P and D up.
+SUM_ROUNDOFFS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What is proved of given loads. Arrays are (n,), in the caller's order.
+
+    scope : "global": the scene has one solution, and the bounds are on the distance to it;
+        "local": it has one solution with no contact radius above convexity_number * (pi/4) times
+        the distance to the nearest neighbour, and the bounds are on the distance to that;
+        "none": nothing is proved, every bound is infinite and every asperity undecided
+    convexity_number : where below 1, the energy is strictly convex on the box used: the smallest
+        eigenvalue of its Hessian, scaled by its local part, is at least 1 - convexity_number
+    status : "contact" (its load is proved positive), "open" (its gap is proved positive) or
+        "undecided"
+    load_errors : [force] bounds on |load - solution|
+    gaps : [length] gaps these loads leave: max(0, (A P)_i - D_i)
+    gap_errors : [length] bounds on |gap - solution|
+    approach : [length] prescribed, or the one that fits the loads best
+    approach_error : [length] bound on |approach - solution|; 0 where prescribed
+    """
+
+    scope: Scope
+    convexity_number: float
+    status: NDArray[np.str_]
+    load_errors: Array
+    gaps: Array
+    gap_errors: Array
+    approach: float
+    approach_error: float
+
+    @property
+    def holds(self) -> bool:
+        """Every asperity is proved to touch or proved to be open."""
+        return self.scope != "none" and not bool((self.status == "undecided").any())
+
+    @property
+    def load_error(self) -> float:
+        """[force] the largest of `load_errors`."""
+        return float(self.load_errors.max())
+
+    @property
+    def gap_error(self) -> float:
+        """[length] the largest of `gap_errors`."""
+        return float(self.gap_errors.max())
+
+
+def certify(
+    scene: Scene,
+    loads: ArrayLike,
+    *,
+    approach: float | None = None,
+    load: float | None = None,
+) -> Certificate:
+    """Judge loads that came from anywhere.
+
+    loads : (n,) [force], not negative, in the order of the scene's asperities
+    approach [length] or load [force] : what is prescribed, exactly one. Under load control the
+        loads are judged after scaling them to the prescribed total; the bounds include that.
+
+    Raises InputError for loads of the wrong length, negative or not finite.
+    """
+    values = checks.array("loads", loads, length=len(scene), sign="not negative")
+    return judge(NormalProblem.assemble(scene, approach=approach, load=load), values)
+
+
+def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
+    """`certify` for a problem already assembled; loads (n,) [force] of the whole scene."""
+    given = scene_loads[problem.candidates] / problem.units.force
+    loads = given if problem.load is None else _scaled_to(problem.load, given)
+    fit = _fit(problem, loads)
+    box = _find_box(problem, loads, fit.displacement)
+    if box is None:
+        return _unproved(problem, loads, fit)
+
+    # || P - P* ||_H <= norm, and what that says of each load.
+    h = box.stiffness
+    norm = float(np.sqrt(np.sum(fit.residual**2 / h))) / (1.0 - box.convexity_number)
+    norm *= 1 + SAFETY
+    errors = norm / np.sqrt(h)
+    if (loads + errors >= box.faces).any():  # the solution may lie outside the local box
+        return _unproved(problem, loads, fit)
+
+    # What it says of A P and D0, and so of delta* = D - A P*.
+    spread = norm * problem.influence.spread(1.0 / h) * (1 + SAFETY)
+    approach_error = 0.0
+    if problem.load is not None:
+        approach_error = _approach_error(problem, loads, fit, errors, spread)
+    error = spread + fit.rounding + approach_error
+    touches = (loads > errors) | (fit.indentation > error)
+
+    # delta* gives a second bound on each load, sharper where the load is small.
+    low = hertz.load(fit.indentation - error, problem.coefficients) * (1 - SAFETY)
+    high = hertz.load(fit.indentation + error, problem.coefficients) * (1 + SAFETY)
+    errors = np.minimum(errors, np.maximum(loads - low, high - loads))
+    errors += np.abs(loads - given) + 4 * ROUNDOFF * loads
+
+    # Everyone, in the caller's order; the screened asperities carry nothing.
+    indentation = problem.to_scene(fit.indentation)
+    error = problem.to_scene(error)
+    for block, product, rounding, reach in _screened(problem, loads, fit.approach, 1.0 / h):
+        indentation[block] = product
+        error[block] = norm * reach * (1 + SAFETY) + rounding + approach_error
+    load_errors = scene_loads.copy()
+    load_errors[problem.candidates] = errors * problem.units.force
+    words = (problem.to_scene(touches) > 0, indentation < -error)
+    return Certificate(
+        scope=box.scope,
+        convexity_number=box.convexity_number,
+        status=frozen(np.select(words, ("contact", "open"), "undecided")),
+        load_errors=frozen(load_errors),
+        gaps=frozen(np.maximum(-indentation, 0.0) * problem.units.length),
+        gap_errors=frozen(error * problem.units.length),
+        approach=fit.approach * problem.units.length,
+        approach_error=approach_error * problem.units.length,
+    )
+
+
+class _Fit(NamedTuple):
+    """How well loads fit the contact law, with the rounding error of saying so."""
+
+    displacement: Array  # A P
+    indentation: Array  # D - A P
+    gap: Array  # k P^(2/3) + A P - D
+    local: Array  # k P^(2/3)
+    rounding: Array  # bound on the error of each of the above
+    residual: Array  # bound on |e|: |gap| where loaded, its negative part where not
+    approach: float  # D0
+
+
+class _Box(NamedTuple):
+    """A box of loads that holds the solution, and how convex the energy is on it."""
+
+    scope: Scope
+    stiffness: Array  # h at the box's upper corner
+    convexity_number: float  # 1 - mu
+    faces: Array  # upper faces that the solution must be shown to stay below; else infinite
+
+
+def _scaled_to(load: float, given: Array) -> Array:
+    total = float(given.sum())
+    if total == 0.0:
+        expected = "a load on some asperity that could touch, as the total is prescribed"
+        raise InputError("loads", found="none", expected=expected)
+    return given * (load / total)
+
+
+def _fit(problem: NormalProblem, loads: Array) -> _Fit:
+    displacement = problem.influence.apply(loads)
+    local = hertz.indentation(loads, problem.coefficients)
+    approach = problem.approach
+    if approach is None:  # the D0 that fits the touching asperities best
+        weights = np.cbrt(loads) / problem.coefficients
+        approach = float(weights @ (local + displacement - problem.offsets) / weights.sum())
+    indentation = approach + problem.offsets - displacement
+    gap = local - indentation
+    rounding = problem.influence.product_error * displacement + problem.offset_errors
+    rounding += SUM_ROUNDOFFS * ROUNDOFF * (local + displacement + abs(approach))
+    residual = np.where(loads > 0, np.abs(gap) + rounding, np.maximum(rounding - gap, 0.0))
+    return _Fit(displacement, indentation, gap, local, rounding, residual, approach)
+
+
+def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box | None:
+    """Global from the a priori bound by shells, then by Cholesky; else local; else None."""
+    ceiling = problem.ceiling
+    if problem.load is not None:
+        ceiling = min(ceiling, problem.overhang(loads, displacement))
+    corner = np.maximum(problem.bounds(ceiling), loads)  # the box must hold both states
+    h = problem.stiffness(corner)
+    nowhere = np.full(len(problem), np.inf)
+    if (theta := problem.convexity_number(corner)) < 1:
+        return _Box("global", h, theta, nowhere)
+    if (smallest := _smallest_eigenvalue(problem.influence, h)) > 0:
+        return _Box("global", h, 1.0 - smallest, nowhere)
+    if (theta := problem.convexity_number(loads)) < 1:
+        theta = (1.0 + theta) / 2.0
+        # The faces a_i = theta (pi/2) s_i, where h_i = shell_i / theta.
+        faces = (2.0 / 3.0 * problem.coefficients * theta / problem.shells) ** 3
+        h = problem.stiffness(np.minimum(corner, faces))
+        return _Box("local", h, theta, np.where(faces < corner, faces, np.inf))
+    return None
+
+
+def _smallest_eigenvalue(influence: DenseInfluence, stiffness: Array) -> float:
+    """A proved lower bound on the smallest eigenvalue of I + H^(-1/2) A H^(-1/2); 0 if none.
+
+    A Cholesky factorisation that runs to its end on B proves that B's smallest eigenvalue is at
+    least about -(n + 2) roundoffs of its trace (Rump, BIT 46 (2006) 433). So: estimate the
+    eigenvalue, shift by a little less, and factorise.
+    """
+    from scipy.linalg import eigh  # 0.2 s to import: only when the shells do not settle it
+    from scipy.linalg.lapack import dpotrf
+
+    n = len(stiffness)
+    root = 1.0 / np.sqrt(stiffness)
+    matrix = influence.matrix * root * root[:, None]
+    blur = (influence.entry_error + 8 * ROUNDOFF) * float(matrix.sum(axis=1).max())
+    slack = 1.1 * (blur + (n + 2) * n * ROUNDOFF)
+    estimate = 1.0 + float(eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0])
+    bound = 0.999 * estimate - 2.0 * slack
+    if bound <= 0:
+        return 0.0
+    np.fill_diagonal(matrix, 1.0 - bound - slack)
+    return bound if dpotrf(matrix, lower=1)[1] == 0 else 0.0
+
+
+def _approach_error(
+    problem: NormalProblem, loads: Array, fit: _Fit, errors: Array, spread: Array
+) -> float:
+    """|D0 - D0*|, as D0* = k_i P*_i^(2/3) + (A P*)_i - d_i at every asperity sure to touch."""
+    least = hertz.indentation(np.maximum(loads - errors, 0.0), problem.coefficients)
+    each = np.abs(fit.gap) + fit.rounding + (fit.local - least) + spread
+    return float(each.min(where=loads > errors, initial=np.inf))
+
+
+def _screened(
+    problem: NormalProblem, loads: Array, approach: float, variances: Array
+) -> Iterator[tuple[NDArray[np.intp], Array, Array, Array]]:
+    """Of the asperities that cannot touch: indices, delta = D - A P, its rounding, the spread."""
+    scene, length = problem.scene, problem.units.length
+    others = np.setdiff1d(np.arange(len(scene)), problem.candidates, assume_unique=True)
+    for block, rows in problem.influence.elsewhere(scene.contact_points[others]):
+        index = others[block]
+        product, offsets = rows @ loads, scene.offsets[index] / length
+        rounding = 2 * problem.influence.product_error * product
+        rounding += SUM_ROUNDOFFS * ROUNDOFF * (product + np.abs(offsets) + abs(approach))
+        yield index, approach + offsets - product, rounding, np.sqrt(rows**2 @ variances)
+
+
+def _unproved(problem: NormalProblem, loads: Array, fit: _Fit) -> Certificate:
+    indentation = problem.to_scene(fit.indentation)
+    for block, product, *_ in _screened(problem, loads, fit.approach, loads):
+        indentation[block] = product
+    unknown = np.full(len(problem.scene), np.inf)
+    return Certificate(
+        scope="none",
+        convexity_number=max(1.0, problem.convexity_number(loads)),
+        status=frozen(np.full(len(problem.scene), "undecided")),
+        load_errors=frozen(unknown),
+        gaps=frozen(np.maximum(-indentation, 0.0) * problem.units.length),
+        gap_errors=frozen(unknown),
+        approach=fit.approach * problem.units.length,
+        approach_error=0.0 if problem.load is None else np.inf,
+    )

@@ -1,0 +1,107 @@
+"""Checks of single values, each raising an InputError that says what was expected."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough.errors import InputError
+
+Array: TypeAlias = NDArray[np.float64]
+Indices: TypeAlias = NDArray[np.intp]
+
+
+def finite(what: str, value: float) -> float:
+    number = _number(what, value, "a finite number")
+    if not math.isfinite(number):
+        raise InputError(what, found=number, expected="a finite number")
+    return number
+
+
+def positive(what: str, value: float) -> float:
+    number = _number(what, value, "a positive number")
+    if not (math.isfinite(number) and number > 0):
+        raise InputError(what, found=number, expected="a positive number")
+    return number
+
+
+def non_negative(what: str, value: float) -> float:
+    number = _number(what, value, "a number that is not negative")
+    if not (math.isfinite(number) and number >= 0):
+        raise InputError(what, found=number, expected="a number that is not negative")
+    return number
+
+
+def between(what: str, value: float, low: float, high: float) -> float:
+    number = _number(what, value, f"a number from {low} to {high}")
+    if not low <= number <= high:
+        raise InputError(what, found=number, expected=f"a number from {low} to {high}")
+    return number
+
+
+def array(what: str, values: ArrayLike, *, length: int | None = None, sign: str = "") -> Array:
+    """A read-only copy of a vector; `sign` is "", "positive" or "not negative".
+
+    A number stands for a vector of `length` equal values.
+    """
+    try:
+        vector = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(what, found=repr(values)[:60], expected="numbers") from error
+    if vector.ndim == 0 and length is not None:
+        vector = np.full(length, float(vector))
+    if vector.ndim != 1 or (length is not None and vector.size != length):
+        count = "a list of numbers" if length is None else f"{length} values, one per asperity"
+        raise InputError(what, found=f"shape {np.shape(values)}", expected=count)
+    good = np.isfinite(vector)
+    if sign == "positive":
+        good &= vector > 0
+    elif sign == "not negative":
+        good &= vector >= 0
+    if not good.all():
+        first = int(np.argmin(good))
+        kind = f"{sign}, finite" if sign else "finite"
+        raise InputError(f"{what}[{first}]", found=vector[first], expected=f"a {kind} number")
+    vector.flags.writeable = False
+    return vector
+
+
+def frozen(values: NDArray[Any]) -> NDArray[Any]:
+    """The array itself, made read-only."""
+    values.flags.writeable = False
+    return values
+
+
+def exactly_one(first: str, a: object, second: str, b: object) -> None:
+    """Exactly one of two alternatives is given (the other is None)."""
+    if (a is None) == (b is None):
+        found = "neither" if a is None else "both"
+        raise InputError(f"{first}, {second}", found=found, expected="exactly one of the two")
+
+
+def fits_in_memory(what: str, count: float, bytes_each: float) -> None:
+    """Refuse to start on something this machine cannot hold."""
+    if count * bytes_each < 2**26:
+        return
+    import psutil  # only asked when something may be large
+
+    available = psutil.virtual_memory().available
+    if count * bytes_each > available:
+        raise InputError(
+            what,
+            found=f"{count:.3g} asperities ({count * bytes_each / 2**30:.3g} GiB)",
+            expected=f"at most {available / bytes_each:.3g} for the {available / 2**30:.3g} GiB "
+            "of memory available",
+        )
+
+
+def _number(what: str, value: float, expected: str) -> float:
+    if isinstance(value, bool):
+        raise InputError(what, found=repr(value), expected=expected)
+    try:
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise InputError(what, found=repr(value), expected=expected) from error

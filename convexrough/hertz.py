@@ -1,0 +1,58 @@
+"""One sphere on an elastically similar half-space: Hertz's law and its relatives.
+
+Scalars or arrays alike; any consistent units. E* is the contact modulus, R the relative radius.
+Displacements are those of two deep points, one in each body, towards each other.
+Source: Johnson, Contact Mechanics (1985), chapters 3 and 4.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+Number = Any  # float or float64 array; the result has the shape of the arguments
+
+
+def local_coefficient(contact_modulus: Number, radius: Number) -> Number:
+    """k of the local law  indentation = k load^(2/3),  k = (9 / (16 E*^2 R))^(1/3)."""
+    return np.cbrt(9.0 / (16.0 * contact_modulus**2 * radius))
+
+
+def indentation(load: Number, coefficient: Number) -> Number:
+    """delta = k P^(2/3)."""
+    return coefficient * np.cbrt(load) ** 2
+
+
+def load(indentation: Number, coefficient: Number) -> Number:
+    """P = (max(delta, 0) / k)^(3/2): a sphere that is pulled away carries nothing."""
+    ratio = np.maximum(indentation, 0.0) / coefficient
+    return ratio * np.sqrt(ratio)
+
+
+def contact_radius(load: Number, contact_modulus: Number, radius: Number) -> Number:
+    """a = (3 P R / (4 E*))^(1/3)."""
+    return np.cbrt(3.0 * load * radius / (4.0 * contact_modulus))
+
+
+def peak_pressure(contact_radius: Number, contact_modulus: Number, radius: Number) -> Number:
+    """p0 = 2 E* a / (pi R), the same as (6 P E*^2 / (pi^3 R^2))^(1/3)."""
+    return 2.0 * contact_modulus * contact_radius / (np.pi * radius)
+
+
+def pressure(distance: Number, contact_radius: Number, peak_pressure: Number) -> Number:
+    """p(r) = p0 sqrt(1 - r^2 / a^2) inside the contact, 0 outside."""
+    ratio = np.divide(distance, contact_radius)
+    return peak_pressure * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
+
+
+def surface_displacement(distance: Number, contact_radius: float, radius: float) -> Number:
+    """Normal displacement of both surfaces at a distance r from the axis.
+
+    a^2/R - r^2/(2R) inside the contact and
+    (1/(pi R)) [(2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)] outside (Johnson, 3.42).
+    """
+    a, r = contact_radius, np.asarray(distance, dtype=np.float64)
+    outer = np.maximum(r, a)
+    outside = (2 * a**2 - outer**2) * np.arcsin(a / outer) + a * np.sqrt(outer**2 - a**2)
+    return np.where(r < a, a**2 / radius - r**2 / (2 * radius), outside / (np.pi * radius))

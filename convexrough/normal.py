@@ -1,0 +1,260 @@
+"""The normal contact problem in its own units: energy, gap, residual, bounds, convexity.
+
+    minimise  Phi(P) = sum (3/5) k_i P_i^(5/3) + (1/2) P'AP - D'P   over P >= 0
+
+with D_i = D0 + d_i prescribed (approach control), or with sum P_i prescribed and D0 the multiplier
+of that constraint (load control). Its first-order conditions are the contact law
+
+    P >= 0,   g = k P^(2/3) + A P - D >= 0,   P_i g_i = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import checks, hertz
+from convexrough.checks import Array, Indices
+from convexrough.errors import InputError
+from convexrough.influence import ROUNDOFF, DenseInfluence, shell_radii
+from convexrough.scene import Scene
+
+#: Relative error allowed for a short chain of float64 operations wherever a bound is computed:
+#: far above what any such chain here can lose, far below what it could matter.
+SAFETY = 1e-12
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units in which the problem's numbers are about 1.
+
+    Powers of two, and the force a power of eight, so that scaling a float64 number (and its 2/3
+    power) by them is exact.
+    """
+
+    length: float  # [length] of approach
+    force: float  # [force]
+
+    @property
+    def local(self) -> float:
+        """What a local coefficient k is multiplied by: force^(2/3) / length, a power of two."""
+        return float(2.0 ** np.round(np.log2(self.force) * 2 / 3) / self.length)
+
+    @classmethod
+    def of(cls, approach: float, coefficient: float) -> Units:
+        length = 2.0 ** np.round(np.log2(approach))
+        force = 8.0 ** np.round(np.log2(length / coefficient) / 2.0)
+        return cls(float(length), float(force))
+
+
+@dataclass(frozen=True, eq=False)
+class NormalProblem:
+    """The asperities of a scene that could touch, and what is prescribed. In own units.
+
+    candidates    : (n,) their indices in the scene; all others carry nothing in any solution
+    coefficients  : (n,) k of the local law
+    offsets       : (n,) d_i = D_i - D0
+    offset_errors : (n,) bound on the rounding error of D_i, without that of D0
+    shells        : (n,) 1 / (pi E* s_i): added to the diagonal of A they make it semidefinite
+    influence     : A
+    approach      : D0, or None under load control
+    load          : total load, or None under approach control
+    ceiling       : upper bound on D0 at any solution
+    """
+
+    scene: Scene
+    units: Units
+    candidates: Indices
+    coefficients: Array
+    offsets: Array
+    offset_errors: Array
+    shells: Array
+    influence: DenseInfluence
+    approach: float | None
+    load: float | None
+    ceiling: float
+
+    def __len__(self) -> int:
+        return len(self.candidates)
+
+    @classmethod
+    def assemble(
+        cls, scene: Scene, *, approach: float | None = None, load: float | None = None
+    ) -> NormalProblem:
+        """Screen, scale and couple. `approach` [length] or `load` [force], exactly one."""
+        checks.exactly_one("approach", approach, "load", load)
+        errors = 6 * ROUNDOFF * (np.abs(scene.asperities.heights) + scene.drops)
+        modulus = scene.material.contact_modulus
+        coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
+        if approach is not None:
+            ceiling = approach = checks.finite("approach", approach)
+        else:
+            assert load is not None  # exactly_one
+            load = checks.positive("load", load)
+            ceiling = highest_approach(scene, load)
+
+        # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
+        prescribed = ceiling + scene.offsets + errors + 6 * ROUNDOFF * abs(ceiling)
+        candidates = np.flatnonzero(prescribed > 0)
+        n = len(candidates)
+        checks.fits_in_memory("asperities that could touch", n, 5 * 8 * n)
+        top = float(prescribed[candidates].max(initial=0.0)) or 1.0
+        units = Units.of(top, float(np.median(coefficients)))
+
+        points = scene.contact_points[candidates]
+        blur = 0.0 if scene.geometry == "summit" else 3 * ROUNDOFF * np.abs(points).max(initial=0.0)
+        scale = units.force / units.length / (np.pi * modulus)
+        return cls(
+            scene=scene,
+            units=units,
+            candidates=candidates,
+            coefficients=coefficients[candidates] * units.local,
+            offsets=scene.offsets[candidates] / units.length,
+            offset_errors=errors[candidates] / units.length,
+            shells=scale / shell_radii(points),
+            influence=DenseInfluence.assemble(points, scale, blur),
+            approach=None if approach is None else approach / units.length,
+            load=None if load is None else load / units.force,
+            ceiling=ceiling / units.length,
+        )
+
+    def energy(self, loads: Array, displacement: Array) -> float:
+        """Phi(P), with D0 = 0 under load control; `displacement` is A P."""
+        local = 0.6 * loads @ hertz.indentation(loads, self.coefficients)
+        prescribed = self.offsets + (self.approach or 0.0)
+        return float(local + loads @ (0.5 * displacement - prescribed))
+
+    def gap(self, loads: Array, displacement: Array, approach: float) -> Array:
+        """(n,) g = k P^(2/3) + A P - D, the gradient of Phi; `displacement` is A P."""
+        local: Array = hertz.indentation(loads, self.coefficients)
+        return local + displacement - self.offsets - approach
+
+    def residual(self, loads: Array, approach: float) -> float:
+        """How far the contact law is from holding: max |g_i| where loaded, else max(-g_i, 0)."""
+        gap = self.gap(loads, self.influence.apply(loads), approach)
+        return float(np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0)).max(initial=0.0))
+
+    def bounds(self, ceiling: float) -> Array:
+        """(n,) U_i = (max(D_i, 0) / k_i)^(3/2): no solution with D0 <= ceiling carries more."""
+        rounding = self.offset_errors + 6 * ROUNDOFF * abs(ceiling)
+        alone: Array = hertz.load(ceiling + self.offsets + rounding, self.coefficients)
+        return alone * (1 + SAFETY)
+
+    def stiffness(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
+        """h_i = (2/3) k_i P_i^(-1/3): the local part of the Hessian, 1 / (2 E* a_i)."""
+        with np.errstate(divide="ignore"):
+            h: Array = (2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads)
+        return h
+
+    def smooth_indentation(self) -> Array:
+        """A start: the heights, riding on the surface that a smooth sphere would make."""
+        radius, modulus = self.scene.sphere_radius, self.scene.material.contact_modulus
+        load = self.load
+        if load is None:
+            smooth = hertz.local_coefficient(modulus, radius) * self.units.local
+            alone = float(self.bounds(self.ceiling).sum())
+            load = min(float(hertz.load(self.ceiling, smooth)), alone) or alone
+        a = float(hertz.contact_radius(load * self.units.force, modulus, radius))
+        distances = self.scene.asperities.distances[self.candidates]
+        sunk = hertz.surface_displacement(distances, a, radius) / self.units.length
+        indentation: Array = self.offsets - sunk
+        return indentation + shift_to_load(indentation, self.coefficients, load)
+
+    def convexity_number(self, loads: Array) -> float:
+        """theta = max 2 a_i / (pi s_i) over the box 0 <= P <= loads; Phi is convex where < 1.
+
+        The smallest eigenvalue of the Hessian, relative to its diagonal, is at least 1 - theta.
+        """
+        ratio = self.shells / self.stiffness(loads)
+        return float(ratio.max(initial=0.0)) * (1 + SAFETY)
+
+    def overhang(self, weights: Array, displacement: Array) -> float:
+        """Upper bound on D0 at every solution of load control, from any trial loads.
+
+        weights      : (n,) trial loads, not negative, not all zero
+        displacement : A times weights
+        """
+        assert self.load is not None
+        return approach_bound(weights, displacement, self.coefficients, self.offsets, self.load)
+
+    def to_scene(self, values: NDArray[Any]) -> Array:
+        """Values of the candidates, set among zeros for all other asperities of the scene."""
+        full = np.zeros(len(self.scene))
+        full[self.candidates] = values
+        return full
+
+
+def shift_to_load(indentation: Array, coefficients: Array, load: float) -> float:
+    """The shift tau for which  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
+
+    The sum grows and is convex in tau, so Newton's method from the right descends on the root.
+    """
+    single = hertz.indentation(load, coefficients)  # one asperity alone would carry it all
+    shift = float((single - indentation).min())
+    for _ in range(200):
+        loads = hertz.load(indentation + shift, coefficients)
+        slope = float(np.sum(np.cbrt(loads) / coefficients)) * 1.5
+        step = (float(loads.sum()) - load) / slope
+        if not step > 4 * ROUNDOFF * (abs(shift) + float(single.min())):
+            break
+        shift -= step
+    return shift
+
+
+def approach_bound(
+    weights: Array, displacement: Array, coefficients: Array, offsets: Array, load: float
+) -> float:
+    """Upper bound on D0 at every solution of total `load` (derived in docs/theory.md).
+
+    With q = weights / sum(weights), alpha_i = q_i k_i and c = A q, for every lambda >= max c:
+
+        D0 <= lambda L + (4/27) sum alpha_i^3 / (lambda - c_i)^2 - d'q.
+    """
+    total = float(weights.sum())
+    q, c = weights / total, displacement / total
+    alpha = q * coefficients
+    active = alpha > 0
+    cubes, c_active = alpha[active] ** 3, c[active]
+    # The best lambda solves (8/27) sum alpha^3 / (lambda - c)^3 = L; Newton from the left.
+    height = float((c_active + np.cbrt(8.0 * cubes / (27.0 * load))).max())
+    for _ in range(100):
+        excess = cubes / (height - c_active) ** 3
+        step = (float(excess.sum()) - 27.0 * load / 8.0) / float(
+            3.0 * (excess / (height - c_active)).sum()
+        )
+        height += max(step, 0.0)
+        if step <= 1e-3 * (height - float(c_active.max())):
+            break  # any height gives a bound; this one is close to the best
+    height = max(height, float(c.max()))
+    terms = (
+        height * load,
+        (4.0 / 27.0) * float((cubes / (height - c_active) ** 2).sum()),
+        -float(offsets @ q),
+    )
+    return sum(terms) + SAFETY * sum(map(abs, terms))
+
+
+def highest_approach(scene: Scene, load: float) -> float:
+    """An upper bound on the approach [length] at every solution of total `load` [force].
+
+    `approach_bound` with the loads that Hertz's smooth sphere suggests.
+    """
+    modulus, radius = scene.material.contact_modulus, scene.sphere_radius
+    coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
+    a = float(hertz.contact_radius(load, modulus, radius))
+    sunk = hertz.surface_displacement(scene.asperities.distances, a, radius)
+    indentation = scene.offsets - sunk
+    weights = hertz.load(indentation + shift_to_load(indentation, coefficients, load), coefficients)
+    touching = np.flatnonzero(weights)
+    points = scene.contact_points
+    sources = DenseInfluence(points[touching], 1.0 / (np.pi * modulus), np.empty((0, 0)), 0.0)
+    displacement = np.empty(len(scene))
+    for block, rows in sources.elsewhere(points):
+        displacement[block] = rows @ weights[touching]
+    bound = approach_bound(weights, displacement, coefficients, scene.offsets, load)
+    if not np.isfinite(bound):
+        raise InputError("load", found=load, expected="a load this scene's units can hold")
+    return bound

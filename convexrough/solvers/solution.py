@@ -1,0 +1,31 @@
+"""What every solver takes and returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from convexrough.checks import Array
+from convexrough.normal import NormalProblem
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Loads of the candidates and the approach, in the problem's units.
+
+    residual : problem.residual(loads, approach), recomputed from the loads
+    """
+
+    loads: Array
+    approach: float
+    iterations: int
+    residual: float
+
+
+class Solver(Protocol):
+    """A frozen settings object. Raises SolverError rather than return a poor answer."""
+
+    @property
+    def name(self) -> str: ...
+
+    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution: ...

@@ -1,0 +1,262 @@
+"""A proved multiprecision solution of the normal contact of rough spheres: the test oracle.
+
+The binary values of float64 inputs are taken as exact numbers. The contact law
+
+    P >= 0,   g = k P^(2/3) + A P - d - D0 >= 0,   P_i g_i = 0
+
+is solved as its *normal map* F = 0, one equation for each asperity and one for the control,
+
+    delta + A P - d - D0 = 0,         P = (max(delta, 0) / k)^(3/2),
+    D0 - approach = 0   or   u (sum P / load - 1) = 0,      u a length, so every row is a length,
+
+whose solution has delta_i > 0 (the indentation) where asperities touch and delta_i < 0 (minus
+the gap) where they do not. Damped Newton finds the point; one interval Newton step, in ball
+arithmetic, proves it. The oracle shares no code with the package that it judges.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import inf, log2
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from flint import arb, arb_mat, ctx
+from numpy.typing import ArrayLike, NDArray
+
+Balls: TypeAlias = Any  # an arb, or an object array of arb: no dtype of numpy can say so
+
+GUARD_DIGITS = 30  # carried beyond the digits promised
+NEWTON_STEPS, HALVINGS = 200, 40  # generous: about ten steps are usual
+EXACT_BITS = 4096  # precision of `errors`: float64 minus reference, with no error of its own
+ZERO: Balls = arb(0)
+ONE: Balls = arb(1)
+
+_exact = np.vectorize(arb, otypes=[object])
+_mid = np.vectorize(arb.mid, otypes=[object])
+_cube_root = np.vectorize(lambda ball: ball.root(3), otypes=[object])
+
+
+class NotProved(ArithmeticError):
+    """Newton did not arrive, or its answer could not be proved with this number of digits."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A proved contact state: every ball contains the true value.
+
+    loads : n normal loads [force]; exactly zero where the asperity is open
+    gaps : n gaps max(0, (A P)_i - D_i) [length]; exactly zero where the asperity touches
+    approach : D0, both bodies together [length];  load : the total, sum P [force]
+    """
+
+    loads: tuple[arb, ...]
+    gaps: tuple[arb, ...]
+    approach: arb
+    load: arb
+
+
+def solve(
+    positions: ArrayLike,
+    tip_radii: ArrayLike,
+    heights: ArrayLike,
+    *,
+    sphere_radius: float,
+    contact_modulus: float,
+    geometry: str = "summit",
+    approach: float | None = None,
+    load: float | None = None,
+    digits: int = 50,
+    start: ArrayLike | None = None,
+) -> Reference:
+    """Solve one contact and prove it: all loads and gaps to `digits` significant digits.
+
+    positions : (n, 2) [length];  tip_radii, heights : (n,) [length], taller is positive
+    contact_modulus : E* = E / (2 (1 - nu^2)) [force / length^2]
+    geometry : "summit", or "closest" for contact points at r_i R / (R + rho_i)
+    approach [length] or load [force] : what is prescribed, exactly one of the two
+    start : (n,) loads [force] to begin Newton at, such as an approximate solution
+
+    Proved: a state exists in which exactly these asperities touch, and no other state is near it.
+    That it is the only one anywhere follows if the energy is convex, which is not tested here.
+    Far from convex (overlapping contact discs) Newton may need a `start`, else raise NotProved.
+    """
+    if (approach is None) == (load is None) or (load is not None and load <= 0):
+        raise ValueError("prescribe either the approach or a positive load")
+    by_load = load is not None
+    with ctx.workdps(digits + GUARD_DIGITS):
+        radius, modulus = arb(float(sphere_radius)), arb(float(contact_modulus))
+        control, tips = arb(float(load or approach or 0)), _exact(tip_radii)
+        points, descents = _contact_points(_exact(positions), tips, radius, geometry)
+        shape = _exact(heights) - descents  # d_i = D_i - D0
+        influence = _influence(points, modulus)
+        law = _cube_root(9 / (16 * modulus * modulus) * (1 / radius + 1 / tips))  # k_i
+
+        # A P >= 0, so an asperity with D_i <= 0 cannot touch: it is left out of the equations.
+        able = np.full(len(shape), True) if by_load else ~(shape + control <= 0)
+        if by_load:  # u: the smooth sphere's approach, or the largest prescribed D_i
+            unit = (9 * control * control / (16 * modulus * modulus * radius)).root(3).mid()
+        else:
+            unit = max((shape + control)[able], default=ONE).mid()
+        problem = NormalMap(
+            influence[np.ix_(able, able)], law[able], shape[able], control, by_load, unit
+        )
+        first = problem.begin(None if start is None else _exact(start)[able])
+        point = newton(problem, first, tolerance=unit / arb(10) ** (digits + 20))
+        state = prove(problem, point, radius=unit / arb(10) ** (digits + 10))
+
+        loads = np.full(len(shape), ZERO)
+        loads[able] = problem.loads(state)
+        depth = state[-1] if by_load else control
+        gaps = np.where(loads > 0, ZERO, influence @ loads - shape - depth)
+        if not ((loads > 0) | (gaps > 0)).all():
+            raise NotProved("an asperity grazes: neither its load nor its gap is positive")
+        if any(ball.rel_accuracy_bits() < digits * log2(10) for ball in (*loads, *gaps)):
+            raise NotProved("an asperity nearly grazes and lost significance: ask for more digits")
+        total = control if by_load else loads.sum(initial=ZERO)
+        return Reference(tuple(loads), tuple(gaps), depth, total)
+
+
+@dataclass(frozen=True)
+class NormalMap:
+    """The map F of the module's docstring; its argument x = (delta_1, .., delta_m, D0) [length].
+
+    influence : (m, m) A_ij [length / force]
+    law : (m,) k_i [length / force^(2/3)];  shape : (m,) d_i = D_i - D0 [length]
+    control : the load [force] where `by_load`, else the approach [length];  unit : u [length]
+    """
+
+    influence: Balls
+    law: Balls
+    shape: Balls
+    control: Balls
+    by_load: bool
+    unit: Balls
+
+    def begin(self, loads: Balls | None) -> Balls:
+        """The state x of these loads; by default each alone (approach) or all equal (load)."""
+        if loads is None and self.by_load:
+            loads = np.full(len(self.law), self.control / len(self.law))
+        elif loads is None:
+            loads = self.loads(np.append(_mid(self.shape + self.control), self.control))
+        delta = self.law * _cube_root(loads * loads)
+        below = self.influence @ loads - self.shape  # D0 - delta of a solution
+        depth = loads @ (delta + below) / loads.sum() if self.by_load else self.control
+        opened = np.minimum(_mid(depth - below), ZERO)
+        return _mid(np.append(np.where(loads > 0, delta, opened), depth))
+
+    def loads(self, x: Balls) -> Balls:
+        """P = (max(delta, 0) / k)^(3/2)."""
+        ratio = _positive_part(x[:-1]) / self.law
+        return ratio * np.sqrt(ratio)
+
+    def residual(self, x: Balls) -> Balls:
+        """F(x) = (delta + A P - d - D0, the control equation)."""
+        delta, depth, loads = x[:-1], x[-1], self.loads(x)
+        contact = delta + self.influence @ loads - self.shape - depth
+        if self.by_load:
+            return np.append(contact, self.unit * (loads.sum() / self.control - 1))
+        return np.append(contact, depth - self.control)
+
+    def jacobian(self, x: Balls) -> Balls:
+        """dF/dx = [[I + A C, -1], [the control's row]], C = diag(dP/d delta) = diag(2 E* a)."""
+        stiffness = 3 * np.sqrt(_positive_part(x[:-1]) / self.law) / (2 * self.law)
+        matrix = np.full((len(x), len(x)), ZERO)
+        matrix[:-1, :-1] = self.influence * stiffness
+        np.fill_diagonal(matrix, ONE)
+        matrix[:-1, -1] = -ONE
+        if self.by_load:
+            matrix[-1] = np.append(self.unit / self.control * stiffness, ZERO)
+        return matrix
+
+
+def newton(problem: NormalMap, x: Balls, *, tolerance: arb) -> Balls:
+    """The point x with sum |F(x)| <= tolerance [length], by Newton steps that shrink this sum."""
+    residual = _mid(problem.residual(x))
+    for _ in range(NEWTON_STEPS):
+        size = np.abs(residual).sum()
+        if size <= tolerance:
+            return x
+        step = _solve(problem.jacobian(x), residual, "approx")
+        for share in (ONE / 2**halvings for halvings in range(HALVINGS)):
+            trial = _mid(x - share * step)
+            after = _mid(problem.residual(trial))
+            if np.abs(after).sum() <= (1 - share / 1000) * size:
+                break
+        else:
+            raise NotProved("no part of Newton's step shrinks the residual")
+        x, residual = trial, after
+    raise NotProved("Newton did not arrive")
+
+
+def prove(problem: NormalMap, x: Balls, *, radius: arb) -> Balls:
+    """Balls that hold a zero of F, the only one in the box X = x +/- radius [length].
+
+    Interval Newton: if x - J^-1 F(x) lies inside X for every matrix J with entries in dF/dx(X),
+    then (mean value and Brouwer) F has one zero in X, and it is among those x - J^-1 F(x).
+    """
+    box = np.array([arb(centre, radius) for centre in x])
+    inside = x - _solve(problem.jacobian(box), problem.residual(x))
+    if not all(whole.contains_interior(part) for whole, part in zip(box, inside, strict=True)):
+        raise NotProved("the interval Newton step leaves its box")
+    return inside
+
+
+def errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:
+    """values - reference, subtracted in multiprecision [the unit of both]."""
+    with ctx.workprec(EXACT_BITS):
+        return np.array([float(v - r) for v, r in _pairs(values, reference)])
+
+
+def relative_errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:
+    """(values - reference) / reference; if the reference is zero: 0 if the value is, else inf."""
+    with ctx.workprec(EXACT_BITS):
+        return np.array(
+            [
+                float((v - r) / r) if r != 0 else 0.0 if v == 0 else inf
+                for v, r in _pairs(values, reference)
+            ]
+        )
+
+
+def _contact_points(summits: Balls, tips: Balls, radius: arb, geometry: str) -> tuple[Balls, Balls]:
+    """Where the asperities touch, (n, 2) [length], and how far below the apex, (n,) [length]."""
+    squares = (summits * summits).sum(axis=1)
+    if geometry == "summit":
+        return summits, squares / (2 * radius)
+    if geometry == "closest":
+        return summits * (radius / (radius + tips))[:, None], squares / (2 * (radius + tips))
+    raise ValueError(f'the geometry is "summit" or "closest", not {geometry!r}')
+
+
+def _influence(points: Balls, modulus: arb) -> Balls:
+    """A_ij = 1 / (pi E* r_ij), A_ii = 0 [length / force]."""
+    offsets = points[:, None, :] - points[None, :, :]
+    squares = (offsets * offsets).sum(axis=2)
+    np.fill_diagonal(squares, ONE)
+    if not (squares > 0).all():
+        raise ValueError("two asperities are in one place")
+    influence = 1 / (arb.pi() * modulus * np.sqrt(squares))
+    np.fill_diagonal(influence, ZERO)
+    return influence
+
+
+def _positive_part(delta: Balls) -> Balls:
+    """max(delta, 0), where every sign is known."""
+    if any(ball.contains(0) and ball != 0 for ball in delta):
+        raise NotProved("an asperity grazes: its indentation may have either sign")
+    return np.where(delta > 0, delta, ZERO)
+
+
+def _solve(matrix: Balls, right: Balls, algorithm: Literal["approx"] | None = None) -> Balls:
+    """matrix^-1 right, in balls that hold it; "approx" is quicker and only near it."""
+    try:
+        column = arb_mat(len(right), 1, list(right))
+        solution: Balls = arb_mat(matrix.tolist()).solve(column, algorithm=algorithm).entries()
+        return np.array(solution)
+    except ZeroDivisionError as error:
+        raise NotProved("the Jacobian may be singular") from error
+
+
+def _pairs(values: ArrayLike, reference: Sequence[arb] | arb) -> Iterator[tuple[arb, arb]]:
+    balls = [reference] if isinstance(reference, arb) else reference
+    return zip(np.atleast_1d(_exact(values)), balls, strict=True)
