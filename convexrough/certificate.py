@@ -108,11 +108,17 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
 
     # || P - P* ||_H <= norm, and what that says of each load.
     h = box.stiffness
-    norm = float(np.sqrt(np.sum(fit.residual**2 / h))) / (1.0 - box.convexity_number)
-    norm *= 1 + SAFETY
+    norm = _norm(fit.residual, h, box.convexity_number)
     errors = norm / np.sqrt(h)
     if (loads + errors >= box.faces).any():  # the solution may lie outside the local box
         return _unproved(problem, loads, fit)
+
+    # The solution is now known to be near: once more, on the box up to there.
+    near = np.minimum(box.loads, loads + errors)
+    if (theta := problem.convexity_number(near)) <= box.convexity_number:
+        h = problem.stiffness(near)
+        norm = _norm(fit.residual, h, theta)
+        errors = norm / np.sqrt(h)
 
     # What it says of A P and D0, and so of delta* = D - A P*.
     spread = norm * problem.influence.spread(1.0 / h) * (1 + SAFETY)
@@ -165,9 +171,16 @@ class _Box(NamedTuple):
     """A box of loads that holds the solution, and how convex the energy is on it."""
 
     scope: Scope
-    stiffness: Array  # h at the box's upper corner
+    loads: Array  # the upper corner
+    stiffness: Array  # h there
     convexity_number: float  # 1 - mu
     faces: Array  # upper faces that the solution must be shown to stay below; else infinite
+
+
+def _norm(residual: Array, stiffness: Array, convexity_number: float) -> float:
+    """|| e ||_{H^-1} / (1 - theta)."""
+    squared = float(np.sum(residual**2 / stiffness))
+    return float(np.sqrt(squared)) / (1.0 - convexity_number) * (1 + SAFETY)
 
 
 def _scaled_to(load: float, given: Array) -> Array:
@@ -202,39 +215,38 @@ def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box
     h = problem.stiffness(corner)
     nowhere = np.full(len(problem), np.inf)
     if (theta := problem.convexity_number(corner)) < 1:
-        return _Box("global", h, theta, nowhere)
-    if (smallest := _smallest_eigenvalue(problem.influence, h)) > 0:
-        return _Box("global", h, 1.0 - smallest, nowhere)
+        return _Box("global", corner, h, theta, nowhere)
+    if (margin := _convex_margin(problem.influence, h)) > 0:
+        return _Box("global", corner, h, 1.0 - margin, nowhere)
     if (theta := problem.convexity_number(loads)) < 1:
         theta = (1.0 + theta) / 2.0
         # The faces a_i = theta (pi/2) s_i, where h_i = shell_i / theta.
         faces = (2.0 / 3.0 * problem.coefficients * theta / problem.shells) ** 3
-        h = problem.stiffness(np.minimum(corner, faces))
-        return _Box("local", h, theta, np.where(faces < corner, faces, np.inf))
+        local = np.minimum(corner, faces)
+        beyond = np.where(faces < corner, faces, np.inf)
+        return _Box("local", local, problem.stiffness(local), theta, beyond)
     return None
 
 
-def _smallest_eigenvalue(influence: DenseInfluence, stiffness: Array) -> float:
-    """A proved lower bound on the smallest eigenvalue of I + H^(-1/2) A H^(-1/2); 0 if none.
+def _convex_margin(influence: DenseInfluence, stiffness: Array) -> float:
+    """A proved mu with  I + H^(-1/2) A H^(-1/2) >= mu I;  0 where none is found.
 
-    A Cholesky factorisation that runs to its end on B proves that B's smallest eigenvalue is at
-    least about -(n + 2) roundoffs of its trace (Rump, BIT 46 (2006) 433). So: estimate the
-    eigenvalue, shift by a little less, and factorise.
+    A Cholesky factorisation that runs to its end on B proves that B's smallest eigenvalue is not
+    below minus some (n + 2) roundoffs of its trace (Rump, BIT 46 (2006) 433). Any mu will do:
+    the bounds are sharpened afterwards on a smaller box.
     """
-    from scipy.linalg import eigh  # 0.2 s to import: only when the shells do not settle it
-    from scipy.linalg.lapack import dpotrf
+    from scipy.linalg.lapack import dpotrf  # 0.2 s to import: only if the shells do not settle it
 
     n = len(stiffness)
     root = 1.0 / np.sqrt(stiffness)
-    matrix = influence.matrix * root * root[:, None]
-    blur = (influence.entry_error + 8 * ROUNDOFF) * float(matrix.sum(axis=1).max())
+    scaled = influence.matrix * root * root[:, None]
+    blur = (influence.entry_error + 8 * ROUNDOFF) * float(scaled.sum(axis=1).max())
     slack = 1.1 * (blur + (n + 2) * n * ROUNDOFF)
-    estimate = 1.0 + float(eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0])
-    bound = 0.999 * estimate - 2.0 * slack
-    if bound <= 0:
-        return 0.0
-    np.fill_diagonal(matrix, 1.0 - bound - slack)
-    return bound if dpotrf(matrix, lower=1)[1] == 0 else 0.0
+    for margin in (0.1, 1e-3):
+        np.fill_diagonal(scaled, 1.0 - margin - slack)
+        if dpotrf(scaled.T, lower=1)[1] == 0:
+            return margin
+    return 0.0
 
 
 def _approach_error(

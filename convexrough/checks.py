@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -96,6 +97,16 @@ def fits_in_memory(what: str, count: float, bytes_each: float) -> None:
             expected=f"at most {available / bytes_each:.3g} for the {available / 2**30:.3g} GiB "
             "of memory available",
         )
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """What to suggest for an unknown name: the valid one like it, or else all of them."""
+    import difflib  # only when something is misspelt
+
+    names = {each.lower(): each for each in valid}
+    if near := difflib.get_close_matches(name.lower(), names, n=1):
+        return f'did you mean "{names[near[0]]}"?'
+    return f"valid: {', '.join(names.values())}"
 
 
 def _number(what: str, value: float, expected: str) -> float:

@@ -14,7 +14,7 @@ from convexrough.checks import Array, frozen
 from convexrough.influence import inverse_distances
 from convexrough.normal import NormalProblem
 from convexrough.scene import Scene
-from convexrough.solvers import Newton, Solver
+from convexrough.solvers import Newton, Solution, Solver
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,10 @@ def press(
     if start is not None:
         given = checks.array("start", start, length=len(scene), sign="not negative")
         first = given[problem.candidates] / force
-    solution = solver.solve(problem, first)
+    if len(problem) == 0:  # too small an approach for anything to touch
+        solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
+    else:
+        solution = solver.solve(problem, first)
     loads = frozen(problem.to_scene(solution.loads * force))
     radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
     certificate = judge(problem, loads)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class ConvexroughError(Exception):
     """Base of every error this package raises on purpose."""
@@ -25,6 +27,17 @@ class InputError(ConvexroughError, ValueError):
         """The same error, seen from further out (a file, say)."""
         place = f"{where}: {self.where}" if self.where else where
         return InputError(self.what, found=self.found, expected=self.expected, where=place)
+
+
+class SceneFileError(InputError):
+    """Everything that is wrong in a scene file; the message has one line per mistake."""
+
+    def __init__(self, path: str, mistakes: Sequence[str]) -> None:
+        super().__init__("mistakes", found=len(mistakes), expected="none", where=path)
+        self.mistakes = tuple(f"{path}: {mistake}" for mistake in mistakes)
+
+    def __str__(self) -> str:
+        return "\n".join(self.mistakes)
 
 
 class FileError(ConvexroughError):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from convexrough.checks import Array
-from convexrough.scene import nearest_neighbours
+from convexrough.scene import nearest_distances
 
 #: Unit roundoff of float64.
 ROUNDOFF = 2.0**-53
@@ -41,7 +41,7 @@ def shell_radii(points: Array) -> Array:
     """
     if len(points) < 2:
         return np.full(len(points), np.inf)
-    return nearest_neighbours(points)[0] / 2.0
+    return nearest_distances(points) / 2.0
 
 
 @dataclass(frozen=True, eq=False)

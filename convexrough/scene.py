@@ -260,24 +260,24 @@ def refuse_coincident(points: Array) -> None:
     """Two asperities at one place have no finite interaction."""
     if len(points) < 2:
         return
-    distances, neighbours = nearest_neighbours(points)
+    distances = nearest_distances(points)
     blur = 4 * np.finfo(float).eps * np.abs(points).max()
     if (worst := float(distances.min())) <= blur:
-        i = int(np.argmin(distances))
-        j = int(neighbours[i])
+        first = int(np.argmin(distances))
+        others = np.hypot(*(points[first + 1 :] - points[first]).T)
+        second = first + 1 + int(np.argmin(others))
         raise InputError(
             "positions",
-            found=f"asperities {min(i, j)} and {max(i, j)} (from 0) at a distance of {worst:g}",
+            found=f"asperities {first} and {second} (from 0) at a distance of {worst:g}",
             expected="distinct positions",
         )
 
 
-def nearest_neighbours(points: Array) -> tuple[Array, Indices]:
-    """Distance to, and index of, each point's nearest neighbour; by a k-d tree."""
+def nearest_distances(points: Array) -> Array:
+    """(n,) [length] distance of each point to its nearest neighbour; by a k-d tree."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
-    distances, neighbours = map(np.asarray, cKDTree(points).query(points, k=2))
-    return distances[:, 1], neighbours[:, 1]
+    return np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]
 
 
 def _points(positions: ArrayLike) -> Array:

@@ -60,7 +60,7 @@ class Newton:
             following = _step(problem, state)
             best = min(state, following, key=lambda s: s.residual)
             accurate = state.residual <= self.tolerance * (abs(state.approach) + farthest)
-            if accurate and following.residual > 0.5 * state.residual:
+            if accurate and following.residual >= 0.5 * state.residual:
                 residual = problem.residual(best.loads, best.approach)
                 return Solution(best.loads, best.approach, iteration, residual)
             state = following
@@ -122,6 +122,8 @@ def _step(problem: NormalProblem, state: _State) -> _State:
 def _direction(problem: NormalProblem, state: _State) -> Array:
     """-F - A W y + beta: beta, the change of D0, is 0 unless the total load is prescribed."""
     touching = np.flatnonzero(state.loads)
+    if len(touching) == 0:
+        return -state.defect
     loads = state.loads[touching]
     root = np.sqrt(1.0 / problem.stiffness(loads, touching))  # W
     right = np.column_stack((-root * state.defect[touching], root))
@@ -139,12 +141,13 @@ def _solve_scaled(problem: NormalProblem, touching: Indices, root: Array, right:
     """Solve (I + W A W) y = right on the touching set; with the shells added if indefinite."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
-    matrix = problem.influence.matrix[np.ix_(touching, touching)]
-    matrix *= root
-    matrix *= root[:, None]
     for shells in (0.0, problem.shells[touching]):
+        matrix = problem.influence.matrix[np.ix_(touching, touching)]
+        matrix *= root
+        matrix *= root[:, None]
         np.fill_diagonal(matrix, 1.0 + root * shells * root)
-        factor, info = dpotrf(matrix, lower=1, clean=0)
+        # The transpose of a symmetric matrix is itself, and in LAPACK's order: no copy.
+        factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
         if info == 0:
             solution: Array = dpotrs(factor, right, lower=1)[0]
             return solution

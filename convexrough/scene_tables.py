@@ -1,0 +1,258 @@
+"""The tables of a scene file: what each key may hold, and every mistake in words.
+
+Each field's `description` is what a message says after "expected". Only this module knows pydantic,
+which takes 0.1 s to import: `read_scene` imports it when a file is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+)
+from pydantic_core import ErrorDetails
+
+from convexrough import solvers
+from convexrough.checks import nearest
+
+#: What `[solver] name` may say.
+SOLVERS: dict[str, Callable[[], solvers.Solver]] = {"newton": solvers.Newton}
+
+Positive = Annotated[float, Field(gt=0, description="a positive number")]
+Spread = Annotated[float, Field(ge=0, description="a number that is not negative")]
+Finite = Annotated[float, Field(description="a finite number")]
+TipRadius = Annotated[
+    Annotated[Positive, Tag("number")] | Annotated[list[Positive], Tag("list")],
+    Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
+    Field(description="a positive number, or a list of one per asperity"),
+]
+Fractions = Annotated[
+    list[Annotated[float, Field(ge=-1, le=1)]],
+    Field(min_length=1, description="a list of numbers from -1 to 1"),
+]
+Shares = Annotated[
+    list[Annotated[float, Field(ge=0, le=1)]],
+    Field(min_length=1, description="a list of numbers from 0 to 1"),
+]
+Geometry = Annotated[Literal["summit", "closest"], Field(description='"summit" or "closest"')]
+
+
+class Table(BaseModel):
+    """A table: numbers are finite, no text or truth value stands for one, no other keys."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+    alternatives: ClassVar[tuple[str, str] | None] = None  # keys of which exactly one is given
+    needs: ClassVar[dict[str, str]] = {}  # the key on the left is only used with that on the right
+
+    @classmethod
+    def mistakes_between(cls, keys: dict[str, Any]) -> Iterator[str]:
+        """Mistakes in which keys are given together, whatever their values."""
+        if cls.alternatives:
+            given = [key for key in cls.alternatives if key in keys]
+            if len(given) != 1:
+                found = "both" if given else "neither"
+                both = ", ".join(cls.alternatives)
+                yield f"{both}: found {found}, expected exactly one of the two"
+        for key, needed in cls.needs.items():
+            if key in keys and needed not in keys:
+                yield f"{needed}: missing, needed with {key}"
+
+    def mistakes_within(self) -> Iterator[str]:
+        """Mistakes that only show between values each right by itself."""
+        yield from ()
+
+
+class Sphere(Table):
+    radius: Positive
+
+
+class Material(Table):
+    alternatives = ("contact_modulus", "youngs_modulus")
+    contact_modulus: Positive | None = None
+    youngs_modulus: Positive | None = None
+    poisson_ratio: Annotated[float, Field(ge=0, le=0.5, description="a number from 0 to 0.5")]
+
+
+class Lattice(Table):
+    needs: ClassVar = {"height_std": "seed", "tip_radius_cv": "seed"}
+    pattern: Annotated[
+        Literal["hexagonal", "square"], Field(description='"hexagonal", "square" or "file"')
+    ]
+    spacing: Positive
+    tip_radius: TipRadius
+    within: Spread | None = None
+    height_std: Spread = 0.0
+    tip_radius_cv: Spread = 0.0
+    seed: Annotated[int, Field(ge=0, description="a whole number, not negative")] | None = None
+    geometry: Geometry = "summit"
+
+
+class Summits(Table):
+    pattern: Literal["file"]
+    path: Annotated[str, Field(min_length=1, description="the name of a CSV file")]
+    tip_radius: TipRadius | None = None
+    geometry: Geometry = "summit"
+
+
+class Normal(Table):
+    alternatives = ("approach", "load")
+    approach: Finite | None = None
+    load: Positive | None = None
+
+
+class Friction(Table):
+    coefficient: Positive
+
+
+class Shear(Table):
+    fractions: Shares
+
+
+class Cycle(Table):
+    maximum: Fractions
+    minimum: Fractions | None = None
+
+    @property
+    def lowest(self) -> list[float]:
+        """The minimum of each cycle: the negative of its maximum unless given."""
+        return [-value for value in self.maximum] if self.minimum is None else self.minimum
+
+    def mistakes_within(self) -> Iterator[str]:
+        if (n := len(self.lowest)) != len(self.maximum):
+            yield f"minimum: found {n} values, expected {len(self.maximum)}, as in maximum"
+            return
+        for i, (low, high) in enumerate(zip(self.lowest, self.maximum, strict=True)):
+            if not low < high:
+                yield f"maximum[{i}]: found {high}, expected a number above its minimum, {low}"
+
+
+class History(Table):
+    fractions: Fractions
+
+
+def _known(name: str) -> str:
+    if name not in SOLVERS:
+        raise ValueError
+    return name
+
+
+class Solver(Table):
+    name: Annotated[
+        str, AfterValidator(_known), Field(description=f"one of: {', '.join(SOLVERS)}")
+    ] = "newton"
+
+
+class Units(Table):
+    length: Annotated[str, Field(description='text, such as "m"')] = ""
+    force: Annotated[str, Field(description='text, such as "N"')] = ""
+
+
+@dataclass(frozen=True)
+class Document:
+    """The tables of one file, each right by itself and beside the others."""
+
+    sphere: Sphere
+    material: Material
+    asperities: Lattice | Summits
+    normal: Normal
+    friction: Friction | None = None
+    shear: Shear | None = None
+    cycle: Cycle | None = None
+    history: History | None = None
+    solver: Solver = Solver()
+    units: Units = Units()
+
+
+_TABLES: dict[str, tuple[type[Table], ...]] = {
+    "sphere": (Sphere,),
+    "material": (Material,),
+    "asperities": (Lattice, Summits),
+    "normal": (Normal,),
+    "friction": (Friction,),
+    "shear": (Shear,),
+    "cycle": (Cycle,),
+    "history": (History,),
+    "solver": (Solver,),
+    "units": (Units,),
+}
+_REQUIRED = ("sphere", "material", "asperities", "normal")
+_FRICTIONAL = ("shear", "cycle", "history")
+
+
+def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
+    """The tables of a parsed file, or None and everything that is wrong, one line each."""
+    tables: dict[str, Any] = {}
+    mistakes = []
+    for name, keys in contents.items():
+        if name not in _TABLES:
+            kind = "table" if isinstance(keys, dict) else "key outside the tables"
+            mistakes.append(f"[{name}]: unknown {kind}, {nearest(name, _TABLES)}")
+        elif not isinstance(keys, dict):
+            mistakes.append(f"[{name}]: found {_shown(keys)}, expected a table")
+        else:
+            table, found = _validate_table(name, keys)
+            tables[name] = table
+            mistakes += [f"[{name}] {mistake}" for mistake in found]
+    for name in _REQUIRED:
+        if name not in contents:
+            keys = ", ".join(key for key in _TABLES[name][0].model_fields)
+            mistakes.append(f"[{name}]: missing table, its keys are: {keys}")
+    for name in _FRICTIONAL:
+        if name in contents and "friction" not in contents:
+            mistakes.append(f"[friction] coefficient: missing, needed with [{name}]")
+    mistakes += _unbounded(tables)
+    return (None if mistakes else Document(**tables)), mistakes
+
+
+def _validate_table(name: str, keys: dict[str, Any]) -> tuple[Table | None, list[str]]:
+    model = _TABLES[name][0]
+    if keys.get("pattern") == "file":
+        model = _TABLES[name][-1]
+    mistakes = list(model.mistakes_between(keys))
+    try:
+        table = model.model_validate(keys)
+    except ValidationError as error:
+        return None, [_phrase(name, model, each) for each in error.errors()] + mistakes
+    return table, mistakes + list(table.mistakes_within())
+
+
+def _phrase(name: str, model: type[Table], error: ErrorDetails) -> str:
+    """One mistake: the key, or element of its list, what was found, what is expected."""
+    key, *inner = error["loc"]
+    place = str(key) + "".join(f"[{i}]" for i in inner if isinstance(i, int))
+    if error["type"] == "extra_forbidden":
+        if any(key in other.model_fields for other in _TABLES[name]):
+            return f"{place}: not used with this pattern"
+        return f"{place}: unknown key, {nearest(place, model.model_fields)}"
+    expected = str(model.model_fields[str(key)].description)
+    if error["type"] == "missing":
+        return f"{place}: missing, expected {expected}"
+    if place != key:
+        expected = expected.removeprefix("a list of ").removesuffix(
+            ", or a list of one per asperity"
+        )
+    return f"{place}: found {_shown(error['input'])}, expected {expected}"
+
+
+def _unbounded(tables: dict[str, Any]) -> Iterator[str]:
+    """A list of tip radii says how many asperities there are; a load alone does not."""
+    lattice, normal = tables.get("asperities"), tables.get("normal")
+    if not isinstance(lattice, Lattice) or normal is None or normal.load is None:
+        return
+    if isinstance(lattice.tip_radius, list) and lattice.within is None:
+        yield "[asperities] within: missing, needed with a list of tip radii under a given load"
+
+
+def _shown(value: object) -> str:
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,263 @@
+"""The certificate under attack: whatever it is given, no word and no bound may be wrong."""
+
+from typing import Any
+
+import multiprecision
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scenes import (
+    MATERIAL,
+    NAMED,
+    PAPER_APPROACH,
+    paper,
+    random_scenes,
+    reference,
+    rough,
+    solve_exactly,
+)
+
+import convexrough as cr
+from convexrough.certificate import _convex_margin, judge
+from convexrough.normal import NormalProblem
+
+Array = NDArray[np.float64]
+
+
+def assert_honest(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
+    """Every word agrees with the proved solution, and every bound covers the distance to it."""
+    for word, load, gap in zip(certificate.status, exact.loads, exact.gaps, strict=True):
+        assert word in ("contact", "open", "undecided")
+        assert word != "contact" or load > 0
+        assert word != "open" or gap > 0
+    assert (np.abs(multiprecision.errors(loads, exact.loads)) <= certificate.load_errors).all()
+    gap_errors = np.abs(multiprecision.errors(certificate.gaps, exact.gaps))
+    assert (gap_errors <= certificate.gap_errors).all()
+    drift = abs(float(multiprecision.errors([certificate.approach], [exact.approach])[0]))
+    assert drift <= certificate.approach_error
+
+
+def attack(kind: str, loads: Array, rng: np.random.Generator) -> Array:
+    """Wrong loads: each a mistake that a user or a solver could make."""
+    wrong = loads.copy()
+    loaded = np.flatnonzero(loads)
+    if kind == "dropped" and len(loaded):
+        wrong[rng.choice(loaded)] = 0.0
+    elif kind == "smallest dropped" and len(loaded):
+        wrong[loaded[np.argmin(loads[loaded])]] = 0.0
+    elif kind == "added":
+        wrong[rng.integers(len(loads))] += loads.max() * 10.0 ** rng.uniform(-16, 0)
+    elif kind == "perturbed":
+        wrong *= 1 + 10.0 ** rng.uniform(-15, -1) * rng.standard_normal(len(loads))
+        wrong = np.maximum(wrong, 0.0)
+    elif kind == "swapped":
+        i, j = rng.integers(len(loads), size=2)
+        wrong[[i, j]] = wrong[[j, i]]
+    elif kind == "zero":
+        wrong[:] = 0.0
+    elif kind == "random":
+        wrong = loads.max() * rng.random(len(loads)) ** 4
+    elif kind == "huge":
+        wrong = loads * 1e6
+    elif kind == "scaled":
+        wrong = loads * (1 + rng.uniform(-0.1, 0.1))
+    elif kind == "rounded":
+        digits = int(rng.integers(1, 16))
+        wrong = np.array([float(f"{load:.{digits}e}") for load in loads])
+    elif kind == "single precision":
+        wrong = loads.astype(np.float32).astype(np.float64)
+    return wrong
+
+
+ATTACKS = [
+    "none",
+    "dropped",
+    "smallest dropped",
+    "added",
+    "perturbed",
+    "swapped",
+    "zero",
+    "random",
+    "huge",
+    "scaled",
+    "rounded",
+    "single precision",
+]
+
+
+@pytest.mark.parametrize("kind", ATTACKS)
+@pytest.mark.parametrize("name", ["paper", "rough, closest", "steel"])
+def test_attacks_on_known_scenes(name: str, kind: str) -> None:
+    scene, approach = NAMED[name]
+    exact = reference(scene, approach=approach)
+    contact = cr.press(scene, approach=approach)
+    for seed in range(5):
+        wrong = attack(kind, contact.loads, np.random.default_rng(seed))
+        assert_honest(cr.certify(scene, wrong, approach=approach), wrong, exact)
+        if wrong.any():
+            exact_load = reference(scene, load=contact.load)
+            assert_honest(cr.certify(scene, wrong, load=contact.load), wrong, exact_load)
+
+
+@settings(max_examples=100, deadline=None)
+@given(random_scenes(crowding=1.2, most=10), st.sampled_from(ATTACKS), st.integers(0, 2**32 - 1))
+def test_attacks_on_random_scenes(drawn: tuple[cr.Scene, float], kind: str, seed: int) -> None:
+    scene, approach = drawn
+    contact = cr.press(scene, approach=approach)
+    wrong = attack(kind, contact.loads, np.random.default_rng(seed))
+    certificate = cr.certify(scene, wrong, approach=approach)
+    if certificate.scope != "none" and contact.load > 0:
+        exact = solve_exactly(scene, approach=approach, start=contact.loads)
+        assert_honest(certificate, wrong, exact)
+        if kind == "none":
+            assert certificate.holds
+    if wrong.any() and contact.load > 0:
+        certificate = cr.certify(scene, wrong, load=contact.load)
+        if certificate.scope != "none":
+            exact = solve_exactly(scene, load=contact.load, start=contact.loads)
+            assert_honest(certificate, wrong, exact)
+
+
+@pytest.mark.parametrize(("digits", "bound"), [(3, 2e-2), (6, 2e-5), (9, 2e-8)])
+def test_rounded_loads_of_the_paper(digits: int, bound: float) -> None:
+    """The bound follows the rounding, and no word changes."""
+    scene = paper()
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    rounded = np.array([float(f"{load:.{digits - 1}e}") for load in contact.loads])
+    certificate = cr.certify(scene, rounded, approach=PAPER_APPROACH)
+    error = np.abs(rounded - contact.loads).max()
+    assert error <= certificate.load_error <= bound * contact.loads.max()
+    assert (certificate.status == contact.status).all()
+    assert certificate.holds
+
+
+def test_a_dropped_asperity_is_not_called_open() -> None:
+    scene = paper()
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    for i in (0, 3, 36):
+        dropped = contact.loads.copy()
+        dropped[i] = 0.0
+        certificate = cr.certify(scene, dropped, approach=PAPER_APPROACH)
+        assert certificate.status[i] != "open"
+        assert certificate.load_errors[i] >= contact.loads[i]
+
+
+def test_touching_exactly_is_undecided() -> None:
+    """An asperity with no load and no gap: neither word may be said."""
+    r, load = 1e-3, 1e-7
+    k = (9 / (16 * (1 / (1 + 100)))) ** (1 / 3)
+    approach = k * load ** (2 / 3)
+    height = load / (np.pi * r) - approach + r**2 / 2
+    scene = cr.Scene(1.0, cr.Asperities([[0, 0], [r, 0]], 0.01, [0, height]), MATERIAL)
+    certificate = cr.press(scene, approach=approach).certificate
+    assert list(certificate.status) == ["contact", "undecided"]
+    assert certificate.scope == "global"
+    assert not certificate.holds
+
+
+def test_scopes() -> None:
+    """From easy to hard: the shells, the Cholesky test, a local box, nothing."""
+
+    def pressed(spacing: float, tip_radius: float) -> cr.Certificate:
+        lattice = cr.Asperities.hexagonal(spacing=spacing, tip_radius=tip_radius, within=0.0102)
+        return cr.press(cr.Scene(1.0, lattice, MATERIAL), approach=PAPER_APPROACH).certificate
+
+    shells, cholesky = pressed(0.0012, 0.01), pressed(0.0012, 0.03)
+    local, nothing = pressed(0.0012, 0.2), pressed(0.0025, 5.0)
+    assert shells.scope == "global"
+    assert shells.convexity_number < 0.75
+    assert cholesky.scope == "global"
+    assert cholesky.convexity_number in (0.9, 0.999)
+    assert local.scope == "local"
+    assert local.holds
+    assert nothing.scope == "none"
+    assert not nothing.holds
+    assert np.isinf(nothing.load_errors).all()
+    assert (nothing.status == "undecided").all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.1, 3))
+def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-1, 1, (12, 2)) * 1e-2
+    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL)
+    problem = NormalProblem.assemble(scene, approach=1e-4)
+    h = problem.stiffness(problem.bounds(problem.ceiling) * size)
+    hessian = problem.influence.matrix / np.sqrt(h) / np.sqrt(h)[:, None] + np.eye(12)
+    margin = _convex_margin(problem.influence, h)
+    smallest = np.linalg.eigvalsh(hessian)[0]
+    assert margin <= max(smallest, 0.0)
+    assert margin > 0 or smallest < 1.1e-3
+
+
+def test_bounds_do_not_depend_on_who_solved() -> None:
+    """`press` and `certify` give the same judgement of the same loads."""
+    scene = rough()
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    again = cr.certify(scene, contact.loads, approach=PAPER_APPROACH)
+    assert (again.load_errors == contact.certificate.load_errors).all()
+    assert (again.status == contact.status).all()
+
+
+def test_the_rounding_of_the_residual_is_counted() -> None:
+    """Loads correctly rounded from 50 digits still have a bound above their last digit."""
+    scene, approach = NAMED["rough"]
+    exact = reference(scene, approach=approach)
+    rounded = np.array([float(load) for load in exact.loads])
+    certificate = cr.certify(scene, rounded, approach=approach)
+    assert certificate.holds
+    assert_honest(certificate, rounded, exact)
+    problem = NormalProblem.assemble(scene, approach=approach)
+    computed = problem.residual(rounded[problem.candidates] / problem.units.force, approach)
+    assert certificate.load_error > 0
+    assert computed >= 0
+
+
+def test_judging_loads_of_screened_asperities() -> None:
+    """A load on an asperity that cannot touch is proved to be wrong by just that load."""
+    scene = paper()
+    contact = cr.press(scene, approach=1e-5)
+    outermost = len(scene) - 1
+    wrong = contact.loads.copy()
+    wrong[outermost] = 1e-9
+    certificate = cr.certify(scene, wrong, approach=1e-5)
+    assert certificate.status[outermost] == "open"
+    assert certificate.load_errors[outermost] == 1e-9
+
+
+@pytest.mark.parametrize(
+    ("loads", "message"),
+    [
+        (np.zeros(60), "expected 61 values"),
+        (-np.ones(61), r"loads\[0\]: found -1.0"),
+        (np.full(61, np.nan), r"loads\[0\]: found nan"),
+        (np.full(61, np.inf), r"loads\[0\]: found inf"),
+        (["a"] * 61, "expected numbers"),
+    ],
+)
+def test_bad_loads(loads: Any, message: str) -> None:
+    with pytest.raises(cr.InputError, match=message):
+        cr.certify(paper(), loads, approach=PAPER_APPROACH)
+
+
+def test_no_loads_under_load_control() -> None:
+    with pytest.raises(cr.InputError, match="found none"):
+        cr.certify(paper(), np.zeros(61), load=1e-7)
+
+
+def test_both_or_neither_control() -> None:
+    for control in ({}, {"approach": 1e-5, "load": 1e-7}):
+        with pytest.raises(cr.InputError, match="exactly one of the two"):
+            cr.certify(paper(), np.zeros(61), **control)
+
+
+def test_judge_is_certify() -> None:
+    scene, approach = NAMED["paper"]
+    loads = cr.press(scene, approach=approach).loads
+    problem = NormalProblem.assemble(scene, approach=approach)
+    assert (
+        judge(problem, loads).load_error == cr.certify(scene, loads, approach=approach).load_error
+    )

@@ -1,0 +1,251 @@
+"""The solved contact: reference values, closed forms, symmetries, and 50-digit solutions."""
+
+import multiprecision
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scenes import (
+    MATERIAL,
+    NAMED,
+    PAPER_APPROACH,
+    paper,
+    random_scenes,
+    reference,
+    rough,
+    steel,
+)
+from scipy.optimize import brentq
+
+import convexrough as cr
+from convexrough import hertz
+
+RINGS = {  # distance^2 / spacing^2 -> (name, asperities, load), computed independently
+    0: ("F", 1, 1.935817e-8),
+    1: ("E", 6, 1.759637e-8),
+    3: ("D", 6, 1.382348e-8),
+    4: ("C", 6, 1.183320e-8),
+    7: ("B", 12, 5.732965e-9),
+    9: ("A", 6, 2.196890e-9),
+}
+
+
+def test_the_papers_example() -> None:
+    scene = paper()
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    ring = np.round((scene.asperities.distances / 0.0025) ** 2)
+    assert (contact.status == "contact").sum() == 37
+    assert contact.load == pytest.approx(3.60853389e-7, rel=2e-9)
+    for square, (name, count, load) in RINGS.items():
+        found = contact.loads[ring == square]
+        assert len(found) == count, name
+        assert_allclose(found, load, rtol=3e-7, err_msg=name)
+    assert contact.certificate.scope == "global"
+    assert contact.certificate.convexity_number == pytest.approx(0.504, abs=5e-4)
+    assert contact.model_error == pytest.approx(0.002, abs=5e-4)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_fifty_digits(name: str) -> None:
+    """Loads and gaps against a proved multiprecision solution, and the bounds against the truth."""
+    scene, approach = NAMED[name]
+    contact = cr.press(scene, approach=approach)
+    exact = reference(scene, approach=approach)
+    assert multiprecision.relative_errors(contact.loads, exact.loads).max() < 1e-13
+    gap_errors = multiprecision.errors(contact.gaps, exact.gaps)
+    assert gap_errors.max() < 1e-13 * contact.gaps.max()
+    truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
+    certificate = contact.certificate
+    assert certificate.holds
+    assert (truth <= certificate.load_errors).all()
+    assert (np.abs(gap_errors) <= certificate.gap_errors).all()
+    assert certificate.load_error <= 1e4 * truth.max()
+    assert certificate.load_error <= 1e-10 * contact.loads.max()
+
+
+@pytest.mark.parametrize("scene", [paper(), rough(), rough("closest"), steel()])
+def test_fifty_digits_under_load_control(scene: cr.Scene) -> None:
+    load = cr.press(scene, approach=5e-5 * scene.sphere_radius).load
+    contact = cr.press(scene, load=load)
+    exact = reference(scene, load=load)
+    assert multiprecision.relative_errors(contact.loads, exact.loads).max() < 1e-13
+    truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
+    certificate = contact.certificate
+    assert certificate.scope == "global"
+    assert certificate.holds
+    assert (truth <= certificate.load_errors).all()
+    assert certificate.load_error <= 1e4 * truth.max()
+    drift = abs(float(multiprecision.errors([contact.approach], [exact.approach])[0]))
+    assert drift <= min(certificate.approach_error, 1e-14 * contact.approach)
+    gap_errors = np.abs(multiprecision.errors(contact.gaps, exact.gaps))
+    assert (gap_errors <= certificate.gap_errors).all()
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_a_single_asperity_is_hertz(control: str) -> None:
+    scene = cr.Scene(2.0, cr.Asperities([[0.0, 0.0]], 0.5), MATERIAL)
+    radius, approach = 0.4, 1e-3  # 1/R_i = 1/2 + 1/0.5
+    load = 4 / 3 * np.sqrt(radius) * approach**1.5
+    contact = cr.press(scene, **{control: {"approach": approach, "load": load}[control]})
+    assert_allclose(contact.loads, [load], rtol=1e-15)
+    assert contact.approach == pytest.approx(approach, rel=1e-15)
+    assert_allclose(contact.contact_radii, np.sqrt(radius * approach), rtol=1e-15)
+    assert contact.certificate.scope == "global"
+    assert contact.certificate.convexity_number == 0
+    assert contact.status[0] == "contact"
+
+
+def test_two_equal_asperities_by_hand() -> None:
+    """k P^(2/3) + P / (pi E* r) = D for both."""
+    scene = cr.Scene(1.0, cr.Asperities([[-1e-3, 0], [1e-3, 0]], 0.01), MATERIAL)
+    prescribed = 2e-5 - 1e-6 / 2
+    k = (9 / (16 * (1 / (1 + 100)))) ** (1 / 3)
+    load = brentq(lambda p: k * p ** (2 / 3) + p / (np.pi * 2e-3) - prescribed, 0, 1, xtol=1e-25)
+    contact = cr.press(scene, approach=2e-5)
+    assert_allclose(contact.loads, load, rtol=1e-13)
+
+
+def test_three_asperities_by_hand() -> None:
+    """One in the middle and two beside it: two equations, solved by nested bisection."""
+    r = 1.5e-3
+    scene = cr.Scene(1.0, cr.Asperities([[0, 0], [r, 0], [-r, 0]], 0.01), MATERIAL)
+    middle, beside = 2e-5, 2e-5 - r**2 / 2
+    k = (9 / (16 * (1 / (1 + 100)))) ** (1 / 3)
+
+    def side(centre: float) -> float:
+        return brentq(
+            lambda p: k * p ** (2 / 3) + p / (2 * np.pi * r) + centre / (np.pi * r) - beside,
+            0,
+            1,
+            xtol=1e-25,
+        )
+
+    def excess(centre: float) -> float:
+        return k * centre ** (2 / 3) + 2 * side(centre) / (np.pi * r) - middle
+
+    top = 0.99 * beside * np.pi * r
+    centre = brentq(excess, 1e-12, min(top, (middle / k) ** 1.5), xtol=1e-25)
+    contact = cr.press(scene, approach=2e-5)
+    assert_allclose(contact.loads, [centre, side(centre), side(centre)], rtol=1e-12)
+
+
+def test_two_asperities_one_of_them_just_open() -> None:
+    """The second asperity lies lower than the first one's dent at its place: its gap by hand."""
+    r, load = 1e-3, 1e-7
+    k = (9 / (16 * (1 / (1 + 100)))) ** (1 / 3)
+    dent = load / (np.pi * r)
+    approach = k * load ** (2 / 3)
+    height = dent - approach + r**2 / 2 - 1e-9  # 1e-9 below touching
+    scene = cr.Scene(1.0, cr.Asperities([[0, 0], [r, 0]], 0.01, [0, height]), MATERIAL)
+    contact = cr.press(scene, approach=approach)
+    assert list(contact.status) == ["contact", "open"]
+    assert contact.gaps[1] == pytest.approx(1e-9, rel=1e-10)
+    assert contact.loads[0] == pytest.approx(load, rel=1e-14)
+
+
+@settings(max_examples=25, deadline=None)
+@given(random_scenes(), st.floats(-3, 3), st.floats(-3, 3))
+def test_units_do_not_matter(drawn: tuple[cr.Scene, float], length: float, force: float) -> None:
+    """Lengths times lambda and moduli times mu: loads times lambda^2 mu, the same words."""
+    scene, approach = drawn
+    lam, mu = 10**length, 10**force
+    a = scene.asperities
+    scaled = cr.Scene(
+        scene.sphere_radius * lam,
+        cr.Asperities(a.positions * lam, a.tip_radii * lam, a.heights * lam),
+        cr.Material(scene.material.contact_modulus * mu, 0.3),
+        geometry=scene.geometry,
+    )
+    first, second = cr.press(scene, approach=approach), cr.press(scaled, approach=approach * lam)
+    top = first.loads.max()
+    assert_allclose(second.loads / (lam**2 * mu), first.loads, rtol=1e-11, atol=1e-12 * top)
+    sure = (first.status != "undecided") & (second.status != "undecided")
+    assert (first.status == second.status)[sure].all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(random_scenes(), st.randoms(use_true_random=False), st.floats(0, 6.28))
+def test_order_and_orientation_do_not_matter(
+    drawn: tuple[cr.Scene, float], random: object, angle: float
+) -> None:
+    scene, approach = drawn
+    a = scene.asperities
+    order = list(range(len(a)))
+    random.shuffle(order)  # type: ignore[attr-defined]
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    turned = cr.Scene(
+        scene.sphere_radius,
+        cr.Asperities((a.positions @ turn.T)[order], a.tip_radii[order], a.heights[order]),
+        scene.material,
+        geometry=scene.geometry,
+    )
+    first, second = cr.press(scene, approach=approach), cr.press(turned, approach=approach)
+    top = first.loads.max()
+    assert_allclose(second.loads, first.loads[order], rtol=1e-10, atol=1e-12 * top)
+
+
+@settings(max_examples=25, deadline=None)
+@given(random_scenes())
+def test_load_control_inverts_approach_control(drawn: tuple[cr.Scene, float]) -> None:
+    scene, approach = drawn
+    first = cr.press(scene, approach=approach)
+    if first.load == 0:
+        return
+    second = cr.press(scene, load=first.load)
+    assert second.load == pytest.approx(first.load, rel=1e-14)
+    assert second.approach == pytest.approx(approach, rel=1e-11)
+    assert_allclose(second.loads, first.loads, rtol=1e-9, atol=1e-12 * first.loads.max())
+
+
+@settings(max_examples=25, deadline=None)
+@given(random_scenes(), st.floats(0.1, 0.99))
+def test_total_load_grows_with_the_approach(drawn: tuple[cr.Scene, float], part: float) -> None:
+    scene, approach = drawn
+    lower, upper = cr.press(scene, approach=part * approach), cr.press(scene, approach=approach)
+    assert lower.load <= upper.load
+
+
+def test_nothing_touches() -> None:
+    scene = cr.Scene(1.0, cr.Asperities([[1e-3, 0], [2e-3, 0]], 0.01), MATERIAL)
+    contact = cr.press(scene, approach=1e-7)
+    assert contact.load == 0
+    assert list(contact.status) == ["open", "open"]
+    assert contact.certificate.holds
+    assert_allclose(contact.gaps, [5e-7 - 1e-7, 2e-6 - 1e-7], rtol=1e-9)
+
+
+@pytest.mark.parametrize("start", ["zero", "huge", "one", "swapped"])
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_the_start_does_not_matter(start: str, control: str) -> None:
+    scene = rough()
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    first = {
+        "zero": np.zeros(91),
+        "huge": np.full(91, 1.0),
+        "one": np.eye(91)[40] * 1e-5,
+        "swapped": contact.loads[::-1],
+    }[start]
+    again = cr.press(
+        scene,
+        start=first,
+        **{control: {"approach": PAPER_APPROACH, "load": contact.load}[control]},
+    )
+    assert_allclose(again.loads, contact.loads, rtol=1e-12, atol=1e-13 * contact.loads.max())
+
+
+def test_contact_fields() -> None:
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    assert contact.solver == "newton"
+    assert contact.candidates == 61
+    assert contact.load == contact.loads.sum()
+    radii = hertz.contact_radius(contact.loads, 1.0, paper().relative_radii)
+    assert_allclose(contact.contact_radii, radii)
+    for array in (contact.loads, contact.gaps, contact.contact_radii, contact.status):
+        assert not array.flags.writeable
+    assert (contact.gaps[contact.status == "contact"] == 0).all()
+
+
+def test_newton_says_so_where_it_does_not_converge() -> None:
+    with pytest.raises(cr.SolverError, match=r"newton: residual .* after 2 steps"):
+        cr.press(paper(), approach=PAPER_APPROACH, solver=cr.solvers.Newton(max_iterations=2))

@@ -1,0 +1,190 @@
+"""Material, asperities, scene: geometry by independent means, and bad values."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scenes import MATERIAL, paper
+from scipy.optimize import minimize
+
+import convexrough as cr
+from convexrough.scene import CUT, largest_tip_radius, reach
+
+
+def test_material() -> None:
+    steel = cr.Material.from_youngs(210e9, 0.3)
+    assert steel.contact_modulus == pytest.approx(210e9 / (2 * 0.91), rel=1e-15)
+    assert steel.shear_modulus == pytest.approx(210e9 / 2.6, rel=1e-15)
+    assert steel.youngs_modulus == pytest.approx(210e9, rel=1e-15)
+
+
+def test_hexagonal_lattice() -> None:
+    lattice = cr.Asperities.hexagonal(spacing=0.5, tip_radius=1, within=2.0)
+    rings = {0: 1, 1: 6, 3: 6, 4: 6, 7: 12, 9: 6, 12: 6, 13: 12, 16: 6}
+    squares = np.round((lattice.distances / 0.5) ** 2).astype(int)
+    assert {s: int((squares == s).sum()) for s in set(squares)} == rings
+    assert (np.diff(squares) >= 0).all()
+    apart = np.hypot(*(lattice.positions[:, None] - lattice.positions).T)
+    np.fill_diagonal(apart, np.inf)
+    assert_allclose(apart.min(axis=0), 0.5)
+    assert ((apart < 0.5001).sum(axis=0)[:7] == 6).all()
+
+
+def test_square_lattice() -> None:
+    lattice = cr.Asperities.square(spacing=2.0, tip_radius=1, within=4.0)
+    assert len(lattice) == 13
+    assert {tuple(p) for p in lattice.positions} >= {(0, 0), (4, 0), (-2, 2), (0, -4)}
+
+
+def test_a_larger_region_keeps_what_was_there() -> None:
+    options: dict[str, Any] = dict(
+        spacing=1.0, tip_radius=2.0, height_std=0.1, tip_radius_cv=0.3, seed=3
+    )
+    small = cr.Asperities.hexagonal(within=3.0, **options)
+    large = cr.Asperities.hexagonal(within=9.0, **options)
+    n = len(small)
+    assert n < len(large)
+    assert (large.positions[:n] == small.positions).all()
+    assert (large.heights[:n] == small.heights).all()
+    assert (large.tip_radii[:n] == small.tip_radii).all()
+
+
+def test_random_heights_and_radii() -> None:
+    options: dict[str, Any] = dict(spacing=1.0, tip_radius=2.0, within=60.0, seed=11)
+    both = cr.Asperities.square(height_std=0.1, tip_radius_cv=0.3, **options)
+    only_heights = cr.Asperities.square(height_std=0.1, **options)
+    assert (both.heights == only_heights.heights).all()
+    assert (only_heights.tip_radii == 2.0).all()
+    n = len(both)
+    assert both.heights.std() == pytest.approx(0.1, rel=4 / np.sqrt(n))
+    assert abs(both.heights.mean()) < 0.4 / np.sqrt(n)
+    assert both.tip_radii.mean() == pytest.approx(2.0, rel=1.5 / np.sqrt(n))
+    assert both.tip_radii.std() / both.tip_radii.mean() == pytest.approx(0.3, rel=0.05)
+    assert both.tip_radii.max() <= largest_tip_radius(2.0, 0.3)
+    assert np.abs(both.heights).max() <= CUT * 0.1
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.1, 10), st.floats(0.01, 10), st.floats(-2, 2), st.floats(-2, 2))
+def test_closest_points_by_minimisation(radius: float, tip: float, x: float, y: float) -> None:
+    """The contact point and the drop of the closest geometry minimise the gap of two paraboloids."""
+    scene = cr.Scene(radius, cr.Asperities([[x, y]], tip), MATERIAL, geometry="closest")
+
+    def gap(point: Any) -> float:
+        u, v = point
+        return (u * u + v * v) / (2 * radius) + ((u - x) ** 2 + (v - y) ** 2) / (2 * tip)
+
+    best = minimize(gap, [x, y], tol=1e-14)
+    assert_allclose(scene.contact_points[0], best.x, atol=1e-5)
+    assert scene.drops[0] == pytest.approx(best.fun, rel=1e-8, abs=1e-12)
+
+
+def test_summit_geometry() -> None:
+    scene = paper()
+    assert_allclose(scene.relative_radii, 1 / (1 + 50))
+    assert_allclose(scene.drops, scene.asperities.distances**2 / 2, atol=1e-18)
+    assert scene.contact_points is scene.asperities.positions
+
+
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+def test_reach(geometry: Any) -> None:
+    """Just inside the reach an asperity could touch, just outside it cannot."""
+    edge = reach(1e-4, sphere_radius=2.0, tip_radius=0.1, height=1e-5, geometry=geometry)
+    for factor, sign in ((0.999, 1), (1.001, -1)):
+        asperity = cr.Asperities([[edge * factor, 0]], 0.1, 1e-5)
+        scene = cr.Scene(2.0, asperity, MATERIAL, geometry=geometry)
+        assert np.sign(1e-4 + scene.offsets[0]) == sign
+        assert scene.reach(1e-4) == edge
+    assert reach(-1.0, sphere_radius=2.0, tip_radius=0.1, height=0.0, geometry=geometry) == 0
+
+
+BAD = [
+    (lambda: cr.Material(0.0, 0.3), "contact_modulus: found 0.0, expected a positive number"),
+    (lambda: cr.Material(float("nan"), 0.3), "contact_modulus: found nan"),
+    (lambda: cr.Material(1.0, 0.51), "poisson_ratio: found 0.51, expected a number from 0.0 to 0"),
+    (lambda: cr.Material(1.0, -0.1), "poisson_ratio: found -0.1"),
+    (lambda: cr.Material("soft", 0.3), "contact_modulus: found 'soft'"),  # type: ignore[arg-type]
+    (lambda: cr.Material(True, 0.3), "contact_modulus: found True"),
+    (lambda: cr.Material.from_youngs(-1.0, 0.3), "youngs_modulus: found -1.0"),
+    (lambda: cr.Asperities([], 1.0), "positions: found no asperity"),
+    (lambda: cr.Asperities([[0, 0, 0]], 1.0), r"positions: found shape \(1, 3\)"),
+    (lambda: cr.Asperities([[0, 0], [0, np.nan]], 1.0), r"positions\[1\]: found"),
+    (lambda: cr.Asperities([["a", 0]], 1.0), "positions: .* expected numbers"),
+    (lambda: cr.Asperities([[0, 0]], 0.0), r"tip_radii\[0\]: found 0.0, expected a positive"),
+    (lambda: cr.Asperities([[0, 0]], [1.0, 2.0]), "tip_radii: .* expected 1 values"),
+    (lambda: cr.Asperities([[0, 0]], 1.0, np.inf), r"heights\[0\]: found inf"),
+    (
+        lambda: cr.Asperities([[0, 1], [2, 3], [0, 1]], 1.0),
+        r"asperities 0 and 2 \(from 0\) at a distance of 0",
+    ),
+    (lambda: cr.Asperities.hexagonal(spacing=0, tip_radius=1, within=1), "spacing: found 0.0"),
+    (lambda: cr.Asperities.square(spacing=1, tip_radius=-1, within=1), r"tip_radius\[0\]"),
+    (lambda: cr.Asperities.square(spacing=1, tip_radius=1, within=-1), "within: found -1.0"),
+    (
+        lambda: cr.Asperities.square(spacing=1, tip_radius=1, within=1, height_std=1),
+        "seed: found None",
+    ),
+    (
+        lambda: cr.Asperities.square(spacing=1, tip_radius=[1, 2], within=1),
+        "tip_radius: .* expected 5 values",
+    ),
+    (
+        lambda: cr.Asperities.hexagonal(spacing=1e-9, tip_radius=1, within=1),
+        r"spacing: found 3.63e\+18 asperities .* memory",
+    ),
+    (
+        lambda: cr.Scene(-1.0, cr.Asperities([[0, 0]], 1), MATERIAL),
+        "sphere_radius: found -1.0",
+    ),
+    (
+        lambda: cr.Scene(1.0, cr.Asperities([[0, 0]], 1), MATERIAL, friction=0.0),
+        "friction: found 0.0",
+    ),
+    (
+        lambda: cr.Scene(1.0, cr.Asperities([[0, 0]], 1), MATERIAL, geometry="tip"),  # type: ignore[arg-type]
+        "geometry: found 'tip'",
+    ),
+    (
+        lambda: cr.Scene(
+            1.0, cr.Asperities([[2, 0], [3, 0]], [1.0, 2.0]), MATERIAL, geometry="closest"
+        ),
+        "asperities 0 and 1",
+    ),
+    (lambda: cr.press(paper(), approach=float("nan")), "approach: found nan"),
+    (lambda: cr.press(paper(), load=0.0), "load: found 0.0, expected a positive number"),
+    (lambda: cr.press(paper(), load=-1.0), "load: found -1.0"),
+    (lambda: cr.press(paper()), "approach, load: found neither"),
+    (lambda: cr.press(paper(), approach=1e-5, load=1e-5), "approach, load: found both"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), BAD)
+def test_bad_values(call: Any, message: str) -> None:
+    with pytest.raises(cr.InputError, match=message) as caught:
+        call()
+    assert isinstance(caught.value, ValueError)
+    assert isinstance(caught.value, cr.ConvexroughError)
+
+
+def test_arrays_are_copies_and_read_only() -> None:
+    positions = np.zeros((1, 2))
+    asperities = cr.Asperities(positions, 1.0)
+    positions[0] = 5.0
+    assert (asperities.positions == 0).all()
+    for values in (asperities.positions, asperities.tip_radii, asperities.heights):
+        assert not values.flags.writeable
+
+
+def test_import_is_light() -> None:
+    """Heavy libraries load when first used, not on import."""
+    import subprocess
+    import sys
+
+    code = (
+        "import convexrough, sys; heavy = {'cvxpy', 'clarabel', 'osqp', 'matplotlib', 'scipy', "
+        "'pydantic', 'click', 'rich', 'psutil'} & set(sys.modules); sys.exit(str(heavy) if heavy else 0)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
