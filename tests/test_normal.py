@@ -1,0 +1,223 @@
+"""The normal problem: derivatives, bounds, convexity, and contacts with known answers."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, rough, scattered
+
+import convexrough as cr
+from convexrough import hertz
+from convexrough.normal import NormalProblem, highest_approach, shift_to_load
+from convexrough.solvers import Newton
+
+
+def assembled(scene: cr.Scene, **control: float) -> NormalProblem:
+    return NormalProblem.assemble(scene, **control)
+
+
+def phi(problem: NormalProblem, loads: Any) -> float:
+    return problem.energy(loads, problem.influence.apply(loads))
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_the_gap_is_the_gradient_of_the_energy(name: str) -> None:
+    scene, approach = NAMED[name]
+    problem = assembled(scene, approach=approach)
+    rng = np.random.default_rng(0)
+    loads = problem.bounds(problem.ceiling) * rng.uniform(0.1, 0.9, len(problem))
+    gap = problem.gap(loads, problem.influence.apply(loads), problem.approach or 0.0)
+    direction = rng.standard_normal(len(problem)) * loads
+    step = 1e-5
+    slope = (phi(problem, loads + step * direction) - phi(problem, loads - step * direction)) / (
+        2 * step
+    )
+    assert slope == pytest.approx(float(gap @ direction), rel=1e-7)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_own_units_are_exact_and_of_order_one(name: str) -> None:
+    scene, approach = NAMED[name]
+    problem = assembled(scene, approach=approach)
+    for unit in (problem.units.length, problem.units.force):
+        assert np.log2(unit) == round(np.log2(unit))
+    assert np.log2(problem.units.force) % 3 == 0
+    assert 0.3 < float(np.median(problem.coefficients)) < 3
+    k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
+    ours = problem.coefficients[0] * problem.units.length / k[0]
+    assert ours == pytest.approx(problem.units.force ** (2 / 3), rel=1e-15)
+    # The contact law in the scene's own units, written out.
+    loads = problem.bounds(problem.ceiling) / 3
+    force, length = problem.units.force, problem.units.length
+    raw = problem.to_scene(loads) * force
+    points = scene.contact_points
+    apart = np.hypot(*(points[:, None] - points).T)
+    np.fill_diagonal(apart, np.inf)
+    gap = k * raw ** (2 / 3) + (1 / (np.pi * scene.material.contact_modulus * apart)) @ raw
+    gap -= approach + scene.offsets
+    ours = problem.gap(loads, problem.influence.apply(loads), problem.approach or 0.0) * length
+    assert_allclose(ours, gap[problem.candidates], rtol=1e-11, atol=1e-14 * approach)
+
+
+def test_screening_drops_only_those_that_cannot_touch() -> None:
+    problem = assembled(paper(), approach=PAPER_APPROACH)
+    assert len(problem) == 61  # the ring at 4 spacings lies at D = 0 to rounding, and is kept
+    problem = assembled(paper(), approach=1e-5)
+    inside = paper().asperities.distances < np.sqrt(2e-5)
+    assert set(problem.candidates) == set(np.flatnonzero(inside))
+
+
+@settings(max_examples=40, deadline=None)
+@given(random_scenes(crowding=1.5))
+def test_a_priori_bounds(drawn: tuple[cr.Scene, float]) -> None:
+    """No solution carries more than an asperity would alone; no load, a higher approach."""
+    scene, approach = drawn
+    contact = cr.press(scene, approach=approach)
+    problem = assembled(scene, approach=approach)
+    bounds = problem.bounds(problem.ceiling) * problem.units.force
+    assert (contact.loads[problem.candidates] <= bounds).all()
+    if contact.load > 0:
+        assert highest_approach(scene, contact.load) >= approach * (1 - 1e-12)
+        controlled = assembled(scene, load=contact.load)
+        touching = np.flatnonzero(contact.loads)
+        assert set(touching) <= set(controlled.candidates)
+
+
+@settings(max_examples=40, deadline=None)
+@given(random_scenes(crowding=1.5), st.integers(0, 2**32 - 1))
+def test_the_approach_bound_holds_for_any_weights(drawn: tuple[cr.Scene, float], seed: int) -> None:
+    scene, approach = drawn
+    contact = cr.press(scene, approach=approach)
+    if contact.load == 0:
+        return
+    problem = assembled(scene, load=contact.load)
+    weights = np.random.default_rng(seed).random(len(problem)) ** 9
+    bound = problem.overhang(weights, problem.influence.apply(weights))
+    assert bound * problem.units.length >= approach * (1 - 1e-12)
+
+
+def test_the_approach_bound_is_sharp_enough_to_screen() -> None:
+    """On the paper's scene it lies within 1 % of the true approach, from Hertz's loads alone."""
+    load = cr.press(paper(), approach=PAPER_APPROACH).load
+    assert highest_approach(paper(), load) == pytest.approx(PAPER_APPROACH, rel=1e-2)
+
+
+@settings(max_examples=60, deadline=None)
+@given(random_scenes(crowding=2.0), st.floats(0.01, 1))
+def test_convexity_number(drawn: tuple[cr.Scene, float], size: float) -> None:
+    """The smallest eigenvalue of the scaled Hessian is at least 1 - theta."""
+    scene, approach = drawn
+    problem = assembled(scene, approach=approach)
+    if len(problem) == 0:
+        return
+    loads = problem.bounds(problem.ceiling) * size
+    root = 1 / np.sqrt(problem.stiffness(loads))
+    hessian = np.eye(len(problem)) + root[:, None] * problem.influence.matrix * root
+    theta = problem.convexity_number(loads)
+    assert np.linalg.eigvalsh(hessian)[0] >= 1 - theta - 1e-12
+    # theta is 2 a / (pi s), in the words of the contact radius.
+    radii = hertz.contact_radius(
+        problem.to_scene(loads) * problem.units.force,
+        scene.material.contact_modulus,
+        scene.relative_radii,
+    )[problem.candidates]
+    points = scene.contact_points[problem.candidates]
+    apart = np.hypot(*(points[:, None] - points).T)
+    np.fill_diagonal(apart, np.inf)
+    assert theta == pytest.approx(float((4 * radii / np.pi / apart.min(axis=0)).max()), rel=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(-1, 1), min_size=1, max_size=9), st.floats(1e-9, 1e9))
+def test_shift_to_load(indentation: list[float], load: float) -> None:
+    depth = np.array(indentation)
+    k = np.linspace(0.5, 2, len(depth))
+    shift = shift_to_load(depth, k, load)
+    assert hertz.load(depth + shift, k).sum() == pytest.approx(load, rel=1e-6)
+    if load > 1e-3:
+        assert hertz.load(depth + shift, k).sum() == pytest.approx(load, rel=1e-12)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.floats(0.1, 0.95))
+def test_manufactured_contacts(seed: int, count: int, crowding: float) -> None:
+    """Draw loads and gaps, at most one of them positive, and the heights that make them exact."""
+    scene, approach = scattered(seed, count, crowding, 0.0)
+    rng = np.random.default_rng(seed)
+    problem = assembled(scene, approach=approach)
+    if len(problem) < count:
+        return
+    touching = rng.random(count) < 0.6
+    largest = problem.bounds(problem.ceiling) * problem.units.force
+    loads = np.where(touching, largest * rng.random(count), 0.0)
+    gaps = np.where(touching, 0.0, approach * rng.random(count))
+    k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
+    matrix = problem.influence.matrix * (problem.units.length / problem.units.force)
+    prescribed = hertz.indentation(loads, k) + matrix @ loads - gaps
+    a = scene.asperities
+    made = cr.Scene(
+        scene.sphere_radius,
+        cr.Asperities(a.positions, a.tip_radii, prescribed - approach + scene.drops),
+        scene.material,
+        geometry=scene.geometry,
+    )
+    contact = cr.press(made, approach=approach)
+    if contact.certificate.scope != "global":
+        return
+    top = largest.max()
+    assert_allclose(contact.loads, loads, rtol=1e-10, atol=1e-12 * top)
+    assert_allclose(contact.gaps, gaps, rtol=1e-10, atol=1e-12 * approach)
+    words = contact.status
+    assert (words[touching] != "open").all()
+    assert (words[~touching] != "contact").all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(random_scenes(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
+def test_newton_converges_from_any_start(
+    drawn: tuple[cr.Scene, float], seed: int, size: float
+) -> None:
+    """On every convex scene, to the same answer."""
+    scene, approach = drawn
+    contact = cr.press(scene, approach=approach)
+    if contact.certificate.scope != "global" or contact.load == 0:
+        return
+    rng = np.random.default_rng(seed)
+    start = contact.load * 10**size * rng.random(len(scene)) ** rng.uniform(0, 9)
+    start *= rng.random(len(scene)) < rng.random()
+    for control in ({"approach": approach}, {"load": contact.load}):
+        again = cr.press(scene, start=start, **control)
+        assert_allclose(again.loads, contact.loads, rtol=1e-9, atol=1e-12 * contact.loads.max())
+
+
+def test_newton_takes_few_steps() -> None:
+    for scene in (paper(), rough(), rough("closest")):
+        for control in ({"approach": PAPER_APPROACH}, {"load": 3.6e-7}):
+            assert cr.press(scene, **control).iterations <= 9
+
+
+def test_newton_descends_where_the_energy_is_not_convex() -> None:
+    """Overlapping discs: the contact law still holds at the answer, and nothing is proved."""
+    scene, approach = scattered(5, 30, 3.0, 0.2)
+    problem = assembled(scene, approach=approach)
+    solution = Newton().solve(problem)
+    assert solution.residual < 1e-12
+    assert cr.press(scene, approach=approach).certificate.scope == "none"
+
+
+def test_newton_residual_is_recomputed() -> None:
+    problem = assembled(paper(), approach=PAPER_APPROACH)
+    solution = Newton().solve(problem)
+    assert solution.residual == problem.residual(solution.loads, solution.approach)
+    wrong = solution.loads * 1.01
+    assert problem.residual(wrong, solution.approach) > 1e-3
+
+
+def test_memory_is_asked_before_it_is_taken() -> None:
+    asperities = cr.Asperities.hexagonal(spacing=2e-5, tip_radius=1e-4, within=0.0102)
+    scene = cr.Scene(1.0, asperities, MATERIAL)
+    with pytest.raises(cr.InputError, match=r"asperities that could touch: found 9\.07e\+05"):
+        cr.press(scene, approach=PAPER_APPROACH)
