@@ -3,8 +3,10 @@
 from convexrough import solvers
 from convexrough.certificate import Certificate, certify
 from convexrough.contact import Contact, press
+from convexrough.cycle import Cycle, History, Loop, cycle, cycles, history, onset_of_sliding
 from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
 from convexrough.scene import Asperities, Material, Scene
+from convexrough.shear import ShearCertificate, ShearState, shear
 
 __version__ = "0.1.0"
 
@@ -13,12 +15,22 @@ __all__ = [
     "Certificate",
     "Contact",
     "ConvexroughError",
+    "Cycle",
     "FileError",
+    "History",
     "InputError",
+    "Loop",
     "Material",
     "Scene",
+    "ShearCertificate",
+    "ShearState",
     "SolverError",
     "certify",
+    "cycle",
+    "cycles",
+    "history",
+    "onset_of_sliding",
     "press",
+    "shear",
     "solvers",
 ]

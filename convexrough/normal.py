@@ -105,7 +105,6 @@ class NormalProblem:
         units = Units.of(top, float(np.median(coefficients)))
 
         points = scene.contact_points[candidates]
-        blur = 0.0 if scene.geometry == "summit" else 3 * ROUNDOFF * np.abs(points).max(initial=0.0)
         scale = units.force / units.length / (np.pi * modulus)
         return cls(
             scene=scene,
@@ -115,7 +114,7 @@ class NormalProblem:
             offsets=scene.offsets[candidates] / units.length,
             offset_errors=errors[candidates] / units.length,
             shells=scale / shell_radii(points),
-            influence=DenseInfluence.assemble(points, scale, blur),
+            influence=DenseInfluence.assemble(points, scale, scene.point_error),
             approach=None if approach is None else approach / units.length,
             load=None if load is None else load / units.force,
             ceiling=ceiling / units.length,

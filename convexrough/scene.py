@@ -213,6 +213,13 @@ class Scene:
         shrink = self.sphere_radius / (self.sphere_radius + self.asperities.tip_radii)
         return frozen(points * shrink[:, None])
 
+    @property
+    def point_error(self) -> float:
+        """[length] bound on the rounding error of each coordinate of `contact_points`."""
+        if self.geometry == "summit":
+            return 0.0
+        return 3 * 2.0**-53 * float(np.abs(self.contact_points).max())
+
     @cached_property
     def drops(self) -> Array:
         """(n,) [length] how much further away the sphere's surface is than on the axis.

@@ -1,0 +1,153 @@
+"""`shear`: the friction state of a pressed contact (Ciavarella-Jaeger), from a certified Contact.
+
+With u the increments of `convexrough.tangential`, f the friction and c_t Mindlin's ratio: the
+asperity forces are Q_i = f u_i, displacements are c_t f times those of the normal problem. At
+every loaded asperity the displacement of the deep points is, [A16] of the source doubled,
+
+    X = displacement_i + sum_j c_t A_ij Q_j,    displacement_i = X_i + slip_i.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import checks, hertz
+from convexrough.certificate import Scope
+from convexrough.checks import Array, frozen
+from convexrough.contact import Contact
+from convexrough.errors import InputError
+from convexrough.shear_certificate import judge_states
+from convexrough.tangential import TangentialProblem
+
+
+@dataclass(frozen=True, eq=False)
+class ShearCertificate:
+    """What is proved of a friction state. Arrays are (n,), in the caller's order.
+
+    scope : that of the contact it starts from, or "none" where nothing is proved
+    status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
+        "open" (proved to carry no load) or "undecided"
+    force_errors : [force];  slip_errors : [length] bounds on the distance to the solution
+    displacement_error : [length] likewise
+    """
+
+    scope: Scope
+    status: NDArray[np.str_]
+    force_errors: Array
+    slip_errors: Array
+    displacement_error: float
+
+    @property
+    def holds(self) -> bool:
+        """Every asperity is proved to slide, to stick in part, or to be open."""
+        return self.scope != "none" and not bool((self.status == "undecided").any())
+
+
+@dataclass(frozen=True, eq=False)
+class ShearState:
+    """A friction state. Arrays are (n,), in the order of the scene's asperities.
+
+    force         : Q [force];  displacement : X of the deep points, both bodies [length]
+    forces        : Q_i [force], sum Q
+    displacements : X_i + slip_i [length]: own deflection and slip, without the others' influence
+    slips         : [length] gross slip, 0 where not sliding
+    stick_radii   : c_i [length], 0 where sliding
+    """
+
+    contact: Contact
+    force: float
+    displacement: float
+    forces: Array
+    displacements: Array
+    slips: Array
+    stick_radii: Array
+    certificate: ShearCertificate
+
+    @property
+    def status(self) -> NDArray[np.str_]:
+        """(n,) "sliding", "partial", "open" or "undecided"; each of the first three is proved."""
+        return self.certificate.status
+
+
+def shear(contact: Contact, *, force: float) -> ShearState:
+    """Apply a shear force Q [force] to a pressed contact, first loading, at constant normal load.
+
+    Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding), and
+    SolverError where Newton's method stops without an answer.
+    """
+    scene = contact.scene
+    friction, force = coefficient(contact), check_force(contact, "force", force)
+    sign = float(np.sign(force))
+    if contact.load == 0.0:
+        return _nothing_loaded(contact)
+    problem = TangentialProblem.of(contact)
+    total = abs(force) / friction / problem.units.force
+    states = problem.solve(problem.limited(np.array([total])))
+    bounds = judge_states(problem, contact.certificate, states)
+
+    touching, force_unit, length_unit = problem.touching, problem.units.force, problem.units.length
+    travel = hertz.mindlin_ratio(scene.material.poisson_ratio) * friction * length_unit
+
+    def everywhere(values: Array, unit: float) -> Array:
+        full = np.zeros(len(scene))
+        full[touching] = values * unit
+        return full
+
+    increments, slips = states.increments[0], states.slips[0]
+    left = np.maximum(1.0 - np.abs(increments) / problem.loads, 0.0)
+    errors = np.where(contact.loads > 0, 0.0, contact.certificate.load_errors)
+    words = np.full(len(scene), "undecided", dtype="<U9")
+    words[contact.status == "open"] = "open"
+    words[touching[bounds.partial[0]]] = "partial"
+    words[touching[bounds.sliding[0]]] = "sliding"
+    certificate = ShearCertificate(
+        scope=contact.certificate.scope if bounds.proved[0] else "none",
+        status=frozen(words),
+        force_errors=frozen(
+            friction * errors + everywhere(bounds.increments[0], friction * force_unit)
+        ),
+        slip_errors=frozen(everywhere(bounds.slips[0], travel)),
+        displacement_error=float(bounds.rises[0]) * travel,
+    )
+    return ShearState(
+        contact=contact,
+        force=force,
+        displacement=sign * float(states.rises[0]) * travel,
+        forces=frozen(everywhere(sign * increments, friction * force_unit)),
+        displacements=frozen(everywhere(sign * (problem.deflections(increments) + slips), travel)),
+        slips=frozen(everywhere(sign * slips, travel)),
+        stick_radii=frozen(everywhere(contact.contact_radii[touching] * np.cbrt(left), 1.0)),
+        certificate=certificate,
+    )
+
+
+def _nothing_loaded(contact: Contact) -> ShearState:
+    zero = frozen(np.zeros(len(contact.scene)))
+    certificate = ShearCertificate(contact.certificate.scope, contact.status, zero, zero, 0.0)
+    return ShearState(contact, 0.0, 0.0, zero, zero, zero, zero, certificate)
+
+
+def coefficient(contact: Contact) -> float:
+    """Coulomb's coefficient of the scene; InputError if it has none."""
+    friction = contact.scene.friction
+    if friction is None:
+        expected = "a coefficient of friction, as shear needs one"
+        raise InputError("friction", found="none", expected=expected)
+    return friction
+
+
+def check_force(contact: Contact, name: str, force: float) -> float:
+    """A shear force [force] that friction can bear, |Q| <= f P; else InputError."""
+    limit = coefficient(contact) * contact.load
+    force = checks.finite(name, force)
+    if abs(force) > limit * (1 + 1e-15):
+        over = f", {abs(force) / limit - 1:.3g} beyond it" if limit > 0 else ""
+        raise InputError(
+            name,
+            found=f"{force:.17g}: gross sliding{over}",
+            expected=f"at most f P = {limit:.17g} in size",
+        )
+    return force
