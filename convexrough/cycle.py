@@ -245,7 +245,7 @@ def history(contact: Contact, *, forces: ArrayLike) -> History:
     applied = checks.array("forces", forces)
     for i, force in enumerate(applied):
         check_force(contact, f"forces[{i}]", force)
-    if contact.load == 0.0:
+    if contact.load == 0.0 or len(applied) == 0:
         none = frozen(np.zeros((len(applied), len(contact.scene))))
         zero = frozen(np.zeros(len(applied)))
         return History(contact, applied, zero, none, none, none, zero)

@@ -64,7 +64,7 @@ def solve(
     contact_modulus: float,
     geometry: str = "summit",
     approach: float | None = None,
-    load: float | None = None,
+    load: float | arb | None = None,
     digits: int = 50,
     start: ArrayLike | None = None,
 ) -> Reference:
@@ -85,7 +85,7 @@ def solve(
     by_load = load is not None
     with ctx.workdps(digits + GUARD_DIGITS):
         radius, modulus = arb(float(sphere_radius)), arb(float(contact_modulus))
-        control, tips = arb(float(load or approach or 0)), _exact(tip_radii)
+        control, tips = arb(approach if load is None else load), _exact(tip_radii)
         points, descents = _contact_points(_exact(positions), tips, radius, geometry)
         shape = _exact(heights) - descents  # d_i = D_i - D0
         influence = _influence(points, modulus)

@@ -1,0 +1,412 @@
+"""The command line as its users meet it: output, files, exit status."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from test_io import scene_text, write_loads
+
+import convexrough as cr
+from convexrough import cli
+from convexrough.scene_file import read_scene
+
+
+class Outcome(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Any:
+    """Run the command line in an empty folder, in this process."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> Outcome:
+        status = cli.main(arguments)
+        return Outcome(status, *capsys.readouterr())
+
+    return call
+
+
+def shell(
+    *arguments: str, cwd: Path, stdout: int = subprocess.PIPE, before: str = ""
+) -> subprocess.CompletedProcess[str]:
+    """Run it as a shell does; `before` is Python to run first."""
+    code = "import sys; from convexrough.cli import main; sys.exit(main())"
+    return subprocess.run(
+        [sys.executable, "-c", before + code, *arguments],
+        cwd=cwd,
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+
+
+def test_new_then_run_then_verify(command: Any, tmp_path: Path) -> None:
+    assert command("new", "first.toml").status == 0
+    ran = command("run", "first.toml")
+    assert (ran.status, ran.err) == (0, "")
+    assert re.search(r"^ +contact +37$", ran.out, re.M)
+    assert re.search(r"^load +3\.60853388\d*e-07$", ran.out, re.M)
+    assert re.search(r"^certificate +global", ran.out, re.M)
+    names = {path.name for path in (tmp_path / "first-results").iterdir()}
+    assert {"summary.json", "asperities.csv", "pressure.png", "pressure.svg"} <= names
+    verified = command("verify", "first.toml", "first-results/asperities.csv")
+    assert (verified.status, verified.err) == (0, "")
+    assert re.search(r"^ +contact +37$", verified.out, re.M)
+
+
+def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("precious")
+    outcome = command("new", "mine.toml")
+    assert outcome.status == 2
+    assert "mine.toml: cannot be written: File exists" in outcome.err
+    assert (tmp_path / "mine.toml").read_text() == "precious"
+    assert command("new", "no/such/folder.toml").status == 2
+
+
+def test_what_new_comments_out_is_valid_too(command: Any, tmp_path: Path) -> None:
+    text = cli.NEW_SCENE
+    tables = text[text.index("# [units]") :]
+    active = "\n".join(line.removeprefix("# ") for line in tables.splitlines())
+    rough = re.sub(r"^# (height_std|tip_radius_cv|seed|within)", r"\1", text, flags=re.M)
+    (tmp_path / "all.toml").write_text(rough.replace(tables, active))
+    outcome = command("run", "all.toml", "--no-figures")
+    assert outcome.status == 0
+    assert "approach          5e-05 m\n" in outcome.out
+
+
+def test_json_is_one_object_and_the_summary(command: Any, tmp_path: Path) -> None:
+    command("new", "a.toml")
+    ran = command("run", "a.toml", "--json", "--no-figures", "--out", "deep/er")
+    assert (ran.status, ran.err) == (0, "")
+    summary = json.loads(ran.out)
+    assert summary == json.loads((tmp_path / "deep/er/summary.json").read_text())
+    assert (summary["schema"], summary["version"]) == (1, cr.__version__)
+    normal, proof = summary["normal"], summary["normal"]["certificate"]
+    counts = {"asperities": 61, "candidates": 61, "contact": 37, "open": 24, "undecided": 0}
+    assert {key: normal[key] for key in counts} == counts
+    assert normal["load"] == pytest.approx(3.60853389e-7, rel=1e-8)
+    assert normal["approach"] == 5e-5
+    assert normal["solver"] == "newton"
+    assert {"iterations", "seconds", "model_error", "crowding", "approach_error"} < set(normal)
+    assert proof["scope"] == "global"
+    assert proof["convexity_number"] == pytest.approx(0.504, abs=1e-3)
+    assert 0 < proof["load_error"] < 1e-10 * normal["load"]
+    assert proof["gap_error"] > 0
+    verified = command("verify", "a.toml", "deep/er/asperities.csv", "--json")
+    assert json.loads(verified.out)["normal"]["certificate"] == proof
+
+
+def test_paper(command: Any, tmp_path: Path) -> None:
+    outcome = command("paper", "--json", "--no-figures")
+    assert outcome.status == 0
+    paper = json.loads(outcome.out)["paper"]
+    assert paper["contacts"] == {"paper": 37, "computed": 37}
+    reference = [1.935817e-8, 1.759637e-8, 1.382348e-8, 1.183320e-8, 5.732965e-9, 2.196890e-9]
+    for (name, ring), load in zip(paper["rings"].items(), reference, strict=True):
+        assert ring["computed"] == ring["paper"], name
+        assert ring["load"] == pytest.approx(load, rel=1e-6), name
+    assert command("paper").status == 2  # nothing overwritten
+    again = command("paper", "--force", "--no-figures")
+    assert again.status == 0
+    assert re.search(r"^asperities in contact +37 +37$", again.out, re.M)
+    assert (tmp_path / "paper-results" / "summary.json").exists()
+
+
+def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
+    command("new", "a.toml")
+    folder = tmp_path / "a-results"
+    folder.mkdir()
+    (folder / "summary.json").write_text("old")
+    (folder / "mine.txt").write_text("precious")
+    refused = command("run", "a.toml", "--no-figures")
+    assert refused.status == 2
+    assert "a-results: not empty" in refused.err
+    assert (folder / "summary.json").read_text() == "old"
+    assert command("run", "a.toml", "--no-figures", "--force").status == 0
+    assert json.loads((folder / "summary.json").read_text())["schema"] == 1
+    assert (folder / "mine.txt").read_text() == "precious"
+
+
+def test_the_folder_is_refused_before_computing(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command("new", "a.toml")
+    (tmp_path / "file").write_text("")
+
+    def never(*_: Any, **__: Any) -> None:
+        raise AssertionError("computed")
+
+    monkeypatch.setattr("convexrough.contact.press", never)
+    outcome = command("run", "a.toml", "--out", "file")
+    assert outcome.status == 2
+    assert outcome.err == "convexrough: error: file: cannot hold results: File exists\n"
+    assert command("run", "a.toml", "--out", "file/sub").status == 2
+
+
+def test_nothing_touches(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(normal="approach = -1e-6"))
+    outcome = command("run", "a.toml", "--json")
+    assert outcome.status == 0
+    normal = json.loads(outcome.out)["normal"]
+    assert (normal["contact"], normal["open"], normal["load"]) == (0, 1, 0.0)
+    assert command("verify", "a.toml", "a-results/asperities.csv").status == 0
+
+
+def test_without_a_certificate(command: Any, tmp_path: Path) -> None:
+    """Tips as flat as the sphere: discs overlap, nothing is proved, and everything says so."""
+    dense = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 100.0'
+    (tmp_path / "a.toml").write_text(scene_text(dense))
+    outcome = command("run", "a.toml", "--json", "--no-figures")
+    assert outcome.status == 3
+    proof = json.loads(outcome.out)["normal"]["certificate"]
+    assert proof["scope"] == "none"
+    assert proof["load_error"] is None
+    assert "warning: not certified" in outcome.err
+    assert "warning: contact discs overlap" in outcome.err
+    assert (tmp_path / "a-results" / "asperities.csv").exists()
+    verified = command("verify", "a.toml", "a-results/asperities.csv")
+    assert verified.status == 3
+    assert "none: nothing is proved" in verified.out
+    assert "warning: not certified" in verified.err
+
+
+@pytest.mark.parametrize("digits", [3, 6, 9])
+def test_verify_rounded_and_shuffled_loads(command: Any, tmp_path: Path, digits: int) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    scene = read_scene(tmp_path / "a.toml").scene
+    contact = cr.press(scene, approach=5e-5)
+    rounded = [float(f"{load:.{digits}g}") for load in contact.loads]
+    order = np.random.default_rng(digits).permutation(len(rounded))
+    write_loads(tmp_path / "loads.csv", scene, rounded, order)
+    outcome = command("verify", "a.toml", "loads.csv", "--json")
+    normal = json.loads(outcome.out)["normal"]
+    error = normal["certificate"]["load_error"]
+    assert np.abs(rounded - contact.loads).max() <= error < 10.0**-digits * contact.loads.max() * 50
+    assert normal["contact"] <= 37
+    assert normal["open"] <= 24
+    assert outcome.status == (0 if normal["undecided"] == 0 else 3)
+    assert ("warning" in outcome.err) == (outcome.status == 3)
+
+
+def test_verify_finds_loads_in_the_wrong_rows(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    scene = read_scene(tmp_path / "a.toml").scene
+    loads = cr.press(scene, approach=5e-5).loads[::-1]
+    write_loads(tmp_path / "loads.csv", scene, loads, range(len(loads)))
+    outcome = command("verify", "a.toml", "loads.csv")
+    assert outcome.status == 3
+    assert "undecided" in outcome.err
+
+
+def test_later_tables_are_checked_and_not_computed(command: Any, tmp_path: Path) -> None:
+    more = "[friction]\ncoefficient = 0.5\n[shear]\nfractions = [0.5]"
+    (tmp_path / "a.toml").write_text(scene_text(more=more))
+    outcome = command("run", "a.toml", "--no-figures", "--json")
+    assert outcome.status == 0
+    assert outcome.err == "convexrough: warning: a.toml: [shear] is not computed by this version\n"
+    json.loads(outcome.out)
+
+
+def test_a_solver_that_fails(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+
+    def fail(*_: Any, **__: Any) -> None:
+        raise cr.SolverError("newton: stopped")
+
+    monkeypatch.setattr(cr.solvers.Newton, "solve", fail)
+    outcome = command("run", "a.toml")
+    assert (outcome.status, outcome.out) == (4, "")
+    assert outcome.err == "convexrough: error: newton: stopped\n"
+    assert not list((tmp_path / "a-results").iterdir())
+
+
+# Every line of what counts as bad input, through the command.
+
+SUMMITS = 'pattern = "file"\npath = "summits.csv"\ntip_radius = 0.02'
+LATTICE = 'pattern = "hexagonal"\nspacing = {}\ntip_radius = {}'
+
+
+@pytest.mark.parametrize(
+    ("scene", "expected"),
+    [
+        (scene_text(LATTICE.format("nan", 1)), "[asperities] spacing: found nan"),
+        (scene_text(normal="approach = inf"), "[normal] approach: found inf"),
+        (scene_text().replace("radius = 1.0", "radius = -1.0", 1), "[sphere] radius: found -1.0"),
+        (scene_text().replace("radius = 1.0", "radius = 0", 1), "[sphere] radius: found 0"),
+        (scene_text(LATTICE.format(1, 0)), "[asperities] tip_radius: found 0"),
+        (
+            scene_text().replace("contact_modulus = 1.0", "contact_modulus = 0.0"),
+            "[material] contact_modulus: found 0.0",
+        ),
+        (
+            scene_text().replace("contact_modulus = 1.0", "youngs_modulus = -1"),
+            "[material] youngs_modulus: found -1",
+        ),
+        (
+            scene_text().replace("contact_modulus = 1.0", ""),
+            "[material] contact_modulus, youngs_modulus: found neither",
+        ),
+        (scene_text(LATTICE.format(-1, 1)), "[asperities] spacing: found -1"),
+        (scene_text(LATTICE.format(0.0, 1)), "[asperities] spacing: found 0.0"),
+        (scene_text().replace("= 0.3", "= 0.51"), "[material] poisson_ratio: found 0.51"),
+        (scene_text().replace("= 0.3", "= -0.1"), "[material] poisson_ratio: found -0.1"),
+        (scene_text(normal="approach = 1\nload = 1"), "[normal] approach, load: found both"),
+        (scene_text(normal=""), "[normal] approach, load: found neither"),
+        (scene_text(more="[sheer]\nx = 1"), '[sheer]: unknown table, did you mean "shear"?'),
+        (scene_text()[:-30], "a.toml: "),
+        ("[sphere]\nradius = 1.", "line 2, column"),
+        (scene_text(LATTICE.format(1e-9, 1)), "spacing: found 3.63e+14 asperities"),
+        (scene_text(LATTICE.format(0.0025, 1), "approach = 1.0"), "asperities that could touch"),
+    ],
+)
+def test_bad_scenes(command: Any, tmp_path: Path, scene: str, expected: str) -> None:
+    (tmp_path / "a.toml").write_text(scene)
+    began = time.perf_counter()
+    outcome = command("run", "a.toml")
+    assert time.perf_counter() - began < 10
+    assert (outcome.status, outcome.out) == (2, "")
+    assert expected in outcome.err
+    for line in outcome.err.splitlines():
+        assert line.startswith("convexrough: error: a.toml: ")
+    assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name != "a.toml"]
+
+
+@pytest.mark.parametrize(
+    ("summits", "expected"),
+    [
+        (None, "summits.csv: cannot be read: No such file or directory"),
+        (b"", "summits.csv: empty"),
+        (b"x,y\n", "summits.csv: rows: found none"),
+        (b"x,y\n0,0\n0.1", "summits.csv: row 3: found 1 cells"),
+        (b"a,b\n0,0\n", "summits.csv: columns: found 'a'"),
+        (b"x,y\n0,0\n1,one\n", "summits.csv: row 3, column y: found 'one'"),
+        (b"x,y\n0,nan\n", "summits.csv: row 2, column y: found nan"),
+        (b"x,y\n1,1\n0,0\n1,1\n", "asperities 0 and 2 (from 0) at a distance of 0"),
+        (b"x,y,height\n0,0,inf\n", "summits.csv: row 2, column height: found inf"),
+        (b"x,y\n0,\xff\n", "summits.csv: not UTF-8 text"),
+    ],
+)
+def test_bad_summits(command: Any, tmp_path: Path, summits: bytes | None, expected: str) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(SUMMITS))
+    if summits is not None:
+        (tmp_path / "summits.csv").write_bytes(summits)
+    outcome = command("run", "a.toml")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert expected in outcome.err
+    assert outcome.err.startswith("convexrough: error: summits.csv")
+    assert not (tmp_path / "a-results").exists()
+
+
+@pytest.mark.parametrize(
+    ("loads", "expected"),
+    [
+        ("load\n" + "1e-9\n" * 36, "loads.csv: rows: found 36, expected 61"),
+        ("load\n" + "1e-9\n" * 60 + "-1e-9\n", "loads.csv: row 62, column load: found -1e-09"),
+        ("load\n" + "1e-9\n" * 60 + "1e-9x\n", "loads.csv: row 62, column load: found '1e-9x'"),
+        ("force\n" + "1e-9\n" * 61, "loads.csv: columns: found 'force'"),
+        ("", "loads.csv: empty"),
+    ],
+)
+def test_bad_loads(command: Any, tmp_path: Path, loads: str, expected: str) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    (tmp_path / "loads.csv").write_text(loads)
+    outcome = command("verify", "a.toml", "loads.csv")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.startswith(f"convexrough: error: {expected}")
+
+
+def test_all_loads_zero_under_a_given_load(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(SUMMITS, "load = 1e-9"))
+    (tmp_path / "summits.csv").write_text("x,y\n0,0\n0.0025,0\n")
+    (tmp_path / "loads.csv").write_text("load\n0\n0\n")
+    outcome = command("verify", "a.toml", "loads.csv")
+    assert outcome.status == 2
+    assert outcome.err.startswith(
+        "convexrough: error: loads.csv: loads: found none, expected a load"
+    )
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run",),
+        ("run", "a.toml", "--outt", "x"),
+        ("walk",),
+        ("verify", "a.toml"),
+        ("run", "a", "b"),
+    ],
+)
+def test_usage_errors(command: Any, arguments: tuple[str, ...]) -> None:
+    outcome = command(*arguments)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "Usage: convexrough" in outcome.err
+
+
+# As a process: real exit status, no traceback, signals.
+
+
+def test_version_and_help(tmp_path: Path) -> None:
+    version = shell("--version", cwd=tmp_path)
+    assert (version.returncode, version.stderr) == (0, "")
+    assert version.stdout.split()[-1] == cr.__version__
+    text = shell("--help", cwd=tmp_path)
+    assert text.returncode == 0
+    assert all(name in text.stdout for name in ("run", "verify", "new", "paper"))
+
+
+def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
+    heavy = {"pydantic", "matplotlib", "rich", "cvxpy", "scipy.spatial", "scipy.linalg"}
+    loaded = f"print(*({heavy} & set(sys.modules)))"
+    code = f"import sys, convexrough.cli as c; c.main(['--help']); {loaded}"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.splitlines()[-1] == ""
+
+
+def test_exit_status_of_a_process(tmp_path: Path) -> None:
+    (tmp_path / "good.toml").write_text(scene_text())
+    (tmp_path / "bad.toml").write_text(scene_text(LATTICE.format(-1, 1)))
+    good = shell("run", "good.toml", "--json", "--no-figures", cwd=tmp_path)
+    assert (good.returncode, good.stderr) == (0, "")
+    json.loads(good.stdout)
+    for arguments in (("run", "bad.toml"), ("run", "none.toml"), ("run", "."), ("frob",)):
+        bad = shell(*arguments, cwd=tmp_path)
+        assert (bad.returncode, bad.stdout) == (2, ""), arguments
+        assert "Traceback" not in bad.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "bad.toml", "good-results", "good.toml",
+    ]  # fmt: skip
+
+
+def test_a_reader_that_leaves(tmp_path: Path) -> None:
+    """As in `convexrough run scene.toml | head -0`."""
+    (tmp_path / "a.toml").write_text(scene_text())
+    reading, writing = os.pipe()
+    os.close(reading)
+    ran = shell("run", "a.toml", "--no-figures", cwd=tmp_path, stdout=writing)
+    os.close(writing)
+    assert ran.stderr == ""
+    assert ran.returncode == 1
+    assert (tmp_path / "a-results" / "summary.json").exists()
+
+
+def test_an_interrupt(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    interrupt = "lambda *a, **k: os.kill(os.getpid(), signal.SIGINT)"
+    before = f"import os, signal, convexrough.contact as c; c.press = {interrupt}\n"
+    ran = shell("run", "a.toml", cwd=tmp_path, before=before)
+    assert ran.returncode == 128 + signal.SIGINT
+    assert "Traceback" not in ran.stderr

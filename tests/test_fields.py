@@ -1,0 +1,149 @@
+"""Pressure anywhere: closed forms, quadrature, scaling, and the plain sum over all asperities."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper
+from scipy.spatial import cKDTree
+
+import convexrough as cr
+from convexrough import fields
+
+
+def pressed(name: str) -> cr.Contact:
+    scene, approach = NAMED[name]
+    return cr.press(scene, approach=approach)
+
+
+@pytest.fixture(params=sorted(NAMED))
+def contact(request: pytest.FixtureRequest) -> cr.Contact:
+    return pressed(request.param)
+
+
+def on_circles(contact: cr.Contact, fraction: float, angles: int = 7) -> Any:
+    """Points on a circle about each touching asperity, of a fraction of its contact radius.
+
+    (touching, angles, 2)
+    """
+    touching = contact.loads > 0
+    centres, a = contact.scene.contact_points[touching], contact.contact_radii[touching]
+    phi = 0.1 + 2 * np.pi * np.arange(angles) / angles
+    circle = fraction * np.stack((np.cos(phi), np.sin(phi)), axis=-1)
+    return centres[:, None] + a[:, None, None] * circle
+
+
+def test_the_pressure_of_each_asperity_integrates_to_its_load(contact: cr.Contact) -> None:
+    touching = contact.loads > 0
+    nodes, weights = np.polynomial.legendre.leggauss(14)
+    phi, weights = np.pi / 4 * (nodes + 1), np.pi / 4 * weights  # r = a sin(phi), 0 to a
+    load = np.zeros(int(touching.sum()))
+    for angle, weight in zip(phi, weights, strict=True):
+        mean = fields.pressure(contact, on_circles(contact, np.sin(angle))).mean(axis=1)
+        load += weight * 2 * np.pi * np.sin(angle) * np.cos(angle) * mean
+    load *= contact.contact_radii[touching] ** 2
+    assert_allclose(load, contact.loads[touching], rtol=1e-10)
+
+
+def test_the_pressure_in_the_middle_is_hertzs_peak(contact: cr.Contact) -> None:
+    scene = contact.scene
+    E, R = scene.material.contact_modulus, scene.relative_radii
+    peak = (6 * contact.loads * E**2 / (np.pi**3 * R**2)) ** (1 / 3)
+    assert_allclose(fields.peak_pressures(contact), peak, rtol=1e-14)
+    assert_allclose(fields.pressure(contact, scene.contact_points), peak, rtol=1e-14)
+
+
+def test_no_pressure_outside_the_discs(contact: cr.Contact) -> None:
+    assert (fields.pressure(contact, on_circles(contact, 1 - 1e-6)) > 0).all()
+    assert_array_equal(fields.pressure(contact, on_circles(contact, 1 + 1e-6)), 0.0)
+    far = 10 * np.abs(contact.scene.contact_points).max()
+    assert fields.pressure(contact, [far, 0.0]) == 0.0
+    open_ = contact.scene.contact_points[contact.loads == 0]
+    assert_array_equal(fields.pressure(contact, open_), 0.0)
+
+
+def test_nothing_pressed_nothing_felt() -> None:
+    contact = cr.press(paper(), approach=-1e-6)
+    assert_array_equal(fields.pressure(contact, contact.scene.contact_points), 0.0)
+    assert_array_equal(fields.peak_pressures(contact), 0.0)
+
+
+@pytest.mark.parametrize("stretch", [1e-6, 2.0**30])
+@pytest.mark.parametrize("harden", [1e-9, 2.0**40])
+def test_units_do_not_matter(stretch: float, harden: float) -> None:
+    contact = pressed("rough")
+    asperities, sphere = contact.scene.asperities, contact.scene.sphere_radius
+    scaled = cr.Asperities(
+        asperities.positions * stretch, asperities.tip_radii * stretch, asperities.heights * stretch
+    )
+    scene = cr.Scene(sphere * stretch, scaled, cr.Material(harden, 0.3))
+    other = cr.press(scene, approach=PAPER_APPROACH * stretch)
+    points = np.random.default_rng(3).uniform(-0.008, 0.008, (400, 2))
+    here, there = fields.pressure(contact, points), fields.pressure(other, points * stretch)
+    assert_allclose(there / harden, here, rtol=1e-9, atol=1e-9 * here.max())
+
+
+@pytest.mark.parametrize("decades", [0.0, 4.0])
+def test_superpose_is_the_plain_sum_also_where_discs_overlap(decades: float) -> None:
+    rng = np.random.default_rng(5)
+    centres, points = rng.uniform(-1, 1, (300, 2)), rng.uniform(-1.2, 1.2, (500, 2))
+    radii, peaks = 0.5 * 10.0 ** (-decades * rng.random(300)), rng.uniform(0.5, 2, 300)
+    points[:100] = centres[:100]
+    r = np.hypot(*(points[:, None] - centres).T).T
+    plain = (peaks * np.sqrt(np.maximum(1 - (r / radii) ** 2, 0))).sum(axis=1)
+    assert np.count_nonzero(plain) > 100
+    assert_allclose(fields.superpose(points, centres, radii, peaks), plain, rtol=1e-12)
+
+
+def test_points_of_any_shape() -> None:
+    contact = pressed("paper")
+    grid = np.stack(np.meshgrid(*[np.linspace(-0.008, 0.008, 9)] * 2), axis=-1)
+    values = fields.pressure(contact, grid)
+    assert values.shape == (9, 9)
+    assert values[4, 4] == fields.pressure(contact, [0.0, 0.0]) == fields.peak_pressures(contact)[0]
+    assert fields.pressure(contact, np.zeros((3, 0, 2))).shape == (3, 0)
+
+
+@pytest.mark.parametrize("bad", [0.0, [1.0, 2.0, 3.0], [["x", "y"]], [[0.0, np.nan]]])
+def test_points_that_are_none(bad: Any) -> None:
+    with pytest.raises(cr.InputError, match=r"points.*x and y of each"):
+        fields.pressure(pressed("paper"), bad)
+
+
+@pytest.mark.parametrize(
+    ("asperities", "cell"),
+    [
+        (cr.Asperities.hexagonal(spacing=0.3, tip_radius=1.0, within=2.0), np.sqrt(0.75) * 0.09),
+        (cr.Asperities.square(spacing=0.3, tip_radius=1.0, within=2.0), 0.09),
+    ],
+)
+def test_the_cells_of_a_lattice(asperities: cr.Asperities, cell: float) -> None:
+    areas = fields.cell_areas(asperities.positions)
+    inside = asperities.distances < 1.4
+    assert np.isnan(areas).any()
+    assert_allclose(areas[inside], cell, rtol=1e-9)
+
+
+def test_cells_of_scattered_points_fill_the_plane() -> None:
+    points = np.random.default_rng(1).uniform(0, 1, (40, 2))
+    areas = fields.cell_areas(points)
+    samples = np.random.default_rng(2).uniform(-1, 2, (400_000, 2))
+    nearest = cKDTree(points).query(samples)[1]
+    counted = 9 * np.bincount(nearest, minlength=40) / len(samples)
+    inner = np.hypot(*(points - 0.5).T) < 0.3
+    assert_allclose(areas[inner], counted[inner], rtol=0.1)
+
+
+def test_no_cells_on_a_line_or_about_few_points() -> None:
+    line = np.column_stack((np.arange(9.0), np.zeros(9)))
+    assert np.isnan(fields.cell_areas(line)).all()
+    assert np.isnan(fields.cell_areas(line[:1])).all()
+
+
+def test_the_whole_pressure_of_three_asperities_on_a_grid() -> None:
+    asperities = cr.Asperities([(0.0, 0.0), (3e-3, 0.0), (-1e-3, 2.5e-3)], 0.02)
+    contact = cr.press(cr.Scene(1.0, asperities, MATERIAL), approach=5e-5)
+    x, step = np.linspace(-5e-3, 5e-3, 801, retstep=True)
+    total = fields.pressure(contact, np.stack(np.meshgrid(x, x), axis=-1)).sum() * step**2
+    assert total == pytest.approx(contact.load, rel=1e-3)

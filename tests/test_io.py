@@ -1,0 +1,518 @@
+"""Scene files, CSV in and out, results on disk."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import convexrough as cr
+from convexrough import results
+from convexrough.io import ASPERITY_COLUMNS, read_loads, read_summits, read_table
+from convexrough.report import Summary, contact_summary, to_json
+from convexrough.results import beside, claim_folder, write_results
+from convexrough.scene_file import UnitNames, read_scene
+
+HEXAGONAL = """
+pattern = "hexagonal"
+spacing = 0.0025
+tip_radius = 0.02
+"""
+
+
+def scene_text(asperities: str = HEXAGONAL, normal: str = "approach = 5e-5", more: str = "") -> str:
+    return f"""
+[sphere]
+radius = 1.0
+[material]
+contact_modulus = 1.0
+poisson_ratio = 0.3
+[asperities]
+{asperities}
+[normal]
+{normal}
+{more}
+"""
+
+
+def read(tmp_path: Path, *parts: str, **tables: str) -> Any:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_text(*parts, **tables), encoding="utf-8")
+    return read_scene(path)
+
+
+def mistakes(tmp_path: Path, *parts: str, **tables: str) -> list[str]:
+    with pytest.raises(cr.InputError) as caught:
+        read(tmp_path, *parts, **tables)
+    return [
+        line.removeprefix(f"{tmp_path / 'scene.toml'}: ") for line in str(caught.value).split("\n")
+    ]
+
+
+def small_scene() -> cr.Scene:
+    asperities = cr.Asperities.hexagonal(
+        spacing=0.0025, tip_radius=0.02, within=0.006, height_std=1e-6, tip_radius_cv=0.1, seed=2
+    )
+    return cr.Scene(1.0, asperities, cr.Material(1.0, 0.3))
+
+
+@pytest.fixture(scope="module")
+def contact() -> cr.Contact:
+    return cr.press(small_scene(), approach=2e-5)
+
+
+# Scene files
+
+
+def test_every_table_is_read(tmp_path: Path) -> None:
+    more = """
+[friction]
+coefficient = 0.5
+[shear]
+fractions = [0, 0.5, 1]
+[cycle]
+maximum = [0.1, 0.5]
+[history]
+fractions = [1, -1, 0.25]
+[solver]
+name = "newton"
+[units]
+length = "m"
+force = "N"
+"""
+    rough = HEXAGONAL + 'within = 0.01\nheight_std = 1e-6\nseed = 7\ngeometry = "closest"'
+    file = read(tmp_path, rough, "load = 1", more)
+    expected = cr.Asperities.hexagonal(
+        spacing=0.0025, tip_radius=0.02, within=0.01, height_std=1e-6, seed=7
+    )
+    assert np.array_equal(file.scene.asperities.heights, expected.heights)
+    assert (file.scene.geometry, file.scene.friction) == ("closest", 0.5)
+    assert (file.approach, file.load) == (None, 1.0)
+    assert file.shear == (0.0, 0.5, 1.0)
+    assert file.cycle == ((0.1, 0.5), (-0.1, -0.5))
+    assert file.history == (1.0, -1.0, 0.25)
+    assert file.solver == cr.solvers.Newton()
+    assert file.units == ("m", "N")
+
+
+def test_what_is_left_out_is_none(tmp_path: Path) -> None:
+    file = read(tmp_path)
+    assert (file.shear, file.cycle, file.history, file.scene.friction) == (None,) * 4
+    assert file.units == ("", "")
+
+
+def test_youngs_modulus(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_text().replace("contact_modulus = 1.0", "youngs_modulus = 1.82"))
+    assert read_scene(path).scene.material.contact_modulus == pytest.approx(1.0, rel=1e-15)
+
+
+def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_text(), encoding="utf-8-sig")
+    assert len(read_scene(path).scene) > 37
+
+
+@pytest.mark.parametrize(
+    ("asperities", "expected"),
+    [
+        ("spacing = -0.1", "spacing: found -0.1, expected a positive number"),
+        ("spacing = 0", "spacing: found 0, expected a positive number"),
+        ("spacing = nan", "spacing: found nan, expected a positive number"),
+        ("spacing = true", "spacing: found true, expected a positive number"),
+        ('spacing = "1"', "spacing: found '1', expected a positive number"),
+        ("spacing = 1e-50", "spacing: found 1e-50, expected a size from 1e-40 to 1e+40"),
+        ("spacing = 1\nspaceing = 1", 'spaceing: unknown key, did you mean "spacing"?'),
+        ("spacing = 1\nzzz = 1", "zzz: unknown key, valid: pattern, spacing, tip_radius"),
+        ("spacing = 1\ntip_radius = inf", "tip_radius: found inf, expected a positive number"),
+        ("spacing = 1\ntip_radius = [1, -2]", "tip_radius[1]: found -2, expected a positive"),
+        ("spacing = 1\nheight_std = 1", "seed: missing, needed with height_std"),
+        ("spacing = 1\ntip_radius_cv = 1", "seed: missing, needed with tip_radius_cv"),
+        ("spacing = 1\nseed = 1.5", "seed: found 1.5, expected a whole number"),
+        ("spacing = 1\nseed = -1", "seed: found -1, expected a whole number"),
+        ("spacing = 1\nwithin = -1", "within: found -1, expected a number that is not negative"),
+        ("spacing = 1\ngeometry = 3", 'geometry: found 3, expected "summit" or "closest"'),
+        ('spacing = 1\npath = "a.csv"', "path: not used with this pattern"),
+        ("", "spacing: missing"),
+    ],
+)
+def test_a_wrong_key(tmp_path: Path, asperities: str, expected: str) -> None:
+    text = 'pattern = "hexagonal"\n' + asperities
+    if "tip_radius = " not in text:
+        text += "\ntip_radius = 0.02"
+    (line,) = mistakes(tmp_path, text)
+    assert line.startswith(f"[asperities] {expected}")
+
+
+@pytest.mark.parametrize(
+    ("normal", "more", "expected"),
+    [
+        ("", "", "[normal] approach, load: found neither, expected exactly one of the two"),
+        ("approach = 1\nload = 1", "", "[normal] approach, load: found both, expected exactly"),
+        ("load = 0", "", "[normal] load: found 0, expected a positive number"),
+        ("approach = nan", "", "[normal] approach: found nan, expected a finite number"),
+        ("load = 1", "[frictoin]", '[frictoin]: unknown table, did you mean "friction"?'),
+        (
+            "load = 1",
+            "[shear]\nfractions = [0.1]",
+            "[friction]: missing table, needed with [shear]",
+        ),
+        (
+            "load = 1",
+            "[friction]\ncoefficient = 1\n[shear]\nfractions = [0.1, -0.1]",
+            "[shear] fractions[1]: found -0.1, expected a number from 0 to 1",
+        ),
+        (
+            "load = 1",
+            "[friction]\ncoefficient = 1\n[shear]\nfractions = []",
+            "[shear] fractions: found [], expected a list of numbers from 0 to 1",
+        ),
+        (
+            "load = 1",
+            "[friction]\ncoefficient = 1\n[history]\nfractions = [1.1]",
+            "[history] fractions[0]: found 1.1, expected a number from -1 to 1",
+        ),
+        (
+            "load = 1",
+            "[friction]\ncoefficient = 1\n[cycle]\nmaximum = [0.1, 0.2]\nminimum = [0]",
+            "[cycle] minimum: found 1 values, expected 2, as in maximum",
+        ),
+        (
+            "load = 1",
+            "[friction]\ncoefficient = 1\n[cycle]\nmaximum = [0.1]\nminimum = [0.1]",
+            "[cycle] maximum[0]: found 0.1, expected a number above its minimum, 0.1",
+        ),
+        ("load = 1", "[solver]\nname = 'newtn'", "[solver] name: found 'newtn', expected one of"),
+        ("load = 1", "[units]\nlength = 1", "[units] length: found 1, expected text in quotes"),
+    ],
+)
+def test_a_wrong_table(tmp_path: Path, normal: str, more: str, expected: str) -> None:
+    (line,) = mistakes(tmp_path, normal=normal, more=more)
+    assert line.startswith(expected)
+
+
+def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text("r = 1\n[sphere]\nradius = -1\n[material]\npoisson_ratio = 0.6\n[normal]\n")
+    with pytest.raises(cr.InputError) as caught:
+        read_scene(path)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith(f"{path}: ") for line in lines)
+    places = [line.removeprefix(f"{path}: ").split(":")[0] for line in lines]
+    assert places == [
+        "r",
+        "[sphere] radius",
+        "[material] poisson_ratio",
+        "[material] contact_modulus, youngs_modulus",
+        "[normal] approach, load",
+        "[asperities]",
+    ]
+
+
+def test_a_list_of_tip_radii_of_the_wrong_length(tmp_path: Path) -> None:
+    text = HEXAGONAL.replace("0.02", "[0.02, 0.03]") + "within = 0.003"
+    (line,) = mistakes(tmp_path, text)
+    assert line == "[asperities] tip_radius: found shape (2,), expected 7 values, one per asperity"
+    (line,) = mistakes(tmp_path, HEXAGONAL.replace("0.02", "[0.02]"), "load = 1e-8")
+    assert line.startswith("[asperities] within: missing")
+
+
+def test_an_endless_lattice_is_counted_not_built(tmp_path: Path) -> None:
+    (line,) = mistakes(tmp_path, HEXAGONAL.replace("0.0025", "1e-9"))
+    assert line.startswith("[asperities] spacing: found 3.63e+14 asperities")
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "empty"),
+        (b"# nothing\n", "empty"),
+        (b"[sphere]\nradius = \n", "line 2, column 10"),
+        (b"[sphere\n", "line 1"),
+        (b"\xff\xfe[sphere]", "not UTF-8"),
+        (b"a = " + b"[" * 5000, "not a TOML file"),
+        (b"a = " + b"9" * 5000, "not a TOML file"),
+    ],
+)
+def test_no_toml(tmp_path: Path, content: bytes, expected: str) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_bytes(content)
+    with pytest.raises(cr.FileError, match=expected):
+        read_scene(path)
+
+
+# What `within` is when the file does not say
+
+
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+@pytest.mark.parametrize("pattern", ["hexagonal", "square"])
+@pytest.mark.parametrize("normal", ["approach = 2e-5", "load = 2e-7", "load = 1e-9"])
+@pytest.mark.parametrize("rough", ["", "height_std = 4e-6\ntip_radius_cv = 0.3\nseed = 5"])
+def test_the_default_within_loses_no_asperity(
+    tmp_path: Path, geometry: str, pattern: str, normal: str, rough: str
+) -> None:
+    text = HEXAGONAL.replace("hexagonal", pattern) + f'geometry = "{geometry}"\n{rough}\n'
+    file = read(tmp_path, text, normal)
+    generous = read(tmp_path, text + "within = 0.05", normal)
+    n = len(file.scene)
+    assert n < len(generous.scene) / 4
+    same = cr.press(file.scene, approach=file.approach, load=file.load)
+    far = cr.press(generous.scene, approach=file.approach, load=file.load)
+    assert same.certificate.holds
+    assert far.certificate.holds
+    assert np.allclose(far.loads[:n], same.loads, rtol=1e-12, atol=0)
+    assert not far.loads[n:].any()
+
+
+def test_the_default_within_reaches_as_far_as_the_tallest_asperity_could(tmp_path: Path) -> None:
+    rough = 'geometry = "closest"\nheight_std = 4e-6\ntip_radius_cv = 0.5\nseed = 5'
+    file = read(tmp_path, HEXAGONAL + rough, "approach = 2e-5")
+    width = np.sqrt(np.log1p(0.5**2))
+    tip_radius = 0.02 * np.exp(6 * width - width**2 / 2)  # the largest that is drawn
+    within = np.sqrt(2 * (1 + tip_radius) * (2e-5 + 6 * 4e-6))
+    expected = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within)
+    assert np.array_equal(file.scene.asperities.positions, expected.positions)
+
+
+def test_the_default_within_leaves_one_asperity_where_none_can_touch(tmp_path: Path) -> None:
+    file = read(tmp_path, normal="approach = -1e-5")
+    assert file.scene.asperities.positions.tolist() == [[0.0, 0.0]]
+
+
+def test_seeds(tmp_path: Path) -> None:
+    heights = [
+        read(
+            tmp_path, HEXAGONAL + f"within = 0.01\nheight_std = 1e-6\nseed = {seed}"
+        ).scene.asperities.heights
+        for seed in (1, 1, 2)
+    ]
+    assert np.array_equal(heights[0], heights[1])
+    assert not np.isclose(heights[0], heights[2], rtol=1e-6).any()
+
+
+# CSV in
+
+
+def test_summits(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    lines = "y, x ,tip_radius,height\r\n0.5,0.25,0.1,1e-3\r\n-1,2,0.2,-1e-3\r\n\r\n"
+    (folder / "summits.csv").write_bytes(b"\xef\xbb\xbf" + lines.encode())
+    # The path is relative to the scene file, wherever the command runs.
+    file = read(tmp_path, 'pattern = "file"\npath = "data/summits.csv"')
+    asperities = file.scene.asperities
+    assert asperities.positions.tolist() == [[0.25, 0.5], [2.0, -1.0]]
+    assert asperities.tip_radii.tolist() == [0.1, 0.2]
+    assert asperities.heights.tolist() == [1e-3, -1e-3]
+
+
+def test_summits_without_optional_columns(tmp_path: Path) -> None:
+    path = tmp_path / "summits.csv"
+    path.write_text("x,y\n0,1\n0,2")
+    asperities = read_summits(path, tip_radius=[0.5, 0.6])
+    assert asperities.tip_radii.tolist() == [0.5, 0.6]
+    assert asperities.heights.tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ("", "empty"),
+        ("x,y\n", "rows: found none below the header"),
+        ("x,y,heigth\n0,0,0\n", "found 'heigth', expected a known column; did you mean \"height\""),
+        ("x;y\n0;0\n", "found 'x;y', expected a known column; valid: x, y, height, tip_radius"),
+        ("x,X\n0,0\n", "found 'X', expected a known column"),
+        ("x,height\n0,0\n", "columns: found x, height, expected a column 'y'"),
+        ("x,y,x\n0,0,0\n", "columns: found 'x' twice, expected once"),
+        ("x,y\n0,0\n1,abc\n", "row 3, column y: found 'abc', expected a finite number"),
+        ("x,y\n0,0\n1,\n", "row 3, column y: found '', expected a finite number"),
+        ("x,y\n0,nan\n", "row 2, column y: found nan, expected a finite number"),
+        ("x,y\n-inf,0\n", "row 2, column x: found -inf, expected a finite number"),
+        ("x,y\n0,0\n1,2,3\n", "row 3: found 3 cells, expected 2"),
+        ("x,y\n0,0\n1", "row 3: found 1 cells, expected 2"),
+        ("x,y\n0,0\n\n1,1\n", "row 3: found 0 cells, expected 2"),
+        ('x,y\n0,"1\n', "not a CSV file"),
+        ("x,y,tip_radius\n0,0,1\n", "tip radii: found both"),
+        ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
+    ],
+)
+def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
+    path = tmp_path / "summits.csv"
+    path.write_text(content)
+    with pytest.raises(cr.ConvexroughError) as caught:
+        read_summits(path, tip_radius=1.0)
+    assert str(caught.value).startswith(str(path))
+    assert expected in str(caught.value)
+
+
+def test_summits_need_a_tip_radius(tmp_path: Path) -> None:
+    path = tmp_path / "summits.csv"
+    path.write_text("x,y\n0,0\n")
+    with pytest.raises(cr.InputError, match="tip radii: found neither"):
+        read_summits(path, tip_radius=None)
+
+
+def write_loads(path: Path, scene: cr.Scene, loads: Any, order: Any) -> Path:
+    points = scene.asperities.positions
+    rows = [f"{float(points[i, 0])},{float(loads[i])},{float(points[i, 1])}" for i in order]
+    path.write_text("\n".join(["x,load,y", *rows]))
+    return path
+
+
+def test_loads_are_matched_by_position(tmp_path: Path, contact: cr.Contact) -> None:
+    order = np.random.default_rng(3).permutation(len(contact.loads))
+    path = write_loads(tmp_path / "loads.csv", contact.scene, contact.loads, order)
+    assert np.array_equal(read_loads(path, contact.scene), contact.loads)
+
+
+def test_loads_without_positions_are_in_order(tmp_path: Path, contact: cr.Contact) -> None:
+    path = tmp_path / "loads.csv"
+    path.write_text("\n".join(["load", *map(repr, contact.loads.tolist())]))
+    assert np.array_equal(read_loads(path, contact.scene), contact.loads)
+
+
+def test_loads_at_a_slightly_different_place(tmp_path: Path, contact: cr.Contact) -> None:
+    path, scene = tmp_path / "loads.csv", contact.scene
+    for offset, fine in ((0.9e-6, True), (1.1e-6, False)):
+        moved = cr.Asperities(scene.asperities.positions + np.array([offset * 0.0025, 0]), 0.02)
+        other = cr.Scene(1.0, moved, scene.material)
+        write_loads(path, other, contact.loads, range(len(moved)))
+        if fine:
+            assert np.array_equal(read_loads(path, scene), contact.loads)
+        else:
+            with pytest.raises(cr.InputError, match=r"row \d+: found position .* 2.75e-09 from"):
+                read_loads(path, scene)
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ("load\n1\n", "rows: found 1, expected 2, one per asperity"),
+        ("load\n1\n2\n3\n", "rows: found 3, expected 2, one per asperity"),
+        ("load\n1\n-2\n", "row 3, column load: found -2.0, expected a number that is not negative"),
+        ("load\n1\nnan\n", "row 3, column load: found nan"),
+        ("loads\n1\n2\n", "found 'loads', expected a known column; did you mean \"load\"?"),
+        ("x,y\n0,0\n1,0\n", "columns: found x, y, expected a column 'load'"),
+        ("x,load\n0,1\n1,1\n", "columns: found only x, expected x and y"),
+        ("x,y,load\n0,0,1\n0,0,1\n", "row 3: found the same position as in row 2"),
+        ("x,y,load\n0,0,1\n0,2,1\n", "row 3: found position [0.0, 2.0], 2 from the nearest"),
+    ],
+)
+def test_wrong_loads(tmp_path: Path, content: str, expected: str) -> None:
+    path = tmp_path / "loads.csv"
+    path.write_text(content)
+    scene = cr.Scene(1.0, cr.Asperities([[0, 0], [1, 0]], 0.1), cr.Material(1.0, 0.3))
+    with pytest.raises(cr.InputError) as caught:
+        read_loads(path, scene)
+    assert str(caught.value).startswith(f"{path}: {expected}") or expected in str(caught.value)
+
+
+# Results
+
+
+def written(folder: Path, contact: cr.Contact, *, figures: bool = False) -> list[str]:
+    summary = contact_summary(contact)
+    paths = write_results(folder, contact, summary, figures=figures, units=UnitNames("m", "N"))
+    assert all(path.stat().st_size > 0 for path in paths)
+    assert {path.name for path in paths} == {path.name for path in folder.iterdir()}
+    return [path.name for path in paths]
+
+
+def test_results_read_back_the_same(tmp_path: Path, contact: cr.Contact) -> None:
+    assert written(tmp_path, contact) == ["summary.json", "asperities.csv"]
+    path = tmp_path / "asperities.csv"
+    assert path.read_text().splitlines()[0] == ",".join(ASPERITY_COLUMNS)
+    columns = read_table(path, required=("load",), optional=("x", "y", "height", "tip_radius"),
+                         ignored=ASPERITY_COLUMNS).columns  # fmt: skip
+    asperities = contact.scene.asperities
+    assert np.array_equal(np.column_stack((columns["x"], columns["y"])), asperities.positions)
+    assert np.array_equal(columns["height"], asperities.heights)
+    assert np.array_equal(columns["tip_radius"], asperities.tip_radii)
+    assert np.array_equal(read_loads(path, contact.scene), contact.loads)
+    normal = json.loads((tmp_path / "summary.json").read_text())["normal"]
+    assert normal["contact"] == int((contact.status == "contact").sum())
+    assert normal["certificate"]["load_error"] == contact.certificate.load_error
+
+
+def test_many_asperities_go_to_npz(
+    tmp_path: Path, contact: cr.Contact, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(results, "MOST_CSV_ROWS", len(contact.loads) - 1)
+    assert written(tmp_path, contact) == ["summary.json", "asperities.npz"]
+    path = tmp_path / "asperities.npz"
+    with np.load(path) as arrays:
+        assert tuple(arrays) == ASPERITY_COLUMNS
+        assert arrays["status"].tolist() == contact.status.tolist()
+    assert np.array_equal(read_loads(path, contact.scene), contact.loads)
+
+
+@pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x03\x04 and then nothing"])
+def test_a_broken_npz(tmp_path: Path, contact: cr.Contact, content: bytes) -> None:
+    path = tmp_path / "loads.npz"
+    path.write_bytes(content)
+    with pytest.raises(cr.FileError, match=str(path)):
+        read_loads(path, contact.scene)
+
+
+def test_figures_are_written_twice_each(tmp_path: Path, contact: cr.Contact) -> None:
+    names = written(tmp_path, contact, figures=True)
+    assert {"pressure.png", "pressure.svg"} < set(names)
+    assert (tmp_path / "pressure.png").read_bytes().startswith(b"\x89PNG")
+    assert b"<svg" in (tmp_path / "pressure.svg").read_bytes()
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "result.csv"
+    path.write_text("old")
+
+    def write(error: Exception | None) -> None:
+        with beside(path) as temporary:
+            temporary.write_text("new")
+            if error:
+                raise error
+
+    with pytest.raises(RuntimeError):
+        write(RuntimeError())
+    with pytest.raises(cr.FileError, match=r"result\.csv: cannot be written: No space left"):
+        write(OSError(28, "No space left on device"))
+    assert path.read_text() == "old"
+    assert [each.name for each in tmp_path.iterdir()] == ["result.csv"]
+    write(None)
+    assert path.read_text() == "new"
+    assert [each.name for each in tmp_path.iterdir()] == ["result.csv"]
+
+
+def test_a_failure_while_drawing_leaves_no_half_figure_and_no_summary(
+    tmp_path: Path, contact: cr.Contact, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from matplotlib.figure import Figure
+
+    def fail(self: Figure, path: Path, **_: Any) -> None:
+        path.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Figure, "savefig", fail)
+    with pytest.raises(cr.FileError, match=r"pressure\.png: cannot be written"):
+        written(tmp_path, contact, figures=True)
+    assert [each.name for each in tmp_path.iterdir()] == ["asperities.csv"]
+
+
+def test_a_folder_is_claimed_before_computing(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    claim_folder(folder, force=False)
+    claim_folder(folder, force=False)  # empty: nothing to lose
+    (folder / "mine.txt").write_text("precious")
+    with pytest.raises(cr.FileError, match="not empty"):
+        claim_folder(folder, force=False)
+    claim_folder(folder, force=True)
+    with pytest.raises(cr.FileError, match="cannot hold results"):
+        claim_folder(folder / "mine.txt", force=True)
+    with pytest.raises(cr.FileError, match="cannot hold results"):
+        claim_folder(folder / "mine.txt" / "c", force=False)
+    assert [each.name for each in folder.iterdir()] == ["mine.txt"]
+
+
+def test_json_has_no_infinities() -> None:
+    summary: Summary = {"a": {"b": [1.0, float("inf")]}, "c": float("nan"), "d": -float("inf")}
+    assert json.loads(to_json(summary)) == {"a": {"b": [1.0, None]}, "c": None, "d": None}

@@ -1,0 +1,218 @@
+"""The figures say what the contact says, and nothing in them collides."""
+
+import dataclasses
+import subprocess
+import sys
+from collections.abc import Callable
+from io import BytesIO
+from itertools import combinations
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from numpy.testing import assert_allclose
+from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel
+
+import convexrough as cr
+from convexrough import fields, hertz
+from convexrough.plots import press_figures
+
+
+def three() -> cr.Contact:
+    asperities = cr.Asperities([(0.0, 0.0), (3e-3, 0.0), (-1e-3, 2.5e-3)], 0.02)
+    return cr.press(cr.Scene(1.0, asperities, MATERIAL), approach=PAPER_APPROACH)
+
+
+def one() -> cr.Contact:
+    return cr.press(cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), MATERIAL), approach=5e-5)
+
+
+def line() -> cr.Contact:
+    points = np.column_stack((np.zeros(9), 2.5e-3 * np.arange(-4, 5)))  # y = 0 crosses one
+    return cr.press(cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL), approach=5e-5)
+
+
+def dense(spacing: float) -> cr.Contact:
+    """Loads as on the smooth sphere: too many asperities to solve for in a test of figures."""
+    asperities = cr.Asperities.hexagonal(spacing=spacing, tip_radius=8 * spacing, within=8.5e-3)
+    scene = cr.Scene(1.0, asperities, MATERIAL)
+    loads = hertz.pressure(asperities.distances, 7e-3, 1.0)
+    loads *= hertz.load(7e-3**2, hertz.local_coefficient(1.0, 1.0)) / loads.sum()
+    nothing = np.zeros(len(scene))
+    status = np.where(loads > 0, "contact", "open")
+    certificate = cr.Certificate(
+        "global", 0.5, status, nothing, nothing, nothing, approach=4.9e-5, approach_error=0.0
+    )
+    radii = hertz.contact_radius(loads, 1.0, scene.relative_radii)
+    return dataclasses.replace(
+        one(), scene=scene, loads=loads, contact_radii=radii, load=loads.sum(),
+        certificate=certificate,
+    )  # fmt: skip
+
+
+def doubted(scope: Any, undecided: int) -> cr.Contact:
+    """The paper's contact with doubt cast on the last of its touching asperities."""
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    status = contact.status.copy().astype("U9")
+    status[37 - undecided : 37] = "undecided"
+    if scope == "none":
+        status[:] = "undecided"
+    certificate = dataclasses.replace(contact.certificate, scope=scope, status=status)
+    return dataclasses.replace(contact, certificate=certificate)
+
+
+CASES: dict[str, Callable[[], cr.Contact]] = {
+    "one": one,
+    "three": three,
+    "line": line,
+    "paper": lambda: cr.press(paper(), approach=PAPER_APPROACH),
+    "closest": lambda: cr.press(paper("closest"), approach=PAPER_APPROACH),
+    "rough": lambda: cr.press(rough(), approach=PAPER_APPROACH),
+    "steel": lambda: cr.press(steel(), approach=0.5e-6),
+    "2000": lambda: dense(3e-4),
+    "5000": lambda: dense(1.9e-4),
+    "20000": lambda: dense(1e-4),
+    "nothing": lambda: cr.press(paper(), approach=-1e-6),
+    "undecided": lambda: doubted("global", 6),
+    "not proved": lambda: doubted("none", 37),
+}
+
+
+@pytest.fixture(params=sorted(CASES))
+def contact(request: pytest.FixtureRequest) -> cr.Contact:
+    return CASES[request.param]()
+
+
+def words(figure: Figure) -> list[Text]:
+    """Every text that is drawn, after drawing the figure."""
+    figure.draw_without_rendering()
+    ticks, drawn = set(), []
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            slack = 1e-9 * (high - low)
+            for place, label in zip(axis.get_majorticklocs(), axis.get_ticklabels(), strict=True):
+                ticks.add(label)
+                if low - slack <= place <= high + slack:
+                    drawn.append(label)
+    others = [t for t in figure.findobj(Text) if isinstance(t, Text) and t not in ticks]
+    return [t for t in drawn + others if t.get_visible() and t.get_text().strip()]
+
+
+def test_fit_to_print(contact: cr.Contact) -> None:
+    for figure in press_figures(contact, length_unit="µm", force_unit="mN").values():
+        boxes = {text: text.get_window_extent() for text in words(figure)}
+        for text, box in boxes.items():
+            assert 6 < float(text.get_fontsize()) < 10
+            assert figure.bbox.padded(1).contains(box.x0, box.y0), text
+            assert figure.bbox.padded(1).contains(box.x1, box.y1), text
+        for one, other in combinations(boxes, 2):
+            assert not boxes[one].overlaps(boxes[other]), (one, other)
+        for axes in figure.axes[:2]:
+            assert axes.get_xlabel()
+            assert axes.get_ylabel()
+
+
+@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_saved_without_a_warning(kind: str) -> None:
+    for name in ("rough", "5000"):
+        file = BytesIO()
+        press_figures(CASES[name]())["pressure"].savefig(file, format=kind, dpi=200)
+        assert 50_000 < len(file.getvalue()) < 1_000_000
+
+
+def test_a_disc_for_every_touching_asperity(contact: cr.Contact) -> None:
+    chart, *_ = press_figures(contact)["pressure"].axes
+    discs: list[Any] = [c for c in chart.collections if isinstance(c, EllipseCollection)]
+    touching = contact.loads > 0
+    if not 0 < touching.sum() < 3000:
+        assert not discs
+        return
+    a_H = (3 * contact.load * contact.scene.sphere_radius) ** (1 / 3)
+    a_H /= (4 * contact.scene.material.contact_modulus) ** (1 / 3)
+    outer = discs[0]
+    assert_allclose(outer.get_offsets(), contact.scene.contact_points[touching] / a_H, rtol=1e-12)
+    assert_allclose(outer.get_widths(), 2 * contact.contact_radii[touching] / a_H, rtol=1e-12)
+    assert all((inner.get_widths() < outer.get_widths()).all() for inner in discs[1:])
+
+
+def test_the_colours_and_the_profile_show_the_pressure() -> None:
+    contact = CASES["rough"]()
+    chart, profile, bar = press_figures(contact)["pressure"].axes
+    E, P = 1.0, contact.load
+    p0 = (6 * P * E**2 / np.pi**3) ** (1 / 3)  # R = 1
+    assert_allclose(bar.get_ylim(), (0, fields.peak_pressures(contact).max() / p0), rtol=1e-12)
+    x, y = profile.collections[0].get_paths()[0].vertices.T  # type: ignore[union-attr]
+    a_H = (3 * P / 4) ** (1 / 3)
+    row = np.column_stack((x * a_H, np.zeros_like(x)))
+    shown = y > 1e-3
+    assert shown.sum() > 400
+    assert_allclose(y[shown], fields.pressure(contact, row)[shown] / p0, rtol=1e-3)
+    (smooth,) = profile.lines
+    assert_allclose(np.hypot(*smooth.get_data()), 1, rtol=1e-12)
+    assert chart.get_xlim() == profile.get_xlim()
+
+
+def test_a_mosaic_shows_the_peaks_of_the_nearest_asperities() -> None:
+    contact = dense(1.9e-4)
+    chart, *_ = press_figures(contact)["pressure"].axes
+    (image,) = chart.images
+    colours = np.asarray(image.get_array())
+    assert colours[0, 0, 3] == 0  # nothing touches in the corner
+    middle = colours[245:255, 245:255]
+    assert_allclose(middle, np.broadcast_to(matplotlib.colormaps["viridis_r"](1.0), middle.shape),
+                    atol=0.02)  # fmt: skip
+
+
+def test_the_loads_shown_are_all_of_the_load() -> None:
+    for name in ("one", "three", "rough", "2000"):
+        contact = CASES[name]()
+        (axes,) = press_figures(contact)["loads"].axes
+        points = next(line for line in axes.lines if line.get_label() == "touching")
+        shares = np.asarray(points.get_ydata())
+        assert len(shares) == np.count_nonzero(contact.loads)
+        assert shares.sum() == pytest.approx(100)
+
+
+def test_the_smooth_sphere_meets_many_asperities() -> None:
+    (axes,) = press_figures(dense(3e-4))["loads"].axes
+    smooth, points = axes.lines
+    r, share = (np.asarray(v, dtype=float) for v in smooth.get_data())
+    at, shown = (np.asarray(v, dtype=float) for v in points.get_data())
+    assert_allclose(np.interp(at, r, share), shown, atol=0.01 * shown.max())
+
+
+@pytest.mark.parametrize(("scope", "undecided"), [("global", 6), ("none", 37)])
+def test_doubt_is_shown(scope: str, undecided: int) -> None:
+    figures = press_figures(doubted(scope, undecided))
+    marked = {line.get_label(): line for line in figures["loads"].axes[0].lines}["undecided"]
+    assert len(np.asarray(marked.get_xdata())) == undecided
+    assert marked.get_marker() == "x"
+    title = figures["pressure"].axes[0].get_title(loc="left")
+    assert title == "touching: 37 of 61 " + ("(not proved)" if scope == "none" else "(6 undecided)")
+
+
+def test_no_contact_is_said() -> None:
+    for figure in press_figures(CASES["nothing"](), length_unit="mm").values():
+        assert "no contact" in {text.get_text() for text in words(figure)}
+
+
+def test_units_are_said_where_given() -> None:
+    contact = CASES["paper"]()
+    _, profile, _ = press_figures(contact, length_unit="$mm", force_unit="N")["pressure"].axes
+    assert profile.get_xlabel() == r"$x\,/\,a_H$  ($a_H$ = $6.47\times 10^{-3}$ \$mm)"
+    assert profile.get_ylabel() == r"$p\,/\,p_0$  ($p_0$ = $4.12\times 10^{-3}$ N/\$mm²)"
+    _, profile, _ = press_figures(contact, force_unit="N")["pressure"].axes
+    assert profile.get_ylabel().endswith("{-3}$)")
+
+
+def test_no_global_state_of_matplotlib() -> None:
+    code = "import sys, convexrough.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
+    before = dict(matplotlib.rcParams)
+    press_figures(three())
+    assert dict(matplotlib.rcParams) == before
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
