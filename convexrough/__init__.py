@@ -3,10 +3,11 @@
 from convexrough import solvers
 from convexrough.certificate import Certificate, certify
 from convexrough.contact import Contact, press
-from convexrough.cycle import Cycle, History, Loop, cycle, cycles, history, onset_of_sliding
+from convexrough.cycle import Cycle, Loop, cycle, cycles
 from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
+from convexrough.history import History, history
 from convexrough.scene import Asperities, Material, Scene
-from convexrough.shear import ShearCertificate, ShearState, shear
+from convexrough.shear import ShearCertificate, ShearState, onset_of_sliding, shear
 
 __version__ = "0.1.0"
 

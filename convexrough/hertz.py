@@ -56,7 +56,7 @@ def surface_displacement(distance: Number, contact_radius: float, radius: float)
     """
     a, r = contact_radius, np.asarray(distance, dtype=np.float64)
     outer = np.maximum(r, a)
-    outside = (2 * a**2 - outer**2) * np.arcsin(a / outer) + a * np.sqrt(outer**2 - a**2)
+    outside = (2 * a**2 - outer**2) * np.arcsin(a / outer) + a * np.sqrt((outer - a) * (outer + a))
     return np.where(r < a, a**2 / radius - r**2 / (2 * radius), outside / (np.pi * radius))
 
 

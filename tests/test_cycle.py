@@ -12,7 +12,7 @@ from test_shear import FRICTION, pressed, with_friction
 
 import convexrough as cr
 from convexrough import hertz
-from convexrough.cycle import _remember
+from convexrough.history import _remember
 from convexrough.influence import inverse_distances
 
 NU = 0.3
