@@ -76,6 +76,32 @@ def frozen(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
+def friction(coefficient: float | None) -> float:
+    """Coulomb's coefficient f of a scene that must have one."""
+    if coefficient is None:
+        expected = "a coefficient of friction, as shear needs one"
+        raise InputError("friction", found="none", expected=expected)
+    return coefficient
+
+
+def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
+    """Shear forces that friction can bear, |Q| <= limit = f P; of any shape."""
+    try:
+        given = np.asarray(forces, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(what, found=repr(forces)[:60], expected="numbers") from error
+    good = np.abs(given) <= limit * (1 + 1e-15)  # nan is not
+    if not good.all():
+        place = np.unravel_index(int(np.argmin(good)), given.shape)
+        name = f"{what}[{', '.join(map(str, place))}]" if place else what
+        worst = float(given[place])
+        over = f": gross sliding, {abs(worst) / limit - 1:.3g} beyond it" if limit > 0 else ""
+        raise InputError(
+            name, found=f"{worst:.17g}{over}", expected=f"at most f P = {limit:.17g} in size"
+        )
+    return given
+
+
 def exactly_one(first: str, a: object, second: str, b: object) -> None:
     """Exactly one of two alternatives is given (the other is None)."""
     if (a is None) == (b is None):

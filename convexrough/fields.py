@@ -1,18 +1,25 @@
-"""The fields under the sphere, anywhere on the surface, from the loads of its asperities.
+"""The fields under the sphere, anywhere on the surface, from the states of its asperities.
 
-So far the normal pressure. Every field with an elliptic profile is one `superpose`: the shear
-traction of an asperity will be f p0 on its contact disc less f p0 c/a on its stick disc.
+Pressure and traction are sums over the contact discs that hold a point; displacements, which reach
+everywhere, over all asperities. Shear is along x.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from convexrough import hertz
-from convexrough.checks import Array
+from convexrough import checks, hertz, mindlin
+from convexrough.checks import Array, Indices
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.hertz import Number
+from convexrough.shear import ShearState
+
+#: Pairs of a point and an asperity evaluated at a time.
+BLOCK = 2**18
 
 
 def peak_pressures(contact: Contact) -> Array:
@@ -42,11 +49,136 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
     )
 
 
+def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
+    """Normal displacement of both surfaces, the far bodies at rest: (...) [length].
+
+    The sum of each asperity's own field, its pressure spread over its disc and not a point force.
+    """
+    touching = np.flatnonzero(contact.loads)
+    centres = contact.scene.contact_points[touching]
+    radii: Number = contact.contact_radii[touching]
+    relative_radii: Number = contact.scene.relative_radii[touching]
+
+    def each(x: Array, y: Array) -> Array:
+        displacements: Array = hertz.surface_displacement(np.hypot(x, y), radii, relative_radii)
+        return displacements
+
+    return _sum_everywhere(points, centres, each)
+
+
+def traction(state: ShearState, points: ArrayLike) -> Array:
+    """Shear traction q(r) along x of first loading: (...) [force / length^2].
+
+    Of each asperity f p0 sqrt(1 - r^2/a^2), less f p0 (c/a) sqrt(1 - r^2/c^2) where it sticks.
+    """
+    asperities = _Sheared(state)
+    return _sum_over_discs(
+        points,
+        asperities.centres,
+        asperities.radii,
+        lambda distances, disc: mindlin.traction(
+            distances, asperities.radii[disc], asperities.shares[disc], asperities.peaks[disc]
+        ),
+    )
+
+
+def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
+    """Displacement along x of both surfaces, the far bodies at rest: (...) [length].
+
+    The sum over asperities of Johnson's 3.91, the source's [A3] and [A4] for both bodies. Where the
+    surfaces stick, the displacement of the deep points less this is 0, to the accuracy of
+    Ciavarella and Jaeger's forces: they are exact only on average over directions.
+    """
+    asperities = _Sheared(state)
+    material = state.contact.scene.material
+
+    def each(x: Array, y: Array) -> Array:
+        displacements: Array = mindlin.surface_displacement(
+            x,
+            y,
+            asperities.radii,
+            asperities.shares,
+            asperities.peaks,
+            material.shear_modulus,
+            material.poisson_ratio,
+        )
+        return displacements
+
+    return _sum_everywhere(points, asperities.centres, each)
+
+
+class _Sheared:
+    """The loaded asperities of a friction state, as `convexrough.mindlin` asks for them.
+
+    centres : (n, 2) [length];  radii : (n,) a [length];  peaks : (n,) f p0 [force / length^2]
+    shares  : (n,) Q_i / (f P_i), exactly +-1 where sliding
+    """
+
+    def __init__(self, state: ShearState) -> None:
+        contact = state.contact
+        friction = checks.friction(contact.scene.friction)
+        touching = np.flatnonzero(contact.loads)
+        forces = state.forces[touching]
+        self.centres = contact.scene.contact_points[touching]
+        self.radii = contact.contact_radii[touching]
+        self.peaks = friction * peak_pressures(contact)[touching]
+        self.shares = np.where(
+            state.stick_radii[touching] > 0,
+            forces / (friction * contact.loads[touching]),
+            np.sign(forces),
+        )
+
+
+def cell_areas(points: Array) -> Array:
+    """Area of each point's Voronoi cell, so that load / area is a nominal pressure.
+
+    points : (n, 2) [length];  result : (n,) [length^2], nan on the outline
+
+    Of each Delaunay triangle, (edge)^2 cot(opposite angle) / 8 goes to both ends of each edge.
+    About 2 s for 1e5 points.
+    """
+    from scipy.spatial import Delaunay, QhullError  # 0.1 s to import: only when asked
+
+    unknown: Array = np.full(len(points), np.nan)
+    if len(points) < 4:
+        return unknown
+    try:
+        mesh = Delaunay(points)
+    except QhullError:  # all on one line
+        return unknown
+    areas: Array = np.zeros(len(points))
+    for turn in range(3):
+        apex, left, right = np.roll(mesh.simplices, turn, axis=1).T
+        u, v = points[left] - points[apex], points[right] - points[apex]
+        edge = points[right] - points[left]
+        squared = np.sum(edge**2, axis=1)
+        cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        flat = cross < 1e-9 * squared  # three points of a straight outline, but for rounding
+        share = squared * np.sum(u * v, axis=1) / np.where(flat, np.nan, cross) / 8.0
+        np.add.at(areas, left, share)
+        np.add.at(areas, right, share)
+    areas[mesh.convex_hull] = np.nan
+    return areas
+
+
 def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> Array:
     """sum_i peak_i sqrt(1 - |r - r_i|^2 / radius_i^2) over the discs that hold r.
 
     points : (..., 2) [length];  centres : (n, 2) [length];  radii : (n,) [length], positive
     peaks  : (n,) [any];  result : (...) [as peaks]
+    """
+    return _sum_over_discs(
+        points,
+        centres,
+        radii,
+        lambda distances, disc: hertz.pressure(distances, radii[disc], peaks[disc]),
+    )
+
+
+def _sum_over_discs(
+    points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
+) -> Array:
+    """sum_i profile(|r - r_i|, i) over the discs that hold r.
 
     Time and memory grow with the number of points and of the discs about each, not with their
     product: discs are found by a k-d tree, in groups whose radii differ by less than a factor 2.
@@ -65,9 +197,23 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
         near = tree.sparse_distance_matrix(
             cKDTree(centres[group]), float(radii[group].max()), output_type="ndarray"
         )
-        disc = group[near["j"]]
-        profile = hertz.pressure(near["v"], radii[disc], peaks[disc])
-        total += np.bincount(near["i"], weights=profile, minlength=len(flat))
+        values = profile(near["v"], group[near["j"]])
+        total += np.bincount(near["i"], weights=values, minlength=len(flat))
+    return total.reshape(places.shape[:-1])
+
+
+def _sum_everywhere(
+    points: ArrayLike, centres: Array, field: Callable[[Array, Array], Array]
+) -> Array:
+    """sum_i field_i(r - r_i), in blocks: `field` takes x and y (m, n) from all n centres."""
+    places = _places(points)
+    flat = places.reshape(-1, 2)
+    total = np.zeros(len(flat))
+    size = max(1, BLOCK // max(1, len(centres)))
+    for start in range(0, len(flat), size):
+        block = slice(start, start + size)
+        x, y = np.moveaxis(flat[block, None] - centres, 2, 0)
+        total[block] = field(x, y).sum(axis=1)
     return total.reshape(places.shape[:-1])
 
 

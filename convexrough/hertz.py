@@ -48,7 +48,7 @@ def pressure(distance: Number, contact_radius: Number, peak_pressure: Number) ->
     return peak_pressure * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
 
 
-def surface_displacement(distance: Number, contact_radius: float, radius: float) -> Number:
+def surface_displacement(distance: Number, contact_radius: Number, radius: Number) -> Number:
     """Normal displacement of both surfaces at a distance r from the axis.
 
     a^2/R - r^2/(2R) inside the contact and

@@ -28,7 +28,7 @@ ROUGH, UNSURE = "#2b5c8a", "#c1440e"
 SMOOTH, FAINT = "0.15", "0.65"  # greys
 
 #: From these numbers of touching asperities on, the discs are pixels inside a vector file, and
-#: too small to show more than one colour each.
+#: too small to be drawn.
 DENSE, CROWDED = 200, 3000
 
 
@@ -80,21 +80,24 @@ def _pressure_figure(contact: Contact, scale: _Scale) -> Figure:
     touching = contact.loads > 0
     points = contact.scene.contact_points / scale.length
     radii = contact.contact_radii[touching] / scale.length
-    peaks = fields.peak_pressures(contact)[touching] / scale.pressure
+    peaks = fields.peak_pressures(contact) / scale.pressure
     edge = 1.06 * max(1.0, float((np.hypot(*points[touching].T) + radii).max()))
     top = max(1.0, float(peaks.max()))
 
-    _draw_open(chart, points[~touching & (np.abs(points).max(axis=1) < edge)])
     colours = ScalarMappable(Normalize(0.0, top), COLOURS)
-    _draw_discs(chart, points[touching], radii, peaks, colours)
+    if len(radii) < CROWDED:
+        _draw_open(chart, points[~touching & (np.abs(points).max(axis=1) < edge)])
+        _draw_discs(chart, points[touching], radii, peaks[touching], colours)
+    else:
+        _draw_mosaic(chart, points, peaks, colours, edge)
     chart.add_patch(Circle((0, 0), 1.0, fill=False, ls=(0, (4, 2.5)), lw=0.9, ec=SMOOTH))
     chart.set(xlim=(-edge, edge), ylim=(-edge, edge), aspect="equal", anchor="E")
-    chart.set_title(_census(contact), fontsize=LABEL, loc="left")
+    chart.set_title(_census(contact), fontsize=TICK, loc="left")
     _label(chart, "$x\\,/\\,a_H$", "$y\\,/\\,a_H$")
     bar = figure.colorbar(colours, ax=chart, aspect=28, pad=0.02)
     bar.ax.tick_params(labelsize=TICK)
     peak = "" if len(radii) < CROWDED else "peak "
-    bar.ax.set_title(peak + "$p\\,/\\,p_0$", fontsize=LABEL)
+    bar.ax.set_title(peak + "$p\\,/\\,p_0$", fontsize=TICK)
 
     _draw_profile(profile, contact, scale, edge)
     profile.set(xlim=(-edge, edge), ylim=(0.0, 1.04 * top))
@@ -107,8 +110,8 @@ def _pressure_figure(contact: Contact, scale: _Scale) -> Figure:
 def _draw_open(axes: Axes, points: Array) -> None:
     """Faint dots, smaller where they are many."""
     size = float(np.clip(25.0 / np.sqrt(len(points) + 1), 0.4, 1.5))
-    rasterized = len(points) > CROWDED
-    axes.plot(*points.T, "o", ms=size, mew=0, color=FAINT, rasterized=rasterized, label="open")
+    pixels = len(points) >= CROWDED
+    axes.plot(*points.T, "o", ms=size, mew=0, color=FAINT, rasterized=pixels, label="open")
 
 
 def _draw_discs(
@@ -119,10 +122,9 @@ def _draw_discs(
     centres : (n, 2) [a_H];  radii : (n,) [a_H];  peaks : (n,) [p0]
     """
     n = len(radii)
-    steps = int(np.clip(1000 // n, 8, 40)) if n < CROWDED else 1
+    steps = int(np.clip(1000 // n, 8, 40))
     for step in range(steps):
         across = 2.0 * radii * np.sqrt(1.0 - (step / steps) ** 2)  # where p = p0 step / steps
-        shown = (step + 0.5) / steps if steps > 1 else 1.0
         discs = EllipseCollection(
             across,
             across,
@@ -130,7 +132,7 @@ def _draw_discs(
             units="xy",
             offsets=centres,
             offset_transform=axes.transData,
-            facecolors=colours.to_rgba(peaks * shown),
+            facecolors=colours.to_rgba(peaks * (step + 0.5) / steps),
             linewidths=0,
             rasterized=n >= DENSE,
             label="contact discs" if step == 0 else "_inner discs",
@@ -138,13 +140,40 @@ def _draw_discs(
         axes.add_collection(discs, autolim=False)
 
 
+def _draw_mosaic(
+    axes: Axes, points: Array, peaks: Array, colours: ScalarMappable, edge: float
+) -> None:
+    """Each place in the colour of the nearest asperity's peak pressure; white where that is open.
+
+    points : (n, 2) [a_H];  peaks : (n,) [p0], 0 where open
+    """
+    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+
+    pixels = 500
+    x = edge * ((np.arange(pixels) + 0.5) / pixels * 2.0 - 1.0)
+    places = np.stack(np.meshgrid(x, x), axis=-1)
+    cell = 2.0 * edge / np.sqrt(np.count_nonzero(peaks))  # no asperity so near: outside them all
+    _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
+    shown = np.append(peaks, 0.0)[nearest]
+    image = colours.to_rgba(np.ma.masked_equal(shown, 0.0))
+    whole = (-edge, edge, -edge, edge)
+    axes.imshow(image, origin="lower", extent=whole, interpolation="nearest")
+
+
 def _draw_profile(axes: Axes, contact: Contact, scale: _Scale, edge: float) -> None:
     """Pressure along y = 0, of the asperities and of the smooth sphere, for |x| < edge [a_H]."""
     x = _abscissae(contact, edge * scale.length)
     rough = fields.pressure(contact, np.column_stack((x, np.zeros_like(x)))) / scale.pressure
-    width = 0.9 if len(x) < 4000 else 0.4
-    axes.fill_between(x / scale.length, rough, color=ROUGH, alpha=0.2, lw=0)
-    axes.plot(x / scale.length, rough, lw=width, color=ROUGH, label="asperities, $y=0$")
+    fine = len(x) > 100 * len(_towards_rim())  # so many discs that lines would leave no white
+    axes.fill_between(
+        x / scale.length,
+        rough,
+        facecolor=(ROUGH, 0.5 if fine else 0.2),
+        edgecolor="none" if fine else ROUGH,
+        lw=float(np.clip(3000 / len(x), 0.4, 0.9)),
+        rasterized=fine,
+        label="asperities, $y=0$",
+    )
     s = _towards_rim()
     axes.plot(s, hertz.pressure(s, 1.0, 1.0), "--", lw=1.3, color=SMOOTH, label="smooth sphere")
     _legend_above(axes)
@@ -199,7 +228,7 @@ def _loads_figure(contact: Contact, scale: _Scale) -> Figure:
     axes.set_xlim(0.0, 1.05 * max(1.0, float(distance[touching | unsure].max())))
     axes.set_ylim(0.0, 1.06 * axes.dataLim.ymax)
     axes.yaxis.get_offset_text().set_fontsize(TICK)
-    _label(axes, scale.length_label("r"), "load of an asperity  [% of total]")
+    _label(axes, scale.length_label("r"), "asperity load  [% of total]")
     _legend_above(axes, markerscale=4.0 / size)
     return figure
 
@@ -207,11 +236,16 @@ def _loads_figure(contact: Contact, scale: _Scale) -> Figure:
 def _draw_smooth_share(axes: Axes, contact: Contact, scale: _Scale) -> None:
     """Percentage of the load that the smooth sphere's pressure lays on the cell of an asperity.
 
-    100 p(r) A / P, with p0 = 3 P / (2 pi a_H^2) and A the typical area per asperity.
+    100 p(r) A / P, with p0 = 3 P / (2 pi a_H^2) and A the median cell of the touching asperities;
+    left out where fewer than seven of these have a whole cell.
     """
-    area = _area_per_asperity(contact)
-    if area is None:
+    points = contact.scene.contact_points
+    sample = np.argsort(np.hypot(*points.T))[:20_000]  # of very many, those nearest to the axis
+    areas = fields.cell_areas(points[sample])
+    whole = np.isfinite(areas) & (contact.loads[sample] > 0)
+    if whole.sum() < 7:
         return
+    area = np.median(areas[whole])
     s = _towards_rim()
     s = s[s >= 0.0]
     share = 100.0 * hertz.pressure(s, 1.0, 1.5 / np.pi) * area / scale.length**2
@@ -219,35 +253,10 @@ def _draw_smooth_share(axes: Axes, contact: Contact, scale: _Scale) -> None:
     axes.plot(s, share, "--", lw=1.1, color=SMOOTH, label=label)
 
 
-def _area_per_asperity(contact: Contact, *, fewest: int = 7, most: int = 20_000) -> float | None:
-    """Median area of the cells of the touching asperities [length^2]; None where these are few.
-
-    A cell is a third of the Delaunay triangles about an asperity: on a lattice, the lattice's
-    own cell. Of very many asperities those nearest to the axis stand for all.
-    """
-    from scipy.spatial import Delaunay, QhullError  # 0.1 s to import: only when asked
-
-    points = contact.scene.contact_points
-    nearest = np.argsort(np.hypot(*points.T), kind="stable")[:most]
-    points, whole = points[nearest], contact.loads[nearest] > 0
-    if whole.sum() < fewest:
-        return None
-    try:
-        mesh = Delaunay(points)
-    except QhullError:  # all on one line
-        return None
-    first, second, third = (points[corner] for corner in mesh.simplices.T)
-    u, v = second - first, third - first
-    thirds = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 6.0
-    cells = np.bincount(mesh.simplices.ravel(), np.repeat(thirds, 3), len(points))
-    whole[mesh.convex_hull.ravel()] = False  # their cells are cut by the outline
-    return float(np.median(cells[whole])) if whole.sum() >= fewest else None
-
-
 def _no_pressure(contact: Contact, scale: _Scale) -> Figure:
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     chart, profile = figure.subplots(1, 2)
-    chart.set_title(_census(contact), fontsize=LABEL, loc="left")
+    chart.set_title(_census(contact), fontsize=TICK, loc="left")
     _draw_open(chart, contact.scene.contact_points)
     chart.set_aspect("equal", adjustable="datalim")
     chart.locator_params(nbins=5)
@@ -269,7 +278,7 @@ def _no_loads(scale: _Scale) -> Figure:
     figure = Figure(figsize=(SINGLE, 2.6), layout="constrained")
     axes = figure.subplots()
     unit = f"  [{_literal(scale.length_unit)}]" if scale.length_unit else ""
-    _label(axes, "$r$" + unit, "load of an asperity  [% of total]")
+    _label(axes, "$r$" + unit, "asperity load  [% of total]")
     _say_no_contact(axes)
     return figure
 
@@ -282,11 +291,11 @@ def _say_no_contact(axes: Axes) -> None:
 
 def _census(contact: Contact) -> str:
     """How many touch, and how sure that is."""
-    words = f"{np.count_nonzero(contact.loads)} of {len(contact.loads)} asperities touch"
+    words = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
     if contact.certificate.scope == "none":
-        return words + ", not certified"
+        return words + " (not proved)"
     unsure = int((contact.status == "undecided").sum())
-    return words + (f", {unsure} undecided" if unsure else "")
+    return words + (f" ({unsure:,} undecided)" if unsure else "")
 
 
 def _label(axes: Axes, x: str, y: str) -> None:
@@ -297,8 +306,8 @@ def _label(axes: Axes, x: str, y: str) -> None:
 
 def _legend_above(axes: Axes, markerscale: float = 1.0) -> None:
     axes.legend(
-        loc="lower center",
-        bbox_to_anchor=(0.5, 0.99),
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.99),
         ncols=3,
         fontsize=TICK,
         markerscale=markerscale,

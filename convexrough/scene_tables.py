@@ -1,25 +1,25 @@
 """The tables of a scene file: what each key may hold, and every mistake in words.
 
-Each field's `description` is what a message says after "expected". Only this module knows pydantic,
-which takes 0.1 s to import: `read_scene` imports it when a file is read.
+Only this module knows pydantic, which takes 0.1 s to import: `read_scene` imports it when a file is
+read.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
-    AfterValidator,
     BaseModel,
     ConfigDict,
     Discriminator,
-    Field,
     Tag,
     ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
 )
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from convexrough import solvers
 from convexrough.checks import nearest
@@ -27,23 +27,50 @@ from convexrough.checks import nearest
 #: What `[solver] name` may say.
 SOLVERS: dict[str, Callable[[], solvers.Solver]] = {"newton": solvers.Newton}
 
-Positive = Annotated[float, Field(gt=0, description="a positive number")]
-Spread = Annotated[float, Field(ge=0, description="a number that is not negative")]
-Finite = Annotated[float, Field(description="a finite number")]
+#: In sensible units every number is well inside; the cube of one outside may overflow.
+LARGEST = 1e40
+
+
+def _expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
+    """What a message says after "expected", of a wrong type or where `holds` is false."""
+
+    def check(value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
+        try:
+            if holds(result := validated(value)):
+                return result
+        except ValidationError as error:
+            if error.errors()[0]["type"] == "expected":  # said already, inside
+                raise
+        raise PydanticCustomError("expected", "{phrase}", {"phrase": phrase})
+
+    return WrapValidator(check)
+
+
+def _is_sized(value: float) -> bool:
+    return value == 0 or 1 / LARGEST <= abs(value) <= LARGEST
+
+
+_SIZED = _expected(f"a size from {1 / LARGEST:g} to {LARGEST:g}; choose other units", _is_sized)
+
+Finite = Annotated[float, _expected("a finite number"), _SIZED]
+Positive = Annotated[float, _expected("a positive number", lambda value: value > 0), _SIZED]
+Spread = Annotated[
+    float, _expected("a number that is not negative", lambda value: value >= 0), _SIZED
+]
+Ratio = Annotated[float, _expected("a number from 0 to 0.5", lambda value: 0 <= value <= 0.5)]
+Share = Annotated[float, _expected("a number from 0 to 1", lambda value: 0 <= value <= 1)]
+Fraction = Annotated[float, _expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
+Shares = Annotated[list[Share], _expected("a list of numbers from 0 to 1", bool)]
+Fractions = Annotated[list[Fraction], _expected("a list of numbers from -1 to 1", bool)]
 TipRadius = Annotated[
     Annotated[Positive, Tag("number")] | Annotated[list[Positive], Tag("list")],
     Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
-    Field(description="a positive number, or a list of one per asperity"),
 ]
-Fractions = Annotated[
-    list[Annotated[float, Field(ge=-1, le=1)]],
-    Field(min_length=1, description="a list of numbers from -1 to 1"),
-]
-Shares = Annotated[
-    list[Annotated[float, Field(ge=0, le=1)]],
-    Field(min_length=1, description="a list of numbers from 0 to 1"),
-]
-Geometry = Annotated[Literal["summit", "closest"], Field(description='"summit" or "closest"')]
+Seed = Annotated[int, _expected("a whole number that is not negative", lambda value: value >= 0)]
+Text = Annotated[str, _expected("text in quotes", bool)]
+Pattern = Annotated[Literal["hexagonal", "square"], _expected('"hexagonal", "square" or "file"')]
+Geometry = Annotated[Literal["summit", "closest"], _expected('"summit" or "closest"')]
+SolverName = Annotated[str, _expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)]
 
 
 class Table(BaseModel):
@@ -80,26 +107,24 @@ class Material(Table):
     alternatives = ("contact_modulus", "youngs_modulus")
     contact_modulus: Positive | None = None
     youngs_modulus: Positive | None = None
-    poisson_ratio: Annotated[float, Field(ge=0, le=0.5, description="a number from 0 to 0.5")]
+    poisson_ratio: Ratio
 
 
 class Lattice(Table):
     needs: ClassVar = {"height_std": "seed", "tip_radius_cv": "seed"}
-    pattern: Annotated[
-        Literal["hexagonal", "square"], Field(description='"hexagonal", "square" or "file"')
-    ]
+    pattern: Pattern
     spacing: Positive
     tip_radius: TipRadius
     within: Spread | None = None
     height_std: Spread = 0.0
     tip_radius_cv: Spread = 0.0
-    seed: Annotated[int, Field(ge=0, description="a whole number, not negative")] | None = None
+    seed: Seed | None = None
     geometry: Geometry = "summit"
 
 
 class Summits(Table):
     pattern: Literal["file"]
-    path: Annotated[str, Field(min_length=1, description="the name of a CSV file")]
+    path: Text
     tip_radius: TipRadius | None = None
     geometry: Geometry = "summit"
 
@@ -140,21 +165,13 @@ class History(Table):
     fractions: Fractions
 
 
-def _known(name: str) -> str:
-    if name not in SOLVERS:
-        raise ValueError
-    return name
-
-
 class Solver(Table):
-    name: Annotated[
-        str, AfterValidator(_known), Field(description=f"one of: {', '.join(SOLVERS)}")
-    ] = "newton"
+    name: SolverName = "newton"
 
 
 class Units(Table):
-    length: Annotated[str, Field(description='text, such as "m"')] = ""
-    force: Annotated[str, Field(description='text, such as "N"')] = ""
+    length: Text = ""
+    force: Text = ""
 
 
 @dataclass(frozen=True)
@@ -169,8 +186,8 @@ class Document:
     shear: Shear | None = None
     cycle: Cycle | None = None
     history: History | None = None
-    solver: Solver = Solver()
-    units: Units = Units()
+    solver: Solver = field(default_factory=Solver)
+    units: Units = field(default_factory=Units)
 
 
 _TABLES: dict[str, tuple[type[Table], ...]] = {
@@ -195,8 +212,8 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
     mistakes = []
     for name, keys in contents.items():
         if name not in _TABLES:
-            kind = "table" if isinstance(keys, dict) else "key outside the tables"
-            mistakes.append(f"[{name}]: unknown {kind}, {nearest(name, _TABLES)}")
+            what = f"[{name}]: unknown table" if isinstance(keys, dict) else f"{name}: in no table"
+            mistakes.append(f"{what}, {nearest(name, _TABLES)}")
         elif not isinstance(keys, dict):
             mistakes.append(f"[{name}]: found {_shown(keys)}, expected a table")
         else:
@@ -207,9 +224,8 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
         if name not in contents:
             keys = ", ".join(key for key in _TABLES[name][0].model_fields)
             mistakes.append(f"[{name}]: missing table, its keys are: {keys}")
-    for name in _FRICTIONAL:
-        if name in contents and "friction" not in contents:
-            mistakes.append(f"[friction] coefficient: missing, needed with [{name}]")
+    if "friction" not in contents and (given := [name for name in _FRICTIONAL if name in contents]):
+        mistakes.append(f"[friction]: missing table, needed with [{given[0]}]")
     mistakes += _unbounded(tables)
     return (None if mistakes else Document(**tables)), mistakes
 
@@ -234,14 +250,9 @@ def _phrase(name: str, model: type[Table], error: ErrorDetails) -> str:
         if any(key in other.model_fields for other in _TABLES[name]):
             return f"{place}: not used with this pattern"
         return f"{place}: unknown key, {nearest(place, model.model_fields)}"
-    expected = str(model.model_fields[str(key)].description)
     if error["type"] == "missing":
-        return f"{place}: missing, expected {expected}"
-    if place != key:
-        expected = expected.removeprefix("a list of ").removesuffix(
-            ", or a list of one per asperity"
-        )
-    return f"{place}: found {_shown(error['input'])}, expected {expected}"
+        return f"{place}: missing"
+    return f"{place}: found {_shown(error['input'])}, expected {error['msg']}"
 
 
 def _unbounded(tables: dict[str, Any]) -> Iterator[str]:
