@@ -36,7 +36,7 @@ def inverse_distances(points: Array, others: Array) -> Array:
 def shell_radii(points: Array) -> Array:
     """(n,) [length] radii s_i with s_i + s_j <= r_ij: half the distance to the nearest neighbour.
 
-    With them A + diag(1 / (pi E* s_i)) is positive semidefinite (docs/theory.md, shell lemma).
+    With them A + diag(1 / (pi E* s_i)) is positive semidefinite (docs/theory/convexity.md).
     A single asperity has no neighbour and an infinite shell.
     """
     if len(points) < 2:

@@ -206,7 +206,7 @@ def shift_to_load(indentation: Array, coefficients: Array, load: float) -> float
 def approach_bound(
     weights: Array, displacement: Array, coefficients: Array, offsets: Array, load: float
 ) -> float:
-    """Upper bound on D0 at every solution of total `load` (derived in docs/theory.md).
+    """Upper bound on D0 at every solution of total `load` (derived in docs/theory/certificate.md).
 
     With q = weights / sum(weights), alpha_i = q_i k_i and c = A q, for every lambda >= max c:
 
