@@ -101,6 +101,25 @@ def test_attacks_on_known_scenes(name: str, kind: str) -> None:
             assert_honest(cr.certify(scene, wrong, load=contact.load), wrong, exact_load)
 
 
+@pytest.mark.parametrize("kind", ATTACKS)
+def test_attacks_on_a_local_certificate(kind: str) -> None:
+    """Where only a box is convex: loads outside it must not be proved, nor their neighbours."""
+    lattice = cr.Asperities.hexagonal(spacing=0.0012, tip_radius=0.2, within=0.0102)
+    scene = cr.Scene(1.0, lattice, MATERIAL)
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    assert contact.certificate.scope == "local"
+    for seed in range(8):
+        wrong = attack(kind, contact.loads, np.random.default_rng(seed))
+        certificate = cr.certify(scene, wrong, approach=PAPER_APPROACH)
+        if certificate.scope == "none":
+            continue
+        distance = np.abs(wrong - contact.loads)
+        slack = 2 * contact.certificate.load_error
+        assert (distance <= certificate.load_errors + slack).all()
+        assert not ((certificate.status == "open") & (contact.status == "contact")).any()
+        assert not ((certificate.status == "contact") & (contact.status == "open")).any()
+
+
 @settings(max_examples=100, deadline=None)
 @given(random_scenes(crowding=1.2, most=10), st.sampled_from(ATTACKS), st.integers(0, 2**32 - 1))
 def test_attacks_on_random_scenes(drawn: tuple[cr.Scene, float], kind: str, seed: int) -> None:

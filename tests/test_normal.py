@@ -13,6 +13,7 @@ import convexrough as cr
 from convexrough import hertz
 from convexrough.normal import NormalProblem, highest_approach, shift_to_load
 from convexrough.solvers import Newton
+from convexrough.solvers.newton import _evaluate, _step
 
 
 def assembled(scene: cr.Scene, **control: float) -> NormalProblem:
@@ -206,6 +207,20 @@ def test_newton_descends_where_the_energy_is_not_convex() -> None:
     solution = Newton().solve(problem)
     assert solution.residual < 1e-12
     assert cr.press(scene, approach=approach).certificate.scope == "none"
+
+
+def test_every_newton_step_lowers_the_energy() -> None:
+    """Also from bad starts on scenes far from convex, where full steps would not."""
+    for seed in range(30):
+        scene, approach = scattered(seed, 20, 4.0, 0.5)
+        problem = assembled(scene, approach=approach)
+        rng = np.random.default_rng(seed)
+        start = problem.bounds(problem.ceiling) * rng.random(len(problem)) ** 3
+        state = _evaluate(problem, hertz.indentation(start, problem.coefficients))
+        for _ in range(12):
+            following = _step(problem, state)
+            assert following.energy <= state.energy + 1e-12 * abs(state.energy)
+            state = following
 
 
 def test_newton_residual_is_recomputed() -> None:

@@ -1,5 +1,6 @@
 """Friction states: against 80 digits, against their own equations, and the words under attack."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -270,6 +271,30 @@ def test_attacks_on_the_words(name: str, fraction: float, kind: str, seed: int) 
     assert not (bounds.partial & truly_sliding).any()
     assert (np.abs(u - good.increments) <= bounds.increments * (1 + 1e-9)).all()
     assert (np.abs(wrong.rises - good.rises) <= bounds.rises * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("digits", [3, 5, 8, 12])
+@pytest.mark.parametrize("fraction", [1e-6, 0.1, 0.37, 0.6, 0.999])
+def test_doubt_about_the_loads_is_counted(fraction: float, digits: int) -> None:
+    """Starting from rounded loads, with the certificate of those, the bounds cover the truth."""
+    contact, truth = pressed("paper"), exact("paper", fraction)
+    rounded = np.array([float(f"{load:.{digits - 1}e}") for load in contact.loads])
+    # Not symmetric: every other load is off the other way.
+    rounded[1::2] += 10.0 ** (-digits) * rounded[1::2]
+    doubtful = replace(
+        contact,
+        loads=rounded,
+        load=float(rounded.sum()),
+        contact_radii=hertz.contact_radius(rounded, 1.0, contact.scene.relative_radii),
+        certificate=cr.certify(contact.scene, rounded, approach=contact.approach),
+    )
+    state = cr.shear(doubtful, force=fraction * FRICTION * contact.load)
+    certificate = state.certificate
+    for i, true in enumerate(truth.forces):
+        assert off(state.forces[i], true) <= certificate.force_errors[i]
+        assert off(state.slips[i], truth.slips[i]) <= certificate.slip_errors[i]
+        assert certificate.status[i] != ("partial" if truth.slips[i] > 0 else "sliding")
+    assert off(state.displacement, truth.displacement) <= certificate.displacement_error
 
 
 def test_an_uncertified_contact_gets_no_word() -> None:

@@ -1,0 +1,145 @@
+"""The source's appendix method: its crossing and scatter, and where it must agree with `shear`."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import PAPER_APPROACH, paper
+from scipy.optimize import brentq
+
+import convexrough as cr
+from convexrough import appendix
+from convexrough.hertz import mindlin_ratio
+from convexrough.smooth import smooth
+
+RATIOS = [0.0, 0.3, 0.5]
+
+
+def pressed(
+    nu: float, approach: float = PAPER_APPROACH, friction: float | None = 0.5
+) -> cr.Contact:
+    scene = cr.Scene(1.0, paper().asperities, cr.Material(1.0, nu), friction)
+    return cr.press(scene, approach=approach)
+
+
+def sheared(nu: float, fraction: float) -> cr.ShearState:
+    contact = pressed(nu)
+    return cr.shear(contact, force=fraction * 0.5 * contact.load)
+
+
+@pytest.mark.parametrize("nu", RATIOS)
+def test_the_losses_cross_earlier_than_by_shear(nu: float) -> None:
+    contact = pressed(nu)
+    hertz = smooth(contact.scene, load=contact.load)
+    limit = hertz.largest_force
+
+    def appendix_over_smooth(t: float) -> float:
+        return float(appendix.cycle_energy(contact, t * limit) / hertz.energy(t * limit) - 1)
+
+    def over_smooth(t: float) -> float:
+        return float(cr.cycle(contact, maximum=t * limit).energy / hertz.energy(t * limit) - 1)
+
+    assert brentq(appendix_over_smooth, 0.3, 0.5, xtol=1e-9) == pytest.approx(0.385524, abs=1e-6)
+    assert brentq(over_smooth, 0.3, 0.5, xtol=1e-9) == pytest.approx(0.387687, abs=1e-6)
+
+
+@pytest.mark.parametrize(("nu", "expected"), [(0.0, 0.00065), (0.3, 0.0109), (0.5, 0.0206)])
+def test_scatter_of_the_adhered_grows_with_poissons_ratio(nu: float, expected: float) -> None:
+    assert appendix.scatter(sheared(nu, 0.5)) == pytest.approx(expected, rel=0.01)
+    assert appendix.scatter(sheared(nu, -0.5)) == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("fraction", [0.37, 0.5, 0.8, -0.8, 1.0])
+def test_at_poissons_ratio_0_slips_are_those_of_shear(fraction: float) -> None:
+    """But for discs in place of points, an error of the displacements that slips are made of."""
+    state = sheared(0.0, fraction)
+    assert np.count_nonzero(state.slips) >= 6
+    error = state.contact.model_error * abs(state.displacement)
+    assert_allclose(appendix.slips(state), state.slips, rtol=0, atol=2 * error)
+    assert not np.allclose(appendix.slips(state), state.slips, rtol=0, atol=0.01 * error)
+
+
+@pytest.mark.parametrize("fraction", [0.37, 0.7])
+def test_slips_scatter_around_a_ring_but_not_their_mean(fraction: float) -> None:
+    means, spreads = [], []
+    for nu in RATIOS:
+        state = sheared(nu, fraction)
+        ring = np.isclose(state.contact.scene.asperities.distances, 3 * 0.0025)
+        slips = appendix.slips(state)[ring] / mindlin_ratio(nu)
+        means.append(slips.mean())
+        spreads.append(np.ptp(slips) / slips.mean())
+    assert_allclose(means, means[0], rtol=1e-9)
+    assert spreads[0] < 1e-9
+    assert 0.1 < spreads[1] < spreads[2]
+
+
+@pytest.mark.parametrize("nu", RATIOS)
+def test_without_sliding_the_loss_is_that_of_cycle(nu: float) -> None:
+    contact = pressed(nu)
+    for t in (1e-9, 0.1, 0.35):
+        Q = t * 0.5 * contact.load
+        cycle = cr.cycle(contact, maximum=Q)
+        assert appendix.cycle_energy(contact, Q) == pytest.approx(cycle.energy, rel=1e-13)
+        state = cr.shear(contact, force=-Q)
+        assert_array_equal(appendix.slips(state), 0.0)
+        assert_allclose(appendix.energies(state), cycle.energies, rtol=1e-12)
+
+
+def test_energies_split_into_partial_slip_and_sliding() -> None:
+    contact = pressed(0.3)
+    Q = 0.25 * contact.load
+    state, cycle = cr.shear(contact, force=Q), cr.cycle(contact, maximum=Q)
+    sliding = 4 * 0.5 * contact.loads * appendix.slips(state)
+    assert np.count_nonzero(sliding) == 6
+    assert_allclose(appendix.energies(state) - sliding, cycle.partial_slip_energies, rtol=1e-10)
+    assert_allclose(appendix.energies(cr.shear(contact, force=-Q)), appendix.energies(state))
+
+
+def test_a_cycle_costs_by_its_range() -> None:
+    contact = pressed(0.3)
+    Q = 0.45 * contact.load
+    whole = appendix.cycle_energy(contact, 0.6 * Q)
+    assert appendix.cycle_energy(contact, Q, -0.2 * Q) == pytest.approx(whole, rel=1e-12)
+    assert appendix.cycle_energy(contact, Q, Q) == 0.0
+    with pytest.raises(cr.InputError, match=r"minimum.*at most the maximum"):
+        appendix.cycle_energy(contact, -Q, Q)
+    with pytest.raises(cr.InputError, match=r"maximum.*gross sliding"):
+        appendix.cycle_energy(contact, 1.2 * Q)
+
+
+def test_at_the_limit_the_last_to_slide_stands_for_the_adhered() -> None:
+    contact = pressed(0.0)
+    limit = 0.5 * contact.load
+    near, at = (cr.shear(contact, force=t * limit) for t in (1 - 1e-12, 1.0))
+    assert np.count_nonzero(near.stick_radii) == 1
+    assert not at.stick_radii.any()
+    assert np.isnan(appendix.scatter(at))
+    assert_allclose(appendix.slips(at), appendix.slips(near), rtol=1e-6)
+    assert_allclose(appendix.slips(cr.shear(contact, force=-limit)), -appendix.slips(at))
+
+
+def test_one_asperity_moves_with_the_deep_points() -> None:
+    asperities = cr.Asperities([(0.3, -0.1)], 0.02)
+    contact = cr.press(cr.Scene(1.0, asperities, cr.Material(2.0, 0.4), 0.7), load=1e-6)
+    Q = 0.6 * 0.7e-6
+    state = cr.shear(contact, force=Q)
+    assert_allclose(appendix.displacements(state), state.displacement, rtol=1e-13)
+    assert appendix.scatter(state) == 0.0
+    assert_array_equal(appendix.slips(state), 0.0)
+    energy = cr.cycle(contact, maximum=Q).energy
+    assert appendix.cycle_energy(contact, Q) == pytest.approx(energy, rel=1e-13)
+
+
+def test_open_asperities_and_no_shear() -> None:
+    state = sheared(0.3, 0.5)
+    is_open = state.contact.loads == 0
+    assert is_open.any()
+    assert_array_equal(np.isnan(appendix.displacements(state)), is_open)
+    assert_array_equal(appendix.slips(state)[is_open], 0.0)
+    assert_array_equal(appendix.energies(state)[is_open], 0.0)
+    for contact in (pressed(0.3), pressed(0.3, approach=-1e-6)):
+        still = cr.shear(contact, force=0.0)
+        assert np.isnan(appendix.scatter(still))
+        assert_array_equal(appendix.slips(still), 0.0)
+        assert appendix.cycle_energy(contact, 0.0) == 0.0
+    with pytest.raises(cr.InputError, match="friction"):
+        appendix.cycle_energy(pressed(0.3, friction=None), 0.0)

@@ -1,0 +1,269 @@
+"""Traction and displacement under shear: Cerruti's integral, 60 digits, balance, plain sums."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper
+
+import convexrough as cr
+from convexrough import fields, hertz, mindlin
+
+A, PEAK, G = 0.7, 2.0, 3.0
+RATIOS = [0.0, 0.3, 0.5]
+DIRECTIONS = np.array([0.0, 0.7, np.pi / 2, 2.5])
+
+
+def displacement(r: Any, angle: Any, nu: float, share: float = 1.0) -> Any:
+    return mindlin.surface_displacement(r * np.cos(angle), r * np.sin(angle), A, share, PEAK, G, nu)
+
+
+def cerruti(r: float, angle: float, nu: float, a: float, q0: float) -> float:
+    """Both surfaces' displacement along x at (r, angle), from q0 sqrt(1 - r^2/a^2) on a disc.
+
+    Cerruti: a force at a distance s moves both surfaces by (1/(pi G s)) (1 - nu + nu cos^2 w), w
+    the angle of the line to it. In polar coordinates about the point, 1/s meets the area s ds dw:
+    what is left is the traction along each line through the point that cuts the disc.
+    """
+    roots, root_weights = np.polynomial.legendre.leggauss(40)
+    if r < a:  # every line does
+        w = np.pi * np.arange(400) / 400
+        weights = np.full(400, np.pi / 400)
+    else:
+        half = np.arcsin(a / r)
+        w, weights = angle + half * np.sin(np.pi / 2 * roots), half * np.pi / 2 * root_weights
+        weights = weights * np.cos(np.pi / 2 * roots)
+    nearest = r * np.sin(w - angle)
+    chord = np.sqrt(np.maximum(a**2 - nearest**2, 0.0))
+    along = np.sin(np.pi / 2 * roots)[:, None] * chord  # from the middle of the chord
+    lengths = (np.pi / 2 * np.cos(np.pi / 2 * roots) * root_weights)[:, None] * chord
+    traction = q0 * np.sqrt(np.maximum(1 - (nearest**2 + along**2) / a**2, 0.0))
+    lines = (lengths * traction).sum(axis=0)
+    return float(weights @ (lines * (1 - nu + nu * np.cos(w) ** 2)) / (np.pi * G))
+
+
+@pytest.mark.parametrize("nu", RATIOS)
+@pytest.mark.parametrize("ratio", [0.0, 0.3, 0.6, 0.95, 1.05, 1.5, 4.0, 30.0])
+def test_displacement_is_cerrutis_integral(ratio: float, nu: float) -> None:
+    r = ratio * A
+    for angle in DIRECTIONS:
+        whole = cerruti(r, angle, nu, A, PEAK)
+        assert displacement(r, angle, nu) == pytest.approx(whole, rel=1e-6)
+        c = A * (1 - 0.4) ** (1 / 3)  # 0.84 a: between the fourth and the third distance
+        stuck = cerruti(r, angle, nu, c, PEAK * c / A)
+        assert displacement(r, angle, nu, 0.4) == pytest.approx(whole - stuck, rel=3e-6)
+
+
+@pytest.mark.parametrize("nu", RATIOS)
+@pytest.mark.parametrize("share", [1.0, 0.4, -1e-3])
+def test_displacement_is_continuous_at_both_edges(share: float, nu: float) -> None:
+    for edge in (A, A * np.cbrt(1 - abs(share))):
+        inside = displacement(edge * (1 - 1e-10), DIRECTIONS, nu, share)
+        outside = displacement(edge * (1 + 1e-10), DIRECTIONS, nu, share)
+        assert_allclose(inside, outside, rtol=1e-7)
+
+
+@pytest.mark.parametrize("nu", RATIOS)
+@pytest.mark.parametrize("share", [1.0, 0.4, 1e-6])
+def test_far_away_the_traction_is_a_point_force(share: float, nu: float) -> None:
+    force, r = 2 / 3 * np.pi * A**2 * PEAK * share, 1e4 * A
+    point = force / (np.pi * G * r) * (1 - nu + nu * np.cos(DIRECTIONS) ** 2)
+    assert_allclose(displacement(r, DIRECTIONS, nu, share), point, rtol=1e-7)
+
+
+@pytest.mark.parametrize("nu", RATIOS)
+@pytest.mark.parametrize("share", [1e-6, 0.3, 0.9, 1.0])
+def test_the_stick_disc_moves_as_one(share: float, nu: float) -> None:
+    """By the displacement of Cattaneo and Mindlin; the annulus less, so it slips forwards."""
+    c = A * np.cbrt(1 - share)
+    P, E = 2 / 3 * np.pi * A**2 * PEAK, G / (1 - nu)  # of f P
+    X = hertz.mindlin_ratio(nu) * 3 * P / (4 * E * A) * hertz.deflection(share)  # delta = 3P/(4Ea)
+    sticking = displacement(np.array([0.0, 0.5, 1 - 1e-9])[:, None] * c, DIRECTIONS, nu, share)
+    assert_allclose(sticking, X, rtol=1e-12)
+    slipping = displacement(np.linspace(c, A, 6)[1:, None], DIRECTIONS, nu, share)
+    assert (slipping < X).all()
+    assert (np.diff(slipping, axis=0) < 0).all()
+
+
+def exact(x: Any, y: Any, nu: Any, share: float) -> tuple[float, float]:
+    """Traction and displacement as in the source, subtracted in 60 digits."""
+    with ctx.workdps(60):
+        x, y, nu, t, a, peak, modulus = (arb(v) for v in (x, y, nu, share, A, PEAK, G))
+        r, c = (x**2 + y**2).sqrt(), a * (1 - t).root(3)
+
+        def disc(radius: Any) -> tuple[Any, Any]:
+            q0 = peak * radius / a
+            if r <= radius:
+                bowl = 4 * (2 - nu) * radius**2 - (4 - nu) * y**2 - (4 - 3 * nu) * x**2
+                traction = q0 * (1 - (r / radius) ** 2).sqrt() if radius > 0 else arb(0)
+                return traction, arb.pi() * peak / (32 * modulus * a) * bowl
+            s = r / radius
+            angle, root = (1 / s).asin(), (1 - 1 / s**2).sqrt()
+            mean = (2 - nu) * ((2 - s**2) * angle + s * root)
+            turned = nu / 2 * (x**2 - y**2) / r**2 * (s**2 * angle + (2 - s**2) / s * root)
+            return arb(0), q0 * radius / (8 * modulus) * (mean + turned)
+
+        whole, stuck = disc(a), disc(c) if share < 1 else (arb(0), arb(0))
+        return float(whole[0] - stuck[0]), float(2 * (whole[1] - stuck[1]))
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3])
+@pytest.mark.parametrize("share", [1e-15, 1e-9, 1e-3, 0.2, 0.7, 1 - 1e-9, 1.0])
+def test_sixty_digits(share: float, nu: float) -> None:
+    """At every share, and from the centre to where the source's formula has lost all its digits."""
+    for ratio in (0.0, 1e-6, 0.4, 0.8, 1.001, 1.3, 10.0, 1e3, 1e8):
+        for angle in DIRECTIONS:
+            x, y = ratio * A * np.cos(angle), ratio * A * np.sin(angle)
+            traction, moved = exact(x, y, nu, share)
+            computed = mindlin.surface_displacement(x, y, A, share, PEAK, G, nu)
+            assert computed == pytest.approx(moved, rel=1e-13), (ratio, angle)
+            q = mindlin.traction(np.hypot(x, y), A, share, PEAK)
+            assert q == pytest.approx(traction, rel=1e-13), (ratio, angle)
+
+
+# Whole scenes
+
+
+def sheared(name: str, fraction: float, nu: float = 0.3) -> cr.ShearState:
+    scene, approach = NAMED[name]
+    material = cr.Material(scene.material.contact_modulus, nu)
+    scene = cr.Scene(scene.sphere_radius, scene.asperities, material, 0.5, scene.geometry)
+    contact = cr.press(scene, approach=approach)
+    return cr.shear(contact, force=fraction * 0.5 * contact.load)
+
+
+@pytest.mark.parametrize("fraction", [0.01, 0.5, -0.5, 0.95, 1.0])
+@pytest.mark.parametrize("name", ["paper", "rough, closest", "steel"])
+def test_the_traction_of_each_asperity_integrates_to_its_force(name: str, fraction: float) -> None:
+    state = sheared(name, fraction)
+    contact = state.contact
+    touching = contact.loads > 0
+    centres, a = contact.scene.contact_points[touching], contact.contact_radii[touching]
+    c = state.stick_radii[touching]
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    phi, weights = np.pi / 4 * (nodes + 1), np.pi / 4 * weights
+    forces = np.zeros(len(a))
+    for inner, outer in ((0 * c, c), (c, a)):  # r^2 = outer^2 - (outer^2 - inner^2) cos^2(phi)
+        squared = outer**2 - inner**2
+        for angle, weight in zip(phi, weights, strict=True):
+            r = np.sqrt(outer**2 - squared * np.cos(angle) ** 2)
+            traction = fields.traction(state, centres + r[:, None] * [0.6, 0.8])
+            forces += weight * 2 * np.pi * squared * np.cos(angle) * np.sin(angle) * traction
+    assert_allclose(forces, state.forces[touching], rtol=1e-7)
+    assert forces.sum() == pytest.approx(state.force, rel=1e-7)
+
+
+@pytest.mark.parametrize("fraction", [1e-9, 0.37, -0.5, 1.0])
+def test_friction_bears_the_traction_and_slip_uses_it_up(fraction: float) -> None:
+    state = sheared("rough", fraction)
+    contact, sign = state.contact, np.sign(fraction)
+    points = np.random.default_rng(3).uniform(-0.009, 0.009, (20_000, 2))
+    friction = 0.5 * fields.pressure(contact, points)
+    traction = fields.traction(state, points)
+    assert (np.abs(traction) <= friction * (1 + 1e-12)).all()
+    within = np.hypot(*(points[:, None] - contact.scene.contact_points).T).T
+    stick = (within < state.stick_radii).any(axis=1)
+    slip = (within < contact.contact_radii).any(axis=1) & ~stick
+    assert_allclose(traction[slip], sign * friction[slip], rtol=1e-9)
+    assert (sign * traction[stick] < friction[stick]).all()
+    assert (sign * traction[stick] > 0).all()
+    assert_array_equal(traction[~stick & ~slip], 0.0)
+    if abs(fraction) > 0.1:
+        assert np.count_nonzero(slip) > 100
+        assert stick.any() == (abs(fraction) < 1)
+
+
+@pytest.mark.parametrize("fraction", [0.37, 0.8])
+def test_traction_is_the_contact_disc_less_the_stick_disc(fraction: float) -> None:
+    state = sheared("paper", fraction)
+    contact, c = state.contact, state.stick_radii
+    centres, sticking = contact.scene.contact_points, c > 0
+    points = np.random.default_rng(4).uniform(-0.008, 0.008, (5000, 2))
+    peaks = 0.5 * fields.peak_pressures(contact)[sticking] * c[sticking]
+    stuck = peaks / contact.contact_radii[sticking]
+    expected = 0.5 * fields.pressure(contact, points)
+    expected -= fields.superpose(points, centres[sticking], c[sticking], stuck)
+    assert_allclose(fields.traction(state, points), expected, rtol=1e-11, atol=1e-13 * stuck.max())
+
+
+@pytest.mark.parametrize("fraction", [1e-9, 0.5, -0.8])
+def test_displacement_is_the_plain_sum_in_blocks(
+    fraction: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state = sheared("rough", fraction)
+    contact, scene = state.contact, state.contact.scene
+    points = np.random.default_rng(6).uniform(-0.02, 0.02, (3, 50, 2))
+    plain = np.zeros((3, 50))
+    for i in np.flatnonzero(contact.loads):
+        share = state.forces[i] / (0.5 * contact.loads[i]) if state.stick_radii[i] else 1.0
+        x, y = np.moveaxis(points - scene.contact_points[i], -1, 0)
+        plain += mindlin.surface_displacement(
+            x,
+            y,
+            contact.contact_radii[i],
+            np.copysign(share, fraction),
+            0.5 * fields.peak_pressures(contact)[i],
+            scene.material.shear_modulus,
+            scene.material.poisson_ratio,
+        )
+    assert_allclose(fields.shear_displacement(state, points), plain, rtol=1e-12)
+    monkeypatch.setattr(fields, "BLOCK", 1000)
+    assert_allclose(fields.shear_displacement(state, points), plain, rtol=1e-12)
+
+
+def test_poissons_ratio_0_has_no_direction_and_the_asperities_move_together() -> None:
+    """By Ciavarella and Jaeger's displacement, but for discs in place of points: 0.2 %."""
+    state = sheared("paper", 0.5, nu=0.0)
+    turned = np.array([[0.6, -0.8], [0.8, 0.6]])
+    points = np.random.default_rng(7).uniform(-0.02, 0.02, (60, 2))
+    lattice = np.array([[0.5, -np.sqrt(0.75)], [np.sqrt(0.75), 0.5]])  # its own symmetry
+    there = fields.shear_displacement(state, points @ lattice.T)
+    assert_allclose(there, fields.shear_displacement(state, points), rtol=1e-10)
+    sticking = state.contact.scene.contact_points[state.stick_radii > 0]
+    moved = fields.shear_displacement(state, sticking)
+    assert_allclose(moved, state.displacement, rtol=2 * state.contact.model_error)
+    assert not np.allclose(fields.shear_displacement(state, points @ turned.T), there, rtol=1e-3)
+
+
+def test_displacement_far_away_is_that_of_the_whole_force() -> None:
+    state = sheared("paper", 0.5)
+    material, r = state.contact.scene.material, 100.0
+    points = r * np.column_stack((np.cos(DIRECTIONS), np.sin(DIRECTIONS)))
+    nu = material.poisson_ratio
+    point = state.force / (np.pi * material.shear_modulus * r)
+    point = point * (1 - nu + nu * np.cos(DIRECTIONS) ** 2)
+    assert_allclose(fields.shear_displacement(state, points), point, rtol=1e-6)
+
+
+def test_normal_displacement_closes_every_contact() -> None:
+    """As the contact law asks, w = D0 + d at each touching asperity, but for discs as points."""
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    touching = contact.loads > 0
+    moved = fields.normal_displacement(contact, contact.scene.contact_points[touching])
+    prescribed = PAPER_APPROACH + contact.scene.offsets[touching]
+    assert_allclose(moved, prescribed, rtol=1.1 * contact.model_error)
+    far = fields.normal_displacement(contact, [[30.0, 40.0]])
+    assert_allclose(far, contact.load / (np.pi * 50.0), rtol=1e-5)
+
+
+def test_nothing_sheared_nothing_moved() -> None:
+    points = np.random.default_rng(8).uniform(-0.008, 0.008, (2, 9, 2))
+    scene = cr.Scene(1.0, paper().asperities, MATERIAL, friction=0.5)
+    for approach in (PAPER_APPROACH, -1e-6):
+        contact = cr.press(scene, approach=approach)
+        state = cr.shear(contact, force=0.0)
+        assert_array_equal(fields.traction(state, points), np.zeros((2, 9)))
+        assert_array_equal(fields.shear_displacement(state, points), np.zeros((2, 9)))
+    assert_array_equal(fields.normal_displacement(contact, points), np.zeros((2, 9)))
+
+
+@pytest.mark.parametrize("bad", [0.0, [1.0, 2.0, 3.0], [[0.0, np.nan]]])
+def test_points_that_are_none(bad: Any) -> None:
+    state = sheared("paper", 0.5)
+    for field in (fields.traction, fields.shear_displacement):
+        with pytest.raises(cr.InputError, match=r"points.*x and y of each"):
+            field(state, bad)
+    assert fields.traction(state, np.zeros((3, 0, 2))).shape == (3, 0)
+    assert fields.shear_displacement(state, np.zeros((3, 0, 2))).shape == (3, 0)
