@@ -1,0 +1,43 @@
+"""Every example runs, and what it computes agrees with its reference."""
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FOLDER = Path(__file__).parent.parent / "examples"
+#: Relative tolerances: of the paper's rounded numbers, of quadrature, of coarse boundary elements.
+TOLERANCES = {"papers_example": 1e-3, "random_heights": 2e-4}
+
+
+def load(path: Path) -> Any:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in sorted(FOLDER.glob("*.py")) if p.stem != "boundary_elements"], ids=str
+)
+def test_example(path: Path) -> None:
+    pairs = load(path).compare()
+    assert pairs
+    for name, computed, reference in pairs:
+        tolerance = TOLERANCES.get(path.stem, 1e-9)
+        assert computed == pytest.approx(reference, rel=tolerance, abs=1e-12), name
+
+
+def test_boundary_elements() -> None:
+    """The asperity model against a boundary-element solution of the same shapes."""
+    pairs = {name: (a, b) for name, a, b in load(FOLDER / "boundary_elements.py").compare(384)}
+    errors = {name: a / b - 1 for name, (a, b) in pairs.items()}
+    assert pairs["order of convergence"][0] == pytest.approx(2.0, abs=0.25)
+    assert abs(errors["closest, total load"]) < 2.5e-4
+    assert abs(errors["summit, total load"]) < 4e-3
+    for ring in "FEDCBA":
+        assert abs(errors[f"closest, load in ring {ring}"]) < 4e-3
+    assert -0.08 < errors["summit, load in ring A"] < -0.07
