@@ -7,7 +7,9 @@ from convexrough.cycle import Cycle, Loop, cycle, cycles
 from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
 from convexrough.history import History, history
 from convexrough.scene import Asperities, Material, Scene
+from convexrough.scene_file import SceneFile, read_scene
 from convexrough.shear import ShearCertificate, ShearState, onset_of_sliding, shear
+from convexrough.smooth import SmoothSphere, smooth
 
 __version__ = "0.1.0"
 
@@ -23,8 +25,10 @@ __all__ = [
     "Loop",
     "Material",
     "Scene",
+    "SceneFile",
     "ShearCertificate",
     "ShearState",
+    "SmoothSphere",
     "SolverError",
     "certify",
     "cycle",
@@ -32,6 +36,8 @@ __all__ = [
     "history",
     "onset_of_sliding",
     "press",
+    "read_scene",
     "shear",
+    "smooth",
     "solvers",
 ]

@@ -2,9 +2,9 @@
 
 Knows no solver. Every bound holds for the exact solution of the scene whose data are the given
 float64 numbers, and includes the rounding of everything computed here. The mathematics is derived
-in docs/theory/certificate.md; in short, for loads P with residual e (the gap where loaded, its negative part
-where not), a box 0 <= P <= B that holds every solution, H = diag(2/3 k B^(-1/3)), and mu > 0 with
-Hessian >= mu H on that box,
+in docs/theory/certificate.md; in short, for loads P with residual e (the gap where loaded, its
+negative part where not), a box 0 <= P <= B that holds every solution, H = diag(2/3 k B^(-1/3)),
+and mu > 0 with Hessian >= mu H on that box,
 
     || P - P* ||_H  <=  || e ||_{H^-1} / mu  =:  eps,
 

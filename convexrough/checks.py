@@ -15,25 +15,29 @@ Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.intp]
 
 
+#: Sizes of numbers, in a scene's own units, whose products and powers float64 can hold.
+SMALLEST, LARGEST = 1e-60, 1e60
+
+
 def finite(what: str, value: float) -> float:
     number = _number(what, value, "a finite number")
     if not math.isfinite(number):
         raise InputError(what, found=number, expected="a finite number")
-    return number
+    return _of_size(what, number)
 
 
 def positive(what: str, value: float) -> float:
     number = _number(what, value, "a positive number")
     if not (math.isfinite(number) and number > 0):
         raise InputError(what, found=number, expected="a positive number")
-    return number
+    return _of_size(what, number)
 
 
 def non_negative(what: str, value: float) -> float:
     number = _number(what, value, "a number that is not negative")
     if not (math.isfinite(number) and number >= 0):
         raise InputError(what, found=number, expected="a number that is not negative")
-    return number
+    return _of_size(what, number)
 
 
 def between(what: str, value: float, low: float, high: float) -> float:
@@ -57,7 +61,7 @@ def array(what: str, values: ArrayLike, *, length: int | None = None, sign: str 
     if vector.ndim != 1 or (length is not None and vector.size != length):
         count = "a list of numbers" if length is None else f"{length} values, one per asperity"
         raise InputError(what, found=f"shape {np.shape(values)}", expected=count)
-    good = np.isfinite(vector)
+    good = np.abs(vector) <= LARGEST  # nan is not
     if sign == "positive":
         good &= vector > 0
     elif sign == "not negative":
@@ -95,7 +99,10 @@ def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
         place = np.unravel_index(int(np.argmin(good)), given.shape)
         name = f"{what}[{', '.join(map(str, place))}]" if place else what
         worst = float(given[place])
-        over = f": gross sliding, {abs(worst) / limit - 1:.3g} beyond it" if limit > 0 else ""
+        over = ""
+        if math.isfinite(worst):
+            excess = f", {abs(worst) / limit - 1:.3g} beyond it" if limit > 0 else ""
+            over = f": gross sliding{excess}"
         raise InputError(
             name, found=f"{worst:.17g}{over}", expected=f"at most f P = {limit:.17g} in size"
         )
@@ -111,6 +118,7 @@ def exactly_one(first: str, a: object, second: str, b: object) -> None:
 
 def fits_in_memory(what: str, count: float, bytes_each: float) -> None:
     """Refuse to start on something this machine cannot hold."""
+    count = float(count)
     if count * bytes_each < 2**26:
         return
     import psutil  # only asked when something may be large
@@ -133,6 +141,13 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     if near := difflib.get_close_matches(name.lower(), names, n=1):
         return f'did you mean "{names[near[0]]}"?'
     return f"valid: {', '.join(names.values())}"
+
+
+def _of_size(what: str, number: float) -> float:
+    if number != 0 and not SMALLEST <= abs(number) <= LARGEST:
+        expected = f"0 or a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
+        raise InputError(what, found=number, expected=expected)
+    return number
 
 
 def _number(what: str, value: float, expected: str) -> float:

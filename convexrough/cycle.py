@@ -18,8 +18,8 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.family import Family
 from convexrough.history import history
-from convexrough.shear import check_force
 from convexrough.shear_certificate import judge_states
+from convexrough.smooth import smooth
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,9 @@ class Cycle:
 
     def loop(self, points: int = 200) -> Loop:
         """The loop through about `points` points, as many down as up."""
-        down = np.linspace(self.maximum, self.minimum, max(2, points // 2 + 1))
+        if points < 4:
+            raise InputError("points", found=points, expected="at least 4")
+        down = np.linspace(self.maximum, self.minimum, points // 2 + 1)
         there_and_back = [self.maximum, self.minimum]
         if abs(self.minimum) > abs(self.maximum):
             there_and_back.insert(0, self.minimum)
@@ -100,18 +102,21 @@ def cycle(contact: Contact, *, maximum: float, minimum: float | None = None) -> 
 
 def cycles(contact: Contact, maximum: ArrayLike, minimum: ArrayLike | None = None) -> list[Cycle]:
     """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives."""
-    upper = checks.array("maximum", maximum)
-    lower = -upper if minimum is None else checks.array("minimum", minimum, length=len(upper))
-    for i, (high, low) in enumerate(zip(upper, lower, strict=True)):
-        check_force(contact, f"maximum[{i}]", high)
-        check_force(contact, f"minimum[{i}]", low)
-        if low > high:
-            raise InputError(f"minimum[{i}]", found=low, expected=f"at most the maximum {high}")
-    if contact.load == 0.0:
+    limit = checks.friction(contact.scene.friction) * contact.load
+    upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
+    lower = -upper
+    if minimum is not None:
+        lower = checks.array("minimum", minimum, length=len(upper))
+        checks.bearable("minimum", lower, limit)
+    if (upper < lower).any():
+        i = int(np.argmax(upper < lower))
+        expected = f"at least the minimum, {lower[i]:g}; by default that is its negative"
+        raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
+    if contact.load == 0.0 or len(upper) == 0:
         return [_empty(contact, high, low) for high, low in zip(upper, lower, strict=True)]
 
     family = Family(contact)
-    problem, scene = family.problem, contact.scene
+    problem = family.problem
     totals = problem.limited((upper - lower) / (2.0 * family.force_unit))
     states = family.states(totals)
     bounds = judge_states(problem, contact.certificate, states)
@@ -120,9 +125,7 @@ def cycles(contact: Contact, maximum: ArrayLike, minimum: ArrayLike | None = Non
     energies = (slip + slide).sum(axis=1)
     others = family.energy_unit * family.trapezoid_error(states)
     defects = np.abs(others - energies) / np.where(energies > 0, energies, 1.0)
-    radius_law = hertz.local_coefficient(scene.material.contact_modulus, scene.sphere_radius)
-    ratio = hertz.mindlin_ratio(scene.material.poisson_ratio)
-    whole = 4.8 * ratio * family.friction**2 * radius_law * contact.load ** (5 / 3)  # W0
+    whole = smooth(contact.scene, load=contact.load).energy_scale  # W0
     words = np.full(slip.shape, "undecided", dtype="<U9")
     words[:, contact.status == "open"] = "open"
     inside = words[:, problem.touching]

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from convexrough import hertz
+from convexrough import checks, hertz
 from convexrough.checks import Array
 from convexrough.contact import Contact
-from convexrough.shear import coefficient
 from convexrough.tangential import States, TangentialProblem
 
 
@@ -21,7 +20,7 @@ class Family:
 
     def __init__(self, contact: Contact) -> None:
         self.contact = contact
-        self.friction = coefficient(contact)
+        self.friction = checks.friction(contact.scene.friction)
         self.problem = TangentialProblem.of(contact)
         ratio = hertz.mindlin_ratio(contact.scene.material.poisson_ratio)
         self.force_unit = self.friction * self.problem.units.force

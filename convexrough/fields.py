@@ -15,11 +15,10 @@ from convexrough import checks, hertz, mindlin
 from convexrough.checks import Array, Indices
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.hertz import Number
 from convexrough.shear import ShearState
 
-#: Pairs of a point and an asperity evaluated at a time.
-BLOCK = 2**18
+#: Pairs of a point and an asperity evaluated at a time: what stays in a cache.
+BLOCK = 2**14
 
 
 def peak_pressures(contact: Contact) -> Array:
@@ -56,8 +55,8 @@ def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
     """
     touching = np.flatnonzero(contact.loads)
     centres = contact.scene.contact_points[touching]
-    radii: Number = contact.contact_radii[touching]
-    relative_radii: Number = contact.scene.relative_radii[touching]
+    radii = contact.contact_radii[touching]
+    relative_radii = contact.scene.relative_radii[touching]
 
     def each(x: Array, y: Array) -> Array:
         displacements: Array = hertz.surface_displacement(np.hypot(x, y), radii, relative_radii)
@@ -118,15 +117,10 @@ class _Sheared:
         contact = state.contact
         friction = checks.friction(contact.scene.friction)
         touching = np.flatnonzero(contact.loads)
-        forces = state.forces[touching]
         self.centres = contact.scene.contact_points[touching]
         self.radii = contact.contact_radii[touching]
         self.peaks = friction * peak_pressures(contact)[touching]
-        self.shares = np.where(
-            state.stick_radii[touching] > 0,
-            forces / (friction * contact.loads[touching]),
-            np.sign(forces),
-        )
+        self.shares = state.forces[touching] / (friction * contact.loads[touching])
 
 
 def cell_areas(points: Array) -> Array:

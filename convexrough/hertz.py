@@ -8,6 +8,7 @@ Source: Johnson, Contact Mechanics (1985), chapters 3 and 4.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import factorial
 from typing import Any
 
 import numpy as np
@@ -51,13 +52,23 @@ def pressure(distance: Number, contact_radius: Number, peak_pressure: Number) ->
 def surface_displacement(distance: Number, contact_radius: Number, radius: Number) -> Number:
     """Normal displacement of both surfaces at a distance r from the axis.
 
-    a^2/R - r^2/(2R) inside the contact and
-    (1/(pi R)) [(2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)] outside (Johnson, 3.42).
+    a^2/R - r^2/(2R) inside the contact and (1/(pi R)) [(2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)]
+    outside (Johnson, 3.42), which is r^2 (sin 2s / 2 - s cos 2s) / (pi R) with s = asin(a/r).
     """
     a, r = contact_radius, np.asarray(distance, dtype=np.float64)
     outer = np.maximum(r, a)
-    outside = (2 * a**2 - outer**2) * np.arcsin(a / outer) + a * np.sqrt((outer - a) * (outer + a))
+    s = np.arcsin(a / outer)
+    outside = outer**2 * (2.0 * s * np.sin(s) ** 2 - less_sine(2.0 * s) / 2.0)  # no cancellation
     return np.where(r < a, a**2 / radius - r**2 / (2 * radius), outside / (np.pi * radius))
+
+
+def less_sine(angle: Number) -> Number:
+    """x - sin(x), by its series for small x."""
+    small = np.square(np.minimum(angle, 1.0))
+    series = np.zeros_like(small)
+    for m in range(19, 1, -2):
+        series = 1.0 / factorial(m) - small * series
+    return np.where(angle < 1.0, series * angle**3, angle - np.sin(angle))
 
 
 # The tangential law of one sphere (Cattaneo-Mindlin) at constant normal load P. With t = Q / (f P)

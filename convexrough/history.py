@@ -21,7 +21,6 @@ from convexrough import checks
 from convexrough.checks import Array, frozen
 from convexrough.contact import Contact
 from convexrough.family import Family
-from convexrough.shear import check_force
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +48,15 @@ class _Step(NamedTuple):
     """How one step is looked up: state = base + scale * family(total)."""
 
     base: int  # the step at the turning point, -1 for the virgin state
-    scale: float  # +-2 on a branch, +-1 on first loading
+    scale: float  # +-2 on a branch, +-1 on first loading, 0 if nothing moves
     total: float  # T
     lost: list[tuple[float, float]]  # (factor, T): the step costs sum factor * w(T)
 
 
 def history(contact: Contact, *, forces: ArrayLike) -> History:
     """Any sequence of shear forces (m,) [force], |Q| <= f P, from the freshly pressed contact."""
-    applied = checks.array("forces", forces)
-    for i, force in enumerate(applied):
-        check_force(contact, f"forces[{i}]", force)
+    limit = checks.friction(contact.scene.friction) * contact.load
+    applied = checks.bearable("forces", checks.array("forces", forces), limit)
     if contact.load == 0.0 or len(applied) == 0:
         none = frozen(np.zeros((len(applied), len(contact.scene))))
         zero = frozen(np.zeros(len(applied)))
@@ -107,9 +105,12 @@ def _remember(applied: Array) -> list[_Step]:
     steps: list[_Step] = []
     now = 0.0
     for m, target in enumerate(applied):
+        if target == now:
+            steps.append(_Step(m - 1, 0.0, 0.0, []))  # the same state once more
+            continue
         origin, direction = now, np.sign(target - now)
         heading = np.sign(now - stack[-1][0]) if stack else np.sign(now)
-        if direction != 0 and heading == -direction:
+        if heading == -direction:
             stack.append((now, m - 1))  # a new turning point
         lost: list[tuple[float, float]] = []
         while stack:
@@ -118,7 +119,7 @@ def _remember(applied: Array) -> list[_Step]:
             close = stack[-2][0] if len(stack) > 1 else -turn
             end = min(target * direction, close * direction) * direction
             lost += [(0.5, abs(end - turn) / 2), (-0.5, abs(origin - turn) / 2)]
-            if direction == 0 or target * direction < close * direction:
+            if target * direction < close * direction:
                 break
             origin = close
             del stack[-2:]

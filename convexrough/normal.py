@@ -100,7 +100,7 @@ class NormalProblem:
         prescribed = ceiling + scene.offsets + errors + 6 * ROUNDOFF * abs(ceiling)
         candidates = np.flatnonzero(prescribed > 0)
         n = len(candidates)
-        checks.fits_in_memory("asperities that could touch", n, 5 * 8 * n)
+        fits_densely(n)
         top = float(prescribed[candidates].max(initial=0.0)) or 1.0
         units = Units.of(top, float(np.median(coefficients)))
 
@@ -186,6 +186,11 @@ class NormalProblem:
         return full
 
 
+def fits_densely(count: int) -> None:
+    """Refuse what the matrix of all pairs, and the copies that a solution needs, cannot hold."""
+    checks.fits_in_memory("asperities that could touch", count, 5 * 8 * count)
+
+
 def shift_to_load(indentation: Array, coefficients: Array, load: float) -> float:
     """The shift tau for which  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
 
@@ -248,6 +253,7 @@ def highest_approach(scene: Scene, load: float) -> float:
     indentation = scene.offsets - sunk
     weights = hertz.load(indentation + shift_to_load(indentation, coefficients, load), coefficients)
     touching = np.flatnonzero(weights)
+    fits_densely(len(touching))
     points = scene.contact_points
     sources = DenseInfluence(points[touching], 1.0 / (np.pi * modulus), np.empty((0, 0)), 0.0)
     displacement = np.empty(len(scene))

@@ -297,7 +297,7 @@ def _points(positions: ArrayLike) -> Array:
     if points.ndim != 2 or points.shape[1] != 2:
         found = f"shape {points.shape}"
         raise InputError("positions", found=found, expected="shape (n, 2): x and y of each")
-    if not (good := np.isfinite(points).all(axis=1)).all():
+    if not (good := (np.abs(points) <= checks.LARGEST).all(axis=1)).all():
         first = int(np.argmin(good))
         found = str(points[first])
         raise InputError(f"positions[{first}]", found=found, expected="finite numbers")

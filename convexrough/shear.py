@@ -18,7 +18,6 @@ from convexrough import checks, hertz
 from convexrough.certificate import Scope
 from convexrough.checks import Array, frozen
 from convexrough.contact import Contact
-from convexrough.errors import InputError
 from convexrough.shear_certificate import judge_states
 from convexrough.tangential import TangentialProblem
 
@@ -79,7 +78,8 @@ def shear(contact: Contact, *, force: float) -> ShearState:
     SolverError where Newton's method stops without an answer.
     """
     scene = contact.scene
-    friction, force = coefficient(contact), check_force(contact, "force", force)
+    friction = checks.friction(scene.friction)
+    force = float(checks.bearable("force", force, friction * contact.load))
     sign = float(np.sign(force))
     if contact.load == 0.0:
         return _nothing_loaded(contact)
@@ -132,6 +132,7 @@ def onset_of_sliding(contact: Contact) -> Array:
     """
     from scipy.optimize.elementwise import find_root  # 0.1 s to import: only when asked
 
+    friction = checks.friction(contact.scene.friction)
     onsets = np.full(len(contact.scene), np.nan)
     if contact.load == 0.0:
         return frozen(onsets)
@@ -152,7 +153,7 @@ def onset_of_sliding(contact: Contact) -> Array:
         args=(np.arange(n),),
         tolerances={"xrtol": 1e-15, "xatol": 0.0, "frtol": 0.0, "fatol": 0.0},
     )
-    onsets[problem.touching] = found.x * coefficient(contact) * problem.units.force
+    onsets[problem.touching] = found.x * friction * problem.units.force
     return frozen(onsets)
 
 
@@ -160,26 +161,3 @@ def _nothing_loaded(contact: Contact) -> ShearState:
     zero = frozen(np.zeros(len(contact.scene)))
     certificate = ShearCertificate(contact.certificate.scope, contact.status, zero, zero, 0.0)
     return ShearState(contact, 0.0, 0.0, zero, zero, zero, zero, certificate)
-
-
-def coefficient(contact: Contact) -> float:
-    """Coulomb's coefficient of the scene; InputError if it has none."""
-    friction = contact.scene.friction
-    if friction is None:
-        expected = "a coefficient of friction, as shear needs one"
-        raise InputError("friction", found="none", expected=expected)
-    return friction
-
-
-def check_force(contact: Contact, name: str, force: float) -> float:
-    """A shear force [force] that friction can bear, |Q| <= f P; else InputError."""
-    limit = coefficient(contact) * contact.load
-    force = checks.finite(name, force)
-    if abs(force) > limit * (1 + 1e-15):
-        over = f", {abs(force) / limit - 1:.3g} beyond it" if limit > 0 else ""
-        raise InputError(
-            name,
-            found=f"{force:.17g}: gross sliding{over}",
-            expected=f"at most f P = {limit:.17g} in size",
-        )
-    return force

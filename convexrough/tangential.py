@@ -133,7 +133,7 @@ class TangentialProblem:
         return limited
 
     def _starts(self, totals: Array) -> Array:
-        """(m, n) deflections to start from: elastic shares, or interpolated where m is large."""
+        """(m, n) deflections to start from: elastic, or interpolated where m is large."""
         share = np.minimum(totals[:, None] * self.elastic, self.loads)
         starts = self.deflections(share)
         if len(totals) < 4 * FAMILY:
@@ -142,7 +142,12 @@ class TangentialProblem:
         known = self.solve(coarse).deflections
         cell = np.minimum(np.searchsorted(coarse, totals, side="right"), FAMILY - 1) - 1
         part: Array = ((totals - coarse[cell]) / coarse[1])[:, None]
-        return np.asarray(known[cell] * (1 - part) + known[cell + 1] * part)
+        between = known[cell] * (1 - part) + known[cell + 1] * part
+        return np.where(self.elastically(totals)[:, None], starts, between)
+
+    def elastically(self, totals: Array) -> NDArray[np.bool_]:
+        """Where T is so small that the elastic state, off by about T / sum P, is exact."""
+        return np.asarray(totals <= 1e-20 * self.loads.sum())
 
     def at_limit(self, totals: Array) -> NDArray[np.bool_]:
         """Where T is sum P to rounding: every asperity slides, the last one just."""
@@ -152,7 +157,7 @@ class TangentialProblem:
     def _solve(self, totals: Array, starts: Array) -> States:
         iterate = self._evaluate(starts, totals)
         limit = self.at_limit(totals)
-        active = np.flatnonzero((totals > 0) & ~limit)
+        active = np.flatnonzero(~self.elastically(totals) & ~limit)
         for _ in range(100):
             if len(active) == 0:
                 break

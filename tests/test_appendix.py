@@ -100,7 +100,7 @@ def test_a_cycle_costs_by_its_range() -> None:
     whole = appendix.cycle_energy(contact, 0.6 * Q)
     assert appendix.cycle_energy(contact, Q, -0.2 * Q) == pytest.approx(whole, rel=1e-12)
     assert appendix.cycle_energy(contact, Q, Q) == 0.0
-    with pytest.raises(cr.InputError, match=r"minimum.*at most the maximum"):
+    with pytest.raises(cr.InputError, match=r"maximum.*at least the minimum"):
         appendix.cycle_energy(contact, -Q, Q)
     with pytest.raises(cr.InputError, match=r"maximum.*gross sliding"):
         appendix.cycle_energy(contact, 1.2 * Q)

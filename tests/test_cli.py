@@ -1,5 +1,6 @@
 """The command line as its users meet it: output, files, exit status."""
 
+import csv
 import json
 import os
 import re
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from test_io import scene_text, write_loads
+from test_io import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
 from convexrough import cli
@@ -123,7 +124,23 @@ def test_paper(command: Any, tmp_path: Path) -> None:
     again = command("paper", "--force", "--no-figures")
     assert again.status == 0
     assert re.search(r"^asperities in contact +37 +37$", again.out, re.M)
-    assert (tmp_path / "paper-results" / "summary.json").exists()
+    folder = tmp_path / "paper-results"
+    assert {path.stem for path in folder.glob("fig*.csv")} == {
+        *("fig3_pressure", "fig4_rings", "fig5_centre", "fig6_traction", "fig7_asperities"),
+        *("fig8_loops", "fig9_loss"),
+    }
+    assert (folder / "summary.json").exists()
+    assert paper["sliding_at_half"] == {"paper": 6, "computed": 6}
+    assert paper["sliding_ring_at_half"]["computed"] == "A"
+    assert paper["first_slide"]["computed"] == pytest.approx(0.352, abs=5e-4)
+    assert paper["crossover"]["paper"] == 0.37
+    assert paper["crossover"]["computed"] == pytest.approx(0.388, abs=5e-4)
+    loss = [
+        (float(row["fraction"]), float(row["loss"]) - float(row["smooth_loss"]))
+        for row in rows(folder / "fig9_loss.csv")
+    ]
+    crossing = paper["crossover"]["computed"]
+    assert all((difference > 0) == (fraction > crossing) for fraction, difference in loss)
 
 
 def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
@@ -212,13 +229,80 @@ def test_verify_finds_loads_in_the_wrong_rows(command: Any, tmp_path: Path) -> N
     assert "undecided" in outcome.err
 
 
-def test_later_tables_are_checked_and_not_computed(command: Any, tmp_path: Path) -> None:
-    more = "[friction]\ncoefficient = 0.5\n[shear]\nfractions = [0.5]"
-    (tmp_path / "a.toml").write_text(scene_text(more=more))
+SHEAR = """
+[friction]
+coefficient = 0.5
+[shear]
+fractions = [0.1, 0.37, 0.5]
+[cycle]
+maximum = [0.37, 0.5]
+minimum = [-0.37, 0.1]
+[history]
+fractions = [0.6, -0.2, 0.3, -0.6, 0.6]
+"""
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
+    """Every table of the scene is computed, and every file says what the package says."""
+    (tmp_path / "a.toml").write_text(scene_text(more=SHEAR))
     outcome = command("run", "a.toml", "--no-figures", "--json")
-    assert outcome.status == 0
-    assert outcome.err == "convexrough: warning: a.toml: [shear] is not computed by this version\n"
-    json.loads(outcome.out)
+    assert (outcome.status, outcome.err) == (0, "")
+    summary = json.loads(outcome.out)
+    file = read_scene(tmp_path / "a.toml")
+    contact = cr.press(file.scene, approach=file.approach)
+    limit = 0.5 * contact.load
+    assert [row["sliding"] for row in summary["shear"]] == [0, 6, 6]
+    assert [row["partial_slip"] for row in summary["shear"]] == [37, 31, 31]
+    assert [row["undecided"] for row in summary["shear"]] == [0, 0, 0]
+
+    shear = rows(tmp_path / "a-results" / "shear.csv")
+    assert list(shear[0]) == [
+        *("fraction", "x", "y", "force", "stick_radius", "slip", "displacement", "status")
+    ]
+    assert len(shear) == 3 * len(file.scene)
+    half = cr.shear(contact, force=0.5 * limit)
+    last = [row for row in shear if float(row["fraction"]) == 0.5]
+    assert [float(row["force"]) for row in last] == list(half.forces)
+    assert [float(row["slip"]) for row in last] == list(half.slips)
+    assert [row["status"] for row in last] == list(half.status)
+    assert summary["shear"][2]["displacement"] == half.displacement
+
+    cycles = rows(tmp_path / "a-results" / "cycle.csv")
+    partial = cr.cycle(contact, maximum=0.5 * limit, minimum=0.1 * limit)
+    assert [float(row["minimum"]) for row in cycles] == [-0.37, 0.1]
+    assert float(cycles[1]["energy"]) == summary["cycle"][1]["energy"]
+    assert float(cycles[1]["energy"]) == pytest.approx(partial.energy, rel=1e-13)
+    assert all(float(row["balance_defect"]) < 1e-10 for row in cycles)
+    loop = rows(tmp_path / "a-results" / "loop.csv")
+    assert {row["curve"] for row in loop} == {"total", *map(str, (0, 1, 7, 13, 19, 31))}
+    total = [row for row in loop if row["curve"] == "total" and float(row["maximum"]) == 0.5]
+    area = np.trapezoid(
+        [float(row["force"]) for row in total], [float(row["displacement"]) for row in total]
+    )
+    assert area == pytest.approx(partial.energy, rel=1e-3)
+
+    past = cr.history(contact, forces=np.array(file.history) * limit)
+    assert summary["history"]["fraction"] == list(file.history)
+    assert summary["history"]["energy"] == past.energy.tolist()
+    assert len(rows(tmp_path / "a-results" / "history.csv")) == 5
+
+    text = command("run", "a.toml", "--no-figures", "--force").out
+    assert re.search(r"^ *0\.5 .* 6 +31 +0$", text, re.M)
+
+
+def test_shear_of_a_contact_without_proof(command: Any, tmp_path: Path) -> None:
+    dense = HEXAGONAL.replace("tip_radius = 0.02", "tip_radius = 5.0")
+    assert dense != HEXAGONAL
+    (tmp_path / "a.toml").write_text(scene_text(dense, more=SHEAR))
+    outcome = command("run", "a.toml", "--no-figures", "--json")
+    assert outcome.status == 3
+    assert "rows in shear have undecided words" in outcome.err
+    assert all(row["undecided"] > 0 for row in json.loads(outcome.out)["shear"])
 
 
 def test_a_solver_that_fails(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

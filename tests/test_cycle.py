@@ -249,7 +249,7 @@ def test_bad_input() -> None:
     limit = limit_of(contact)
     with pytest.raises(cr.InputError, match=r"maximum\[0\].*gross sliding"):
         cr.cycle(contact, maximum=1.1 * limit)
-    with pytest.raises(cr.InputError, match=r"minimum\[0\].*at most the maximum"):
+    with pytest.raises(cr.InputError, match=r"maximum\[0\].*at least the minimum"):
         cr.cycle(contact, maximum=0.1 * limit, minimum=0.2 * limit)
     with pytest.raises(cr.InputError, match=r"forces\[1\].*gross sliding"):
         cr.history(contact, forces=[0.0, -2 * limit])

@@ -53,7 +53,7 @@ def test_displacement_inside_follows_the_sphere() -> None:
 
 
 def test_far_away_a_load_is_a_point_force() -> None:
-    r = 100 * A
-    point = LOAD / (np.pi * MODULUS * r)
-    spread = 1 + A**2 / (10 * r**2)
-    assert hertz.surface_displacement(r, A, RADIUS) == pytest.approx(point * spread, rel=1e-7)
+    for r in (100 * A, 1e4 * A, 1e7 * A):
+        point = LOAD / (np.pi * MODULUS * r)
+        spread = 1 + A**2 / (10 * r**2) + 3 * A**4 / (280 * r**4) * 2
+        assert hertz.surface_displacement(r, A, RADIUS) == pytest.approx(point * spread, rel=2e-10)

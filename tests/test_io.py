@@ -10,9 +10,10 @@ import pytest
 import convexrough as cr
 from convexrough import results
 from convexrough.io import ASPERITY_COLUMNS, read_loads, read_summits, read_table
-from convexrough.report import Summary, contact_summary, to_json
+from convexrough.report import Summary, summarise, to_json
 from convexrough.results import beside, claim_folder, write_results
 from convexrough.scene_file import UnitNames, read_scene
+from convexrough.stages import Outcome
 
 HEXAGONAL = """
 pattern = "hexagonal"
@@ -152,39 +153,47 @@ def test_a_wrong_key(tmp_path: Path, asperities: str, expected: str) -> None:
         ("approach = 1\nload = 1", "", "[normal] approach, load: found both, expected exactly"),
         ("load = 0", "", "[normal] load: found 0, expected a positive number"),
         ("approach = nan", "", "[normal] approach: found nan, expected a finite number"),
-        ("load = 1", "[frictoin]", '[frictoin]: unknown table, did you mean "friction"?'),
+        ("approach = 1e-5", "[frictoin]", '[frictoin]: unknown table, did you mean "friction"?'),
         (
-            "load = 1",
+            "approach = 1e-5",
             "[shear]\nfractions = [0.1]",
             "[friction]: missing table, needed with [shear]",
         ),
         (
-            "load = 1",
+            "approach = 1e-5",
             "[friction]\ncoefficient = 1\n[shear]\nfractions = [0.1, -0.1]",
             "[shear] fractions[1]: found -0.1, expected a number from 0 to 1",
         ),
         (
-            "load = 1",
+            "approach = 1e-5",
             "[friction]\ncoefficient = 1\n[shear]\nfractions = []",
             "[shear] fractions: found [], expected a list of numbers from 0 to 1",
         ),
         (
-            "load = 1",
+            "approach = 1e-5",
             "[friction]\ncoefficient = 1\n[history]\nfractions = [1.1]",
             "[history] fractions[0]: found 1.1, expected a number from -1 to 1",
         ),
         (
-            "load = 1",
+            "approach = 1e-5",
             "[friction]\ncoefficient = 1\n[cycle]\nmaximum = [0.1, 0.2]\nminimum = [0]",
             "[cycle] minimum: found 1 values, expected 2, as in maximum",
         ),
         (
-            "load = 1",
+            "approach = 1e-5",
             "[friction]\ncoefficient = 1\n[cycle]\nmaximum = [0.1]\nminimum = [0.1]",
             "[cycle] maximum[0]: found 0.1, expected a number above its minimum, 0.1",
         ),
-        ("load = 1", "[solver]\nname = 'newtn'", "[solver] name: found 'newtn', expected one of"),
-        ("load = 1", "[units]\nlength = 1", "[units] length: found 1, expected text in quotes"),
+        (
+            "approach = 1e-5",
+            "[solver]\nname = 'newtn'",
+            "[solver] name: found 'newtn', expected one of",
+        ),
+        (
+            "approach = 1e-5",
+            "[units]\nlength = 1",
+            "[units] length: found 1, expected text in quotes",
+        ),
     ],
 )
 def test_a_wrong_table(tmp_path: Path, normal: str, more: str, expected: str) -> None:
@@ -412,8 +421,10 @@ def test_wrong_loads(tmp_path: Path, content: str, expected: str) -> None:
 
 
 def written(folder: Path, contact: cr.Contact, *, figures: bool = False) -> list[str]:
-    summary = contact_summary(contact)
-    paths = write_results(folder, contact, summary, figures=figures, units=UnitNames("m", "N"))
+    outcome = Outcome(contact)
+    paths = write_results(
+        folder, outcome, summarise(outcome), figures=figures, units=UnitNames("m", "N")
+    )
     assert all(path.stat().st_size > 0 for path in paths)
     assert {path.name for path in paths} == {path.name for path in folder.iterdir()}
     return [path.name for path in paths]

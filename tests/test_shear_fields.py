@@ -175,6 +175,18 @@ def test_friction_bears_the_traction_and_slip_uses_it_up(fraction: float) -> Non
         assert stick.any() == (abs(fraction) < 1)
 
 
+@pytest.mark.parametrize("name", sorted(NAMED))
+def test_a_sliding_asperity_has_no_trace_of_a_stick_disc(name: str) -> None:
+    scene, approach = NAMED[name]
+    scene = cr.Scene(scene.sphere_radius, scene.asperities, scene.material, 0.35, scene.geometry)
+    contact = cr.press(scene, approach=approach)
+    state = cr.shear(contact, force=0.3 * contact.load)
+    sliding = (contact.loads > 0) & (state.stick_radii == 0)
+    assert np.count_nonzero(sliding) > 6
+    middle = fields.traction(state, scene.contact_points[sliding])
+    assert_allclose(middle, 0.35 * fields.peak_pressures(contact)[sliding], rtol=1e-14)
+
+
 @pytest.mark.parametrize("fraction", [0.37, 0.8])
 def test_traction_is_the_contact_disc_less_the_stick_disc(fraction: float) -> None:
     state = sheared("paper", fraction)

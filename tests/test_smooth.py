@@ -198,7 +198,6 @@ def test_gross_sliding_is_refused() -> None:
     hertz = sphere()
     limit = hertz.largest_force
     for law in (hertz.displacement, hertz.stick_radius, hertz.energy, lambda Q: hertz.branch(0, Q)):
-        law(limit * (1 + 1e-16))
         with pytest.raises(cr.InputError, match=r"gross sliding, 0\.01 beyond it.*at most f P"):
             law(1.01 * limit)
     with pytest.raises(cr.InputError, match=r"force\[1\].*gross sliding"):
@@ -207,11 +206,22 @@ def test_gross_sliding_is_refused() -> None:
         hertz.energy(0.0, -2 * limit)
 
 
+def test_the_limit_to_rounding_is_the_limit() -> None:
+    hertz = sphere()
+    limit = hertz.largest_force
+    beyond = np.nextafter(limit, np.inf)
+    assert hertz.stick_radius(beyond) == 0.0
+    for law in (hertz.displacement, hertz.energy, lambda Q: hertz.branch(0, Q)):
+        assert law(beyond) == pytest.approx(law(limit), rel=1e-14)
+
+
 def test_bad_input() -> None:
     hertz = sphere()
     Q = hertz.largest_force / 2
-    with pytest.raises(cr.InputError, match=r"minimum.*at most the maximum"):
+    with pytest.raises(cr.InputError, match=r"maximum: found 0.*at least the minimum"):
         hertz.energy(0.0, Q)
+    with pytest.raises(cr.InputError, match=r"maximum.*at least the minimum"):
+        hertz.energy([Q, -Q])
     with pytest.raises(cr.InputError, match=r"force: found.*at most the turning force"):
         hertz.branch([0.0, 1.1 * Q], Q)
     with pytest.raises(cr.InputError, match=r"force: found nan"):

@@ -1,0 +1,249 @@
+"""The command line. Nothing is computed here; every command imports what it needs when it runs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from convexrough import __version__
+from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
+
+if TYPE_CHECKING:
+    from convexrough.report import Summary
+    from convexrough.scene_file import UnitNames
+    from convexrough.stages import Outcome
+
+DONE, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+
+NEW_SCENE = """\
+# A rough sphere pressed on a half-space. Any consistent units; convexrough run THIS-FILE
+
+[sphere]
+radius = 1.0
+
+[material]
+contact_modulus = 1.0        # E* = E / (2 (1 - nu^2)); or youngs_modulus = ... (one of the two)
+poisson_ratio = 0.3
+
+[asperities]
+pattern = "hexagonal"        # "hexagonal", "square", or "file"
+spacing = 0.0025
+tip_radius = 0.02            # a number; or a list as long as the asperities
+# within = 0.0102            # keep asperities this near to the axis; default: all that could touch
+# height_std = 1e-6          # random heights (normal distribution) ...
+# tip_radius_cv = 0.1        # ... and tip radii (lognormal, this coefficient of variation)
+# seed = 7                   # required when either is given
+geometry = "summit"          # or "closest": touch where the undeformed surfaces are closest
+
+# Asperities from a file instead, with columns x, y and optionally height, tip_radius:
+# pattern = "file"
+# path = "summits.csv"       # relative to this file
+
+[normal]
+approach = 5e-5              # or load = ... (one of the two)
+
+# [units]                    # names for printed results and figures; nothing is converted
+# length = "m"
+# force = "N"
+
+[friction]                   # the three tables below need it; leave out what you do not want
+coefficient = 0.5
+
+[shear]                      # monotonic shear
+fractions = [0.1, 0.37, 0.5]             # of f P
+
+[cycle]                      # steady cycles
+maximum = [0.1, 0.37, 0.5]               # of f P
+# minimum = [0.0, 0.1, 0.2]              # default: the negative of maximum
+
+[history]                    # any sequence of shear forces, from 0
+fractions = [0.6, -0.2, 0.3, -0.6, 0.6]  # of f P
+
+# [solver]
+# name = "newton"
+"""
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+_PATH = click.Path(path_type=Path)
+_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object, no text.")
+
+
+def _output(command: Command) -> Command:
+    """The options of every command that writes a folder of results."""
+    for option in (
+        _json,
+        click.option("--force", is_flag=True, help="Replace results in a folder in use."),
+        click.option("--no-figures", is_flag=True, help="Write no PNG and SVG."),
+        click.option("--out", metavar="DIR", type=_PATH, help="Folder for results."),
+    ):
+        command = option(command)
+    return command
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="convexrough")
+def program() -> None:
+    """Rough frictional contact, with a proof of which asperities touch.
+
+    Exit status: 0 done and certified; 2 wrong input; 3 done, not certified; 4 a solver failed.
+    """
+
+
+@program.command()
+@click.argument("scene", type=_PATH)
+@_output
+def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int:
+    """Press and shear the scene of a TOML file; write tables, certificate and figures.
+
+    Results go to the folder SCENE-results unless --out names another.
+    """
+    from convexrough.contact import press
+    from convexrough.results import claim_folder
+    from convexrough.scene_file import read_scene
+    from convexrough.stages import compute
+
+    file = read_scene(scene)
+    folder = out or Path(f"{scene.stem}-results")
+    claim_folder(folder, force=force)
+    with _blamed_on(scene), _progress(f"pressing on {len(file.scene)} asperities"):
+        contact = press(file.scene, approach=file.approach, load=file.load, solver=file.solver)
+    with _blamed_on(scene), _progress("shearing"):
+        outcome = compute(
+            contact, shear_at=file.shear, cycle_between=file.cycle, history_of=file.history
+        )
+    return _finish(folder, outcome, file.units, not no_figures, as_json)
+
+
+@program.command()
+@click.argument("scene", type=_PATH)
+@click.argument("loads", type=_PATH)
+@_json
+def verify(scene: Path, loads: Path, as_json: bool) -> int:
+    """Certify loads that came from anywhere.
+
+    LOADS is a CSV file with a column load, and x and y unless in the scene's order.
+    """
+    from convexrough.certificate import certify
+    from convexrough.io import read_loads
+    from convexrough.report import certificate_summary
+    from convexrough.scene_file import read_scene
+
+    file = read_scene(scene)
+    values = read_loads(loads, file.scene)
+    with _blamed_on(loads), _progress(f"judging the loads of {len(values)} asperities"):
+        certificate = certify(file.scene, values, approach=file.approach, load=file.load)
+    summary = certificate_summary(certificate, values)
+    return _say(summary, as_json, units=file.units)
+
+
+@program.command()
+@click.argument("scene", type=_PATH)
+def new(scene: Path) -> int:
+    """Write a commented scene to start from."""
+    try:
+        with scene.open("x", encoding="utf-8") as file:
+            file.write(NEW_SCENE)
+    except OSError as error:
+        raise FileError(f"{scene}: cannot be written: {error.strerror or error}") from error
+    click.echo(f"written  {scene}")
+    return DONE
+
+
+@program.command()
+@_output
+def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int:
+    """Reproduce the source paper's example (Dini and Hills 2009)."""
+    from convexrough import paper as example
+    from convexrough import report, results
+
+    folder = out or Path("paper-results")
+    results.claim_folder(folder, force=force)
+    with _progress("reproducing the paper"):
+        outcome = example.outcome()
+        comparison = example.compare(outcome)
+        summary = report.summarise(outcome) | {"paper": comparison}
+        files = results.write_tables(folder, example.figure_data(outcome.contact))
+        if not no_figures:
+            from convexrough.plots import paper_figures
+
+            files += results.write_figures(folder, paper_figures(outcome.contact))
+        files += results.write_results(folder, outcome, summary, figures=False)
+    lines = ["", *example.table(comparison), *_written(folder, files)]
+    return _say(summary, as_json, lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status; errors are a message, never a traceback."""
+    try:
+        return int(program.main(arguments, prog_name="convexrough", standalone_mode=False) or DONE)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        return INTERRUPTED
+    except ConvexroughError as error:
+        for line in str(error).splitlines():
+            _say_aside("error", line)
+        return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
+
+
+def _finish(folder: Path, outcome: Outcome, units: UnitNames, figures: bool, as_json: bool) -> int:
+    """Write and say the results of a run."""
+    from convexrough.report import summarise
+    from convexrough.results import write_results
+
+    summary = summarise(outcome)
+    with _progress("writing results"):
+        files = write_results(folder, outcome, summary, figures=figures, units=units)
+    return _say(summary, as_json, _written(folder, files), units)
+
+
+def _written(folder: Path, files: Sequence[Path]) -> list[str]:
+    return ["", f"written to {folder}: {', '.join(path.name for path in files)}"]
+
+
+def _say(
+    summary: Summary, as_json: bool, lines: Sequence[str] = (), units: UnitNames | None = None
+) -> int:
+    """Print the summary, then `lines`, and return the exit status that it deserves."""
+    from convexrough.report import describe, proved, to_json, warnings
+
+    if as_json:
+        click.echo(to_json(summary))
+    else:
+        length, force = units or ("", "")
+        described = describe(summary, length_unit=length, force_unit=force)
+        click.echo("\n".join([*described, *lines]))
+    for warning in warnings(summary):
+        _say_aside("warning", warning)
+    return DONE if proved(summary) else NOT_CERTIFIED
+
+
+def _say_aside(kind: str, message: str) -> None:
+    click.echo(f"convexrough: {kind}: {message}", err=True)
+
+
+@contextmanager
+def _blamed_on(path: Path) -> Iterator[None]:
+    """Mistakes that show only in computing, with the file named."""
+    try:
+        yield
+    except InputError as error:
+        raise error.within(str(path)) from error
+
+
+@contextmanager
+def _progress(message: str) -> Iterator[None]:
+    """A moving line on standard error while the body runs, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(message):
+        yield

@@ -1,0 +1,14 @@
+"""Figures of every stage, fit to print. Nothing is computed here that another room computes.
+
+Each function returns figures by the stem of the file each belongs in; units are only said, never
+converted. No global state of matplotlib is touched: save a figure, or show it in a notebook. Discs
+of dense scenes are pixels inside a vector file: save that with a `dpi` too.
+"""
+
+from convexrough.plots.cycle import cycle_figures
+from convexrough.plots.history import history_figures
+from convexrough.plots.paper import paper_figures
+from convexrough.plots.press import press_figures
+from convexrough.plots.shear import shear_figures
+
+__all__ = ["cycle_figures", "history_figures", "paper_figures", "press_figures", "shear_figures"]

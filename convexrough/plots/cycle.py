@@ -1,0 +1,257 @@
+"""Steady cycles and histories: hysteresis loops, and the energy they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
+
+from convexrough import hertz
+from convexrough.checks import Array
+from convexrough.contact import Contact
+from convexrough.cycle import Cycle, Loop
+from convexrough.history import history
+from convexrough.plots.style import (
+    DASHED,
+    DOUBLE,
+    FAINT,
+    ROUGH,
+    SMOOTH,
+    TICK,
+    ShearScale,
+    label,
+    no_contact_figure,
+    rings,
+    round_ticks,
+    spread,
+)
+from convexrough.smooth import SmoothSphere
+
+MOST_LOOPS, MOST_ASPERITIES = 4, 6
+POINTS = 400  # of a loop
+#: Styles of the chosen asperities, outwards: told apart by more than the colour.
+DASHES: list[Any] = ["-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2, 2, 2)), "-"]
+
+
+def cycle_figures(
+    cycles: Sequence[Cycle],
+    *,
+    asperities: Sequence[int] | None = None,
+    length_unit: str = "",
+    force_unit: str = "",
+) -> dict[str, Figure]:
+    """The figures of steady cycles of one contact.
+
+    asperities : whose loops to show; default: one at each distance from the axis, at most 6
+
+    "hysteresis" : the loops of at most 4 of the cycles, with the smooth sphere's; and of chosen
+        asperities in the cycle of the widest range
+    "loss" : where there are cycles of several ranges, energy against amplitude
+    """
+    if not cycles:
+        return {}
+    contact = cycles[0].contact
+    several = len(np.unique([each.maximum - each.minimum for each in cycles])) > 1
+    if not contact.loads.any():
+        figures = {"hysteresis": no_contact_figure(("$X$", "$Q$"), ("$X_i$ + slip", "$Q_i$"))}
+        if several:
+            figures["loss"] = no_contact_figure(("amplitude of $Q$", "$W$"))
+        return figures
+    scale = ShearScale.of(contact, length_unit, force_unit)
+    by_range = sorted(cycles, key=lambda each: each.maximum - each.minimum)
+    chosen = one_of_each_ring(contact) if asperities is None else list(asperities)
+    distances = np.hypot(*contact.scene.contact_points.T) / scale.sphere.contact_radius
+    names = [f"{distance:.2f}" for distance in distances[chosen]]
+    shown = spread(by_range, MOST_LOOPS)
+    figures = {"hysteresis": loops_figure(shown, chosen, names, "$r\\,/\\,a_H$", scale)}
+    if several:
+        figures["loss"] = _loss_figure(by_range, scale)
+    return figures
+
+
+def loops_figure(
+    cycles: Sequence[Cycle],
+    asperities: Sequence[int],
+    names: Sequence[str],
+    meaning: str,
+    scale: ShearScale,
+) -> Figure:
+    """Loops of the contact, the same sheared upright, and of single asperities in the last cycle.
+
+    names, meaning : entries and title of the legend of the asperities
+    """
+    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
+    whole, upright, single = figure.subplots(1, 3, width_ratios=[1, 1, 1.1])
+    for cycle in cycles:
+        loop = drawn_loop(cycle)
+        x = smooth_loop(scale.sphere, loop.forces)
+        for axes, elastic in ((whole, 0.0), (upright, 2.0 / 3.0)):
+            across, up = loop.displacements / scale.displacement, loop.forces / scale.force
+            look: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "label": "asperities"}
+            axes.plot(across - elastic * up, up, **look)
+            look = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": "smooth sphere"}
+            axes.plot(x / scale.displacement - elastic * up, up, **look)
+    label(whole, "$X\\,/\\,X_0$", "$Q\\,/\\,(fP)$")
+    label(upright, r"$X\,/\,X_0 - \frac{2}{3}\,Q\,/\,(fP)$", "")
+    upright.sharey(whole)
+    upright.tick_params(labelleft=False)
+    whole.set_title("whole contact", fontsize=TICK, loc="left")
+    upright.set_title("less the smooth elastic part", fontsize=TICK, loc="left")
+    _draw_asperity_loops(single, loop, asperities, names, cycles[-1], scale)
+    single.set_title(f"asperities, {_between(cycles[-1], scale)}", fontsize=TICK, loc="left")
+    single.legend(
+        title=meaning,
+        loc="center left",
+        bbox_to_anchor=(1.0, 0.5),
+        fontsize=TICK,
+        title_fontsize=TICK,
+        frameon=False,
+        handlelength=2.4,
+        handletextpad=0.5,
+        borderpad=0.2,
+    )
+    for axes in (whole, upright, single):
+        axes.xaxis.set_major_locator(round_ticks(5))
+    _legend(figure, whole)
+    figure.supxlabel(f"{scale.footnote()},   $s_i$: gross slip", fontsize=TICK)
+    return figure
+
+
+def drawn_loop(cycle: Cycle) -> Loop:
+    """`cycle.loop`, but with its points close together at the ends, where X bends sharply."""
+    middle, half = (cycle.maximum + cycle.minimum) / 2, (cycle.maximum - cycle.minimum) / 2
+    down = np.clip(
+        middle + half * np.cos(np.linspace(0.0, np.pi, POINTS // 2 + 1)),
+        cycle.minimum,
+        cycle.maximum,
+    )
+    first = [cycle.minimum] if abs(cycle.minimum) > abs(cycle.maximum) else []
+    past = history(cycle.contact, forces=np.concatenate((first, down, down[-2::-1])))
+    body = slice(len(first), None)
+    return Loop(
+        forces=past.applied[body],
+        displacements=past.displacements[body],
+        asperity_forces=past.forces[body],
+        asperity_displacements=past.asperity_displacements[body],
+    )
+
+
+def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:
+    """X [length] of the smooth sphere at the forces of a steady loop, from a maximum and back.
+
+    From a turning point Q1, X = X1 + 2 X((Q - Q1) / 2) with X(Q) that of first loading; first
+    loading goes to the larger of the two forces.
+    """
+    turn = int(np.argmin(forces))
+    maximum, minimum = forces[0], forces[turn]
+    first = maximum if abs(maximum) >= abs(minimum) else minimum
+    start = sphere.displacement(first) + 2.0 * sphere.displacement((maximum - first) / 2.0)
+    there = start + 2.0 * sphere.displacement((forces[: turn + 1] - maximum) / 2.0)
+    back = there[-1] + 2.0 * sphere.displacement((forces[turn + 1 :] - minimum) / 2.0)
+    return np.append(there, back)
+
+
+def one_of_each_ring(contact: Contact) -> list[int]:
+    """An asperity at each distance from the axis, at most 6 of them."""
+    return [int(ring[0]) for ring in spread(rings(contact), MOST_ASPERITIES)]
+
+
+def _draw_asperity_loops(
+    axes: Axes,
+    loop: Loop,
+    asperities: Sequence[int],
+    names: Sequence[str],
+    cycle: Cycle,
+    scale: ShearScale,
+) -> None:
+    """Q_i / (f P_i) against (X_i + slip_i) / X0: an asperity that slides runs along +-1."""
+    limits = scale.force * cycle.contact.loads / cycle.contact.load
+    for order, (i, name) in enumerate(zip(asperities, names, strict=True)):
+        axes.plot(
+            loop.asperity_displacements[:, i] / scale.displacement,
+            loop.asperity_forces[:, i] / limits[i],
+            lw=1.1,
+            ls=DASHES[order % len(DASHES)],
+            color=ring_colour(order, len(asperities)),
+            label=name,
+        )
+    label(axes, "$(X_i + s_i)\\,/\\,X_0$", "$Q_i\\,/\\,(fP_i)$")
+    for limit in (-1.0, 1.0):
+        axes.axhline(limit, lw=0.5, color=FAINT, zorder=0.5)
+
+
+def ring_colour(order: int, count: int) -> Any:
+    """From dark at the axis to lighter outwards."""
+    return matplotlib.colormaps["viridis"](0.82 * order / max(1, count - 1))
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    """Above all panels, the first two lines of one."""
+    figure.legend(
+        handles=axes.lines[:2],
+        loc="outside upper left",
+        ncols=2,
+        fontsize=TICK,
+        frameon=False,
+        borderpad=0.2,
+    )
+
+
+def _between(cycle: Cycle, scale: ShearScale) -> str:
+    """The range of a cycle, in words."""
+    high, low = cycle.maximum / scale.force, cycle.minimum / scale.force
+    if high == -low:
+        return f"$Q/(fP)$ = ±{high:.4g}"
+    return f"$Q/(fP)$ = {low:.4g} to {high:.4g}".replace("-", "\u2212")
+
+
+def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
+    """Energy against amplitude; `cycles` by amplitude."""
+    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
+    loss, ratio = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
+    some = [each for each in cycles if each.maximum > each.minimum]
+    amplitude = np.array([(each.maximum - each.minimum) / 2.0 for each in some]) / scale.force
+    rough = np.array([each.energy_normalised for each in some])
+    smooth = np.array([each.smooth_normalised for each in some])
+    marks: dict[str, Any] = {
+        "color": ROUGH,
+        "lw": 1.2,
+        "ms": 4 if len(some) < 30 else 2.5,
+        "mew": 0,
+        "clip_on": False,
+    }
+    marks |= {"marker": "o", "ls": ""} if len(some) < 100 else {"ls": "-"}
+
+    t = np.geomspace(min(0.7 * amplitude[0], 0.3), 1.0, 300)
+    loss.plot(t, hertz.loss(t), ls=DASHED, lw=1.1, color=SMOOTH, label="smooth sphere")
+    loss.plot(amplitude, rough, label="asperities", **marks)
+    loss.set(xscale="log", yscale="log", xlim=(t[0], 1.0))
+    _few_ticks(loss)
+    label(loss, f"amplitude of $Q\\,/\\,(fP)$  ({scale.limit()})", scale.energy_label())
+    loss.legend(loc="upper left", fontsize=TICK, frameon=False)
+    loss.set_title("energy lost per cycle", fontsize=TICK, loc="left")
+
+    ratio.axhline(1.0, ls=DASHED, lw=1.1, color=SMOOTH)
+    ratio.plot(amplitude, rough / smooth, **marks)
+    ratio.set(xlim=(0.0, 1.0))
+    label(ratio, "amplitude of $Q\\,/\\,(fP)$", "$W\\,/\\,W_\\mathrm{smooth}$")
+    ratio.set_title("the same, over the smooth sphere's", fontsize=TICK, loc="left")
+    return figure
+
+
+def _few_ticks(axes: Axes) -> None:
+    """At most 6 labelled powers of ten, or where there are too few, 2 and 5 times them too."""
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        subs = (1.0, 2.0, 5.0) if high / low < 50 else (1.0,)
+        axis.set_major_locator(LogLocator(subs=subs, numticks=6))
+        if len(subs) == 1:
+            axis.set_major_formatter(LogFormatterSciNotation())
+        else:
+            axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())

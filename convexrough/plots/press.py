@@ -1,0 +1,233 @@
+"""Figures of a pressed contact: pressure and loads."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from convexrough import fields, hertz
+from convexrough.checks import Array
+from convexrough.contact import Contact
+from convexrough.plots.style import (
+    COLOURS,
+    CROWDED,
+    DOUBLE,
+    ROUGH,
+    SINGLE,
+    SMOOTH,
+    TICK,
+    UNSURE,
+    Scale,
+    abscissae,
+    census,
+    draw_circle,
+    draw_discs,
+    draw_open,
+    frame_map,
+    label,
+    legend_above,
+    literal,
+    map_edge,
+    round_ticks,
+    say_no_contact,
+    towards_rim,
+)
+
+
+def press_figures(
+    contact: Contact, *, length_unit: str = "", force_unit: str = ""
+) -> dict[str, Figure]:
+    """The figures of a pressed contact, by the stem of the file each belongs in.
+
+    "pressure" : map of the contact discs, and the profile along y = 0 with that of the smooth
+        sphere (Dini & Hills 2009, Fig. 3)
+    "loads"    : load of each touching asperity by its distance from the axis
+
+    Units are only said, never converted. Discs of dense scenes are pixels inside a vector file:
+    save that with a `dpi` too.
+    """
+    scale = Scale.of(contact, length_unit, force_unit)
+    loads = _loads_figure(contact, scale) if contact.loads.any() else _no_loads(scale)
+    return {"pressure": pressure_figure(contact, scale), "loads": loads}
+
+
+def pressure_figure(contact: Contact, scale: Scale) -> Figure:
+    """Map and profile of the pressure."""
+    if not contact.loads.any():
+        return _no_pressure(contact, scale)
+    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
+    chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
+    touching = contact.loads > 0
+    points = contact.scene.contact_points / scale.length
+    radii = contact.contact_radii[touching] / scale.length
+    peaks = fields.peak_pressures(contact) / scale.pressure
+    edge = map_edge(contact, scale)
+    top = max(1.0, float(peaks.max()))
+
+    colours = ScalarMappable(Normalize(0.0, top), COLOURS)
+    if len(radii) < CROWDED:
+        draw_open(chart, points[~touching & (np.abs(points).max(axis=1) < edge)])
+        _draw_peaks(chart, points[touching], radii, peaks[touching], colours)
+    else:
+        _draw_mosaic(chart, points, peaks, colours, edge)
+    draw_circle(chart, 1.0)
+    frame_map(chart, edge)
+    chart.set_anchor("E")
+    chart.set_title(census(contact), fontsize=TICK, loc="left")
+    label(chart, "$x\\,/\\,a_H$", "$y\\,/\\,a_H$")
+    bar = figure.colorbar(colours, ax=chart, aspect=28, pad=0.02)
+    bar.ax.tick_params(labelsize=TICK)
+    peak = "" if len(radii) < CROWDED else "peak "
+    bar.ax.set_title(peak + "$p\\,/\\,p_0$", fontsize=TICK)
+
+    _draw_profile(profile, contact, scale, edge)
+    profile.set(xlim=(-edge, edge), ylim=(0.0, 1.04 * top))
+    label(profile, scale.length_label("x"), scale.pressure_label())
+    profile.xaxis.set_major_locator(round_ticks())
+    return figure
+
+
+def _draw_peaks(
+    axes: Axes, centres: Array, radii: Array, peaks: Array, colours: ScalarMappable
+) -> None:
+    """Each pressure p0 sqrt(1 - s^2) as a stack of discs in equal steps of pressure.
+
+    centres : (n, 2) [a_H];  radii : (n,) [a_H];  peaks : (n,) [p0]
+    """
+    n = len(radii)
+    steps = int(np.clip(1000 // n, 8, 40))
+    for step in range(steps):
+        inner = radii * np.sqrt(1.0 - (step / steps) ** 2)  # where p = p0 step / steps
+        shades = colours.to_rgba(peaks * (step + 0.5) / steps)
+        word = "contact discs" if step == 0 else "_inner discs"
+        draw_discs(axes, centres, inner, word, facecolors=shades, linewidths=0)
+
+
+def _draw_mosaic(
+    axes: Axes, points: Array, peaks: Array, colours: ScalarMappable, edge: float
+) -> None:
+    """Each place in the colour of the nearest asperity's peak pressure; white where that is open.
+
+    points : (n, 2) [a_H];  peaks : (n,) [p0], 0 where open
+    """
+    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+
+    pixels = 500
+    x = edge * ((np.arange(pixels) + 0.5) / pixels * 2.0 - 1.0)
+    places = np.stack(np.meshgrid(x, x), axis=-1)
+    cell = 2.0 * edge / np.sqrt(np.count_nonzero(peaks))  # no asperity so near: outside them all
+    _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
+    shown = np.append(peaks, 0.0)[nearest]
+    image = colours.to_rgba(np.ma.masked_equal(shown, 0.0))
+    whole = (-edge, edge, -edge, edge)
+    axes.imshow(image, origin="lower", extent=whole, interpolation="nearest")
+
+
+def _draw_profile(axes: Axes, contact: Contact, scale: Scale, edge: float) -> None:
+    """Pressure along y = 0, of the asperities and of the smooth sphere, for |x| < edge [a_H]."""
+    x = abscissae(contact.scene.contact_points, contact.contact_radii, edge * scale.length)
+    rough = fields.pressure(contact, np.column_stack((x, np.zeros_like(x)))) / scale.pressure
+    fine = len(x) > 100 * len(towards_rim())  # so many discs that lines would leave no white
+    axes.fill_between(
+        x / scale.length,
+        rough,
+        facecolor=(ROUGH, 0.5 if fine else 0.2),
+        edgecolor="none" if fine else ROUGH,
+        lw=float(np.clip(3000 / len(x), 0.4, 0.9)),
+        rasterized=fine,
+        label="asperities, $y=0$",
+    )
+    s = towards_rim()
+    axes.plot(s, hertz.pressure(s, 1.0, 1.0), "--", lw=1.3, color=SMOOTH, label="smooth sphere")
+    legend_above(axes)
+
+
+def _loads_figure(contact: Contact, scale: Scale) -> Figure:
+    figure = Figure(figsize=(SINGLE, 2.6), layout="constrained")
+    axes = figure.subplots()
+    touching = contact.loads > 0
+    unsure = contact.status == "undecided"
+    if contact.certificate.scope == "none":  # every asperity is: show those with a load
+        unsure &= touching
+    distance = np.hypot(*contact.scene.contact_points.T) / scale.length
+    share = 100.0 * contact.loads / contact.load
+
+    _draw_smooth_share(axes, contact, scale)
+    n = int(touching.sum())
+    size = float(np.clip(40.0 / np.sqrt(n), 1.2, 4.0))
+    for word, chosen, marker, colour in (
+        ("touching", touching & ~unsure, "o", ROUGH),
+        ("undecided", unsure, "x", UNSURE),
+    ):
+        if chosen.any():
+            axes.plot(
+                distance[chosen],
+                share[chosen],
+                marker,
+                ms=size,
+                mew=0.0 if marker == "o" else 0.8,
+                color=colour,
+                label=word,
+                clip_on=False,
+                rasterized=n >= CROWDED,
+                zorder=3,
+            )
+    axes.set_xlim(0.0, 1.05 * max(1.0, float(distance[touching | unsure].max())))
+    axes.set_ylim(0.0, 1.06 * axes.dataLim.ymax)
+    axes.yaxis.get_offset_text().set_fontsize(TICK)
+    label(axes, scale.length_label("r"), "asperity load  [% of total]")
+    legend_above(axes, markerscale=4.0 / size)
+    return figure
+
+
+def _draw_smooth_share(axes: Axes, contact: Contact, scale: Scale) -> None:
+    """Percentage of the load that the smooth sphere's pressure lays on the cell of an asperity.
+
+    100 p(r) A / P, with p0 = 3 P / (2 pi a_H^2) and A the median cell of the touching asperities;
+    left out where fewer than seven of these have a whole cell.
+    """
+    points = contact.scene.contact_points
+    sample = np.argsort(np.hypot(*points.T))[:20_000]  # of very many, those nearest to the axis
+    areas = fields.cell_areas(points[sample])
+    whole = np.isfinite(areas) & (contact.loads[sample] > 0)
+    if whole.sum() < 7:
+        return
+    area = np.median(areas[whole])
+    s = towards_rim()
+    s = s[s >= 0.0]
+    share = 100.0 * hertz.pressure(s, 1.0, 1.5 / np.pi) * area / scale.length**2
+    label = "smooth $p(r)$ × cell area"
+    axes.plot(s, share, "--", lw=1.1, color=SMOOTH, label=label)
+
+
+def _no_pressure(contact: Contact, scale: Scale) -> Figure:
+    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
+    chart, profile = figure.subplots(1, 2)
+    chart.set_title(census(contact), fontsize=TICK, loc="left")
+    draw_open(chart, contact.scene.contact_points)
+    chart.set_aspect("equal", adjustable="datalim")
+    chart.locator_params(nbins=5)
+    x, y, p = (
+        f"${name}$" + (f"  [{literal(unit)}]" if unit else "")
+        for name, unit in (
+            ("x", scale.length_unit),
+            ("y", scale.length_unit),
+            ("p", scale.pressure_unit),
+        )
+    )
+    label(chart, x, y)
+    label(profile, x, p)
+    say_no_contact(profile)
+    return figure
+
+
+def _no_loads(scale: Scale) -> Figure:
+    figure = Figure(figsize=(SINGLE, 2.6), layout="constrained")
+    axes = figure.subplots()
+    unit = f"  [{literal(scale.length_unit)}]" if scale.length_unit else ""
+    label(axes, "$r$" + unit, "asperity load  [% of total]")
+    say_no_contact(axes)
+    return figure

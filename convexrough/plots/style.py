@@ -1,0 +1,251 @@
+"""The shared look of the figures: sizes, colours, scales, labels, and maps of contact discs.
+
+Lengths are in a_H and pressures in p0, contact radius and peak pressure of the smooth sphere under
+the same load. Shear forces are in f P, displacements in X0 and energies in W0 (`ShearScale`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
+
+from convexrough import hertz
+from convexrough.checks import Array, Indices
+from convexrough.contact import Contact
+from convexrough.smooth import SmoothSphere, smooth
+
+LABEL, TICK = 9, 8  # points
+SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal
+COLOURS = "viridis_r"  # darkens steadily towards the peak, so that it also reads in grey
+ROUGH, UNSURE = "#2b5c8a", "#c1440e"
+SMOOTH, FAINT = "0.15", "0.65"  # greys
+DASHED = (0, (4, 2.5))
+
+#: From these numbers of touching asperities on, the discs are pixels inside a vector file, and
+#: too small to be drawn.
+DENSE, CROWDED = 200, 3000
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What lengths and pressures are divided by, and how the labels say so."""
+
+    length: float  # a_H
+    pressure: float  # p0
+    length_unit: str
+    pressure_unit: str
+
+    @classmethod
+    def of(cls, contact: Contact, length_unit: str, force_unit: str) -> Scale:
+        modulus, radius = contact.scene.material.contact_modulus, contact.scene.sphere_radius
+        a_H = float(hertz.contact_radius(contact.load, modulus, radius))
+        p0 = float(hertz.peak_pressure(a_H, modulus, radius))
+        pressure_unit = f"{force_unit}/{length_unit}²" if force_unit and length_unit else ""
+        return cls(a_H, p0, length_unit, pressure_unit)
+
+    def length_label(self, name: str) -> str:
+        return f"${name}\\,/\\,a_H$  ($a_H$ = {quantity(self.length, self.length_unit)})"
+
+    def pressure_label(self) -> str:
+        return f"$p\\,/\\,p_0$  ($p_0$ = {quantity(self.pressure, self.pressure_unit)})"
+
+
+@dataclass(frozen=True)
+class ShearScale:
+    """What shear forces, displacements and energies are divided by, and how the labels say so.
+
+    sphere : the smooth sphere under the same load
+    X0 is its displacement at gross sliding, W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H).
+    """
+
+    sphere: SmoothSphere
+    length_unit: str
+    force_unit: str
+
+    @classmethod
+    def of(cls, contact: Contact, length_unit: str, force_unit: str) -> ShearScale:
+        return cls(smooth(contact.scene, load=contact.load), length_unit, force_unit)
+
+    @property
+    def force(self) -> float:
+        return self.sphere.largest_force
+
+    @property
+    def displacement(self) -> float:
+        return float(self.sphere.displacement(self.force))
+
+    @property
+    def energy(self) -> float:
+        return self.sphere.energy_scale
+
+    def limit(self) -> str:
+        """f P, in words for a label."""
+        return f"$fP$ = {quantity(self.force, self.force_unit)}"
+
+    def displacement_label(self) -> str:
+        return f"$X\\,/\\,X_0$  ($X_0$ = {quantity(self.displacement, self.length_unit)})"
+
+    def footnote(self) -> str:
+        """What the letters of short labels are."""
+        X0 = quantity(self.displacement, self.length_unit)
+        return f"{self.limit()},   $X_0$ = {X0}: the smooth sphere's $X$ at gross sliding"
+
+    def energy_label(self) -> str:
+        both = self.force_unit and self.length_unit
+        unit = f"{self.force_unit} {self.length_unit}" if both else ""
+        return f"$W\\,/\\,W_0$  ($W_0$ = {quantity(self.energy, unit)})"
+
+
+def rings(contact: Contact) -> list[Indices]:
+    """The touching asperities, in groups at the same distance from the axis; outwards."""
+    distances = np.hypot(*contact.scene.contact_points.T)
+    order = np.flatnonzero(contact.loads)
+    order = order[np.argsort(distances[order], kind="stable")]
+    ends = np.flatnonzero(np.diff(distances[order]) > 1e-6 * distances.max()) + 1
+    return np.split(order, ends)
+
+
+def spread(items: Sequence[Item], most: int) -> list[Item]:
+    """All the items, or of more than `most` so many evenly spread: the first and last are kept."""
+    places = np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int)
+    return [items[i] for i in places]
+
+
+def map_edge(contact: Contact, scale: Scale) -> float:
+    """Half the width of a map that holds every contact disc and the smooth sphere's [a_H]."""
+    touching = contact.loads > 0
+    reach = np.hypot(*contact.scene.contact_points[touching].T) + contact.contact_radii[touching]
+    return 1.06 * max(1.0, float(reach.max()) / scale.length)
+
+
+def frame_map(axes: Axes, edge: float) -> None:
+    """A square window round the axis of the sphere."""
+    axes.set(xlim=(-edge, edge), ylim=(-edge, edge), aspect="equal")
+    axes.xaxis.set_major_locator(round_ticks())
+    axes.yaxis.set_major_locator(round_ticks())
+    axes.tick_params(labelsize=TICK)
+
+
+def round_ticks(most: int = 6) -> MaxNLocator:
+    return MaxNLocator(most, steps=[1, 2, 5, 10])
+
+
+def draw_circle(axes: Axes, radius: float, style: Any = DASHED, colour: str = SMOOTH) -> None:
+    """A circle about the axis: what the smooth sphere would do."""
+    axes.add_patch(Circle((0, 0), radius, fill=False, ls=style, lw=0.9, ec=colour))
+
+
+def draw_open(axes: Axes, points: Array) -> None:
+    """Faint dots, smaller where they are many."""
+    size = float(np.clip(25.0 / np.sqrt(len(points) + 1), 0.4, 1.5))
+    pixels = len(points) >= CROWDED
+    axes.plot(*points.T, "o", ms=size, mew=0, color=FAINT, rasterized=pixels, label="open")
+
+
+def draw_discs(axes: Axes, centres: Array, radii: Array, label: str, **look: Any) -> None:
+    """Discs of true size.
+
+    centres : (n, 2) [a_H];  radii : (n,) [a_H]
+    """
+    discs = EllipseCollection(
+        2.0 * radii,
+        2.0 * radii,
+        np.zeros(len(radii)),
+        units="xy",
+        offsets=centres,
+        offset_transform=axes.transData,
+        rasterized=len(radii) >= DENSE,
+        label=label,
+        **look,
+    )
+    axes.add_collection(discs, autolim=False)
+
+
+def towards_rim() -> Array:
+    """(81,) from -1 to 1, close together at both ends: a semicircle drawn over them is smooth."""
+    return np.sin(np.linspace(-np.pi / 2, np.pi / 2, 81))
+
+
+def abscissae(centres: Array, radii: Array, edge: float) -> Array:
+    """x from -edge to edge, close together at the rims of the discs on y = 0, steep in pressure.
+
+    centres : (n, 2) [length];  radii : (n,) [length], 0 where there is no disc
+    """
+    x, y = centres.T
+    crossed = np.abs(y) < radii
+    half_chord = np.sqrt(radii[crossed] ** 2 - y[crossed] ** 2)
+    places = x[crossed, None] + np.outer(half_chord, towards_rim())
+    return np.unique(np.append(places, [-edge, edge]))
+
+
+def no_contact_figure(*labels: tuple[str, str], width: float = DOUBLE) -> Figure:
+    """A panel for each pair of axis labels, and the words "no contact" in each."""
+    figure = Figure(figsize=(width, 2.6), layout="constrained")
+    for axes, (x, y) in zip(figure.subplots(1, len(labels), squeeze=False)[0], labels, strict=True):
+        label(axes, x, y)
+        say_no_contact(axes)
+    return figure
+
+
+def say_no_contact(axes: Axes) -> None:
+    axes.set(xticks=[], yticks=[])
+    place = axes.transAxes
+    axes.text(0.5, 0.5, "no contact", transform=place, fontsize=LABEL, ha="center", va="center")
+
+
+def census(contact: Contact) -> str:
+    """How many touch, and how sure that is."""
+    words = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
+    return words + doubt(contact.certificate.scope, contact.status)
+
+
+def doubt(scope: str, status: Any) -> str:
+    """What is not proved of a state, in brackets; nothing if all is."""
+    if scope == "none":
+        return " (not proved)"
+    unsure = int((status == "undecided").sum())
+    return f" ({unsure:,} undecided)" if unsure else ""
+
+
+def label(axes: Axes, x: str, y: str) -> None:
+    axes.set_xlabel(x, fontsize=LABEL)
+    axes.set_ylabel(y, fontsize=LABEL)
+    axes.tick_params(labelsize=TICK)
+
+
+def legend_above(axes: Axes, markerscale: float = 1.0, ncols: int = 3) -> None:
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.99),
+        ncols=ncols,
+        fontsize=TICK,
+        markerscale=markerscale,
+        frameon=False,
+        borderpad=0.2,
+        columnspacing=1.0,
+        handletextpad=0.4,
+        handlelength=1.6,
+    )
+
+
+def quantity(value: float, unit: str) -> str:
+    """Three digits and the unit, such as  4.12 × 10^-3 mm."""
+    digits, _, exponent = f"{value:.2e}".partition("e")
+    power = int(exponent)
+    number = f"{value:.3g}" if -3 < power < 3 else f"${digits}\\times 10^{{{power}}}$"
+    return f"{number} {literal(unit)}".strip()
+
+
+def literal(text: str) -> str:
+    """Text in which no dollar sign begins a formula."""
+    return text.replace("$", r"\$")

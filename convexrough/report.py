@@ -1,0 +1,228 @@
+"""What a run says: a summary for programs, aligned lines for people."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+import convexrough
+from convexrough.certificate import Certificate
+from convexrough.checks import Array
+from convexrough.contact import Contact
+from convexrough.stages import Outcome
+
+Summary = dict[str, Any]
+
+_WORDS = ("contact", "open", "undecided")
+_SCOPES = {
+    "global": "global: the scene has no other solution",
+    "local": "local: no other solution with contacts of such sizes",
+    "none": "none: nothing is proved",
+}
+
+
+def summarise(outcome: Outcome) -> Summary:
+    """The summary of a run, in the scene's units; the shear stages only where they were asked for.
+
+    Forces named as in a scene file are fractions of f P, as there.
+    """
+    summary = _contact_summary(outcome.contact)
+    if outcome.shear:
+        summary["shear"] = [
+            {
+                "fraction": fraction,
+                "force": state.force,
+                "displacement": state.displacement,
+                "displacement_error": state.certificate.displacement_error,
+                "sliding": int(np.sum(state.status == "sliding")),
+                "partial_slip": int(np.sum(state.status == "partial")),
+                "undecided": int(np.sum(state.status == "undecided")),
+                "scope": state.certificate.scope,
+            }
+            for fraction, state in outcome.shear
+        ]
+    if outcome.cycles:
+        summary["cycle"] = [
+            {
+                "maximum": maximum,
+                "minimum": minimum,
+                "energy": cycle.energy,
+                "energy_normalised": cycle.energy_normalised,
+                "smooth_normalised": cycle.smooth_normalised,
+                "balance_defect": cycle.balance_defect,
+                "sliding": int(np.sum(cycle.status == "sliding")),
+                "partial_slip": int(np.sum(cycle.status == "partial")),
+                "undecided": int(np.sum(cycle.status == "undecided")),
+            }
+            for maximum, minimum, cycle in outcome.cycles
+        ]
+    if outcome.history is not None:
+        fractions, history = outcome.history
+        summary["history"] = {
+            "fraction": list(fractions),
+            "displacement": history.displacements.tolist(),
+            "energy": history.energy.tolist(),
+        }
+    return summary
+
+
+def _contact_summary(contact: Contact) -> Summary:
+    normal = _judged(contact.certificate, contact.loads) | {
+        "candidates": contact.candidates,
+        "solver": contact.solver,
+        "iterations": contact.iterations,
+        "seconds": contact.seconds,
+        "model_error": contact.model_error,
+        "crowding": contact.crowding,
+    }
+    return _headed(normal)
+
+
+def certificate_summary(certificate: Certificate, loads: Array) -> Summary:
+    """The summary of judged loads, (n,) [force], in the scene's units."""
+    return _headed(_judged(certificate, loads))
+
+
+def to_json(summary: Summary) -> str:
+    """Valid JSON: infinities, and what is no number, are null."""
+    return json.dumps(_finite(summary), indent=2, allow_nan=False)
+
+
+def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -> list[str]:
+    """Aligned lines for people, of either summary."""
+    normal = summary["normal"]
+    proof = normal["certificate"]
+    able = f"  ({normal['candidates']} could touch)" if "candidates" in normal else ""
+    width = len(str(normal["asperities"]))
+    relative = _ratio(proof["load_error"], normal["largest_load"])
+    lines = [
+        ("asperities", f"{normal['asperities']}{able}"),
+        *((f"  {word}", f"{normal[word]:>{width}}") for word in _WORDS),
+        ("approach", _quantity(f"{normal['approach']:.10g}", length_unit)),
+        ("load", _quantity(f"{normal['load']:.10g}", force_unit)),
+        ("certificate", _SCOPES[proof["scope"]]),
+        ("convexity number", f"{proof['convexity_number']:.4g}  (convex below 1)"),
+        ("load error", f"{_quantity(_bound(proof['load_error']), force_unit)}{relative}"),
+        ("gap error", _quantity(_bound(proof["gap_error"]), length_unit)),
+    ]
+    if "solver" in normal:
+        steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
+        lines += [
+            ("model error", f"{normal['model_error']:.2g}  (point forces for pressures)"),
+            ("crowding", f"{normal['crowding']:.3g}  (contact discs overlap above 1)"),
+            ("solver", f"{normal['solver']}, {steps}"),
+        ]
+    described = [f"{name:<18}{text}" for name, text in lines]
+    return described + _describe_shear(summary, length_unit, force_unit)
+
+
+def _describe_shear(summary: Summary, length_unit: str, force_unit: str) -> list[str]:
+    work = f"{force_unit} {length_unit}".strip()
+    lines = []
+    if rows := summary.get("shear"):
+        keys = ["fraction", "force", "displacement", "sliding", "partial_slip", "undecided"]
+        lines += ["", _titled("shear", f"force {force_unit}", f"displacement {length_unit}")]
+        heading = ["Q/(fP)", "force", "displacement", "slide", "partial", "undecided"]
+        lines += _aligned(heading, [[row[key] for key in keys] for row in rows])
+    if rows := summary.get("cycle"):
+        keys = ["maximum", "minimum", "energy", "energy_normalised", "smooth_normalised"]
+        keys += ["balance_defect", "sliding"]
+        lines += ["", _titled("steady cycles", f"energy {work}")]
+        heading = ["max/(fP)", "min/(fP)", "energy", "W/W0", "smooth", "defect", "slide"]
+        lines += _aligned(heading, [[row[key] for key in keys] for row in rows])
+    if past := summary.get("history"):
+        steps = list(zip(past["fraction"], past["displacement"], past["energy"], strict=True))
+        lines += ["", _titled("history", f"displacement {length_unit}", f"energy {work}")]
+        if len(steps) > 20:
+            lines.append(f"(the last 20 of {len(steps)} steps; all are in history.csv)")
+        lines += _aligned(["Q/(fP)", "displacement", "energy"], steps[-20:])
+    return lines
+
+
+def _titled(name: str, *quantities: str) -> str:
+    """A heading, with the units of quantities where the scene names them."""
+    named = [quantity for quantity in quantities if not quantity.endswith(" ")]
+    return f"{name}  ({', '.join(named)})" if named else name
+
+
+def _aligned(heading: Sequence[str], rows: Sequence[Sequence[float]]) -> list[str]:
+    cells = [[f"{x:d}" if isinstance(x, int) else f"{x:.7g}" for x in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(heading, *cells, strict=True)]
+    return [
+        "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
+        for row in (heading, *cells)
+    ]
+
+
+def warnings(summary: Summary) -> list[str]:
+    """What a user must not overlook, of either summary."""
+    normal = summary["normal"]
+    found = []
+    if normal["certificate"]["scope"] == "none":
+        found.append("not certified: these loads come without any proof")
+    elif normal["undecided"]:
+        found.append(f"not certified: {normal['undecided']} of the asperities undecided")
+    for stage in ("shear", "cycle"):
+        doubtful = sum(1 for row in summary.get(stage, ()) if row["undecided"])
+        if doubtful:
+            found.append(f"not certified: {doubtful} of the rows in {stage} have undecided words")
+    if normal.get("crowding", 0.0) > 1:
+        found.append("contact discs overlap (crowding above 1): the asperity model does not hold")
+    return found
+
+
+def proved(summary: Summary) -> bool:
+    """Every asperity has a proved word, in every stage."""
+    stages = [summary["normal"], *summary.get("shear", ()), *summary.get("cycle", ())]
+    scope = summary["normal"]["certificate"]["scope"]
+    return scope != "none" and not any(stage["undecided"] for stage in stages)
+
+
+def _headed(normal: Summary) -> Summary:
+    return {"schema": 1, "version": convexrough.__version__, "normal": normal}
+
+
+def _judged(certificate: Certificate, loads: Array) -> Summary:
+    return {
+        "asperities": len(loads),
+        **{word: int(np.sum(certificate.status == word)) for word in _WORDS},
+        "approach": certificate.approach,
+        "approach_error": certificate.approach_error,
+        "load": float(loads.sum()),
+        "largest_load": float(loads.max()),
+        "certificate": {
+            "scope": certificate.scope,
+            "convexity_number": certificate.convexity_number,
+            "load_error": certificate.load_error,
+            "gap_error": certificate.gap_error,
+        },
+    }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _quantity(number: str, unit: str) -> str:
+    return f"{number} {unit}".rstrip()
+
+
+def _bound(value: float) -> str:
+    """Two digits, never below the value."""
+    return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
+
+
+def _ratio(error: float, largest: float) -> str:
+    if largest == 0 or not math.isfinite(error):
+        return ""
+    return f"  ({_bound(error / largest)} of the largest load)"
