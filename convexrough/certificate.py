@@ -51,6 +51,8 @@ class Certificate:
     gap_errors : [length] bounds on |gap - solution|
     approach : [length] prescribed, or the one that fits the loads best
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
+    duality_gap : [force length] bound on the energy of these loads above the least in the box, by
+        a dual point made from the loads alone; 0 to rounding at a solution
     """
 
     scope: Scope
@@ -61,6 +63,7 @@ class Certificate:
     gap_errors: Array
     approach: float
     approach_error: float
+    duality_gap: float
 
     @property
     def holds(self) -> bool:
@@ -152,6 +155,8 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
         gap_errors=frozen(error * problem.units.length),
         approach=fit.approach * problem.units.length,
         approach_error=approach_error * problem.units.length,
+        duality_gap=problem.duality_gap(loads, fit.displacement, fit.approach, box.loads)
+        * (problem.units.force * problem.units.length),
     )
 
 
@@ -286,4 +291,5 @@ def _unproved(problem: NormalProblem, loads: Array, fit: _Fit) -> Certificate:
         gap_errors=frozen(unknown),
         approach=fit.approach * problem.units.length,
         approach_error=0.0 if problem.load is None else np.inf,
+        duality_gap=np.inf,
     )

@@ -170,6 +170,44 @@ class NormalProblem:
         ratio = self.shells / self.stiffness(loads)
         return float(ratio.max(initial=0.0)) * (1 + SAFETY)
 
+    def duality_gap(self, loads: Array, displacement: Array, approach: float, box: Array) -> float:
+        """Upper bound on Phi(P) less its minimum over 0 <= P <= box, from the loads alone.
+
+        With M = A + diag(shells), positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2,
+        convex on the box where its convexity number is at most 1, any P gives a dual bound:
+
+            min Phi >= -P'MP / 2 + sum min over 0 <= x <= box_i of [h_i(x) - (D - M P)_i x].
+
+        Phi(P) less that is a sum of terms that are not negative. Under load control `approach` is
+        any estimate of the multiplier and `loads` must add up to the load. Infinite where the box
+        is not convex.
+
+        displacement : A P
+        """
+        if self.convexity_number(box) > 1:
+            return np.inf
+        k, shells = self.coefficients, self.shells
+        slope = approach + self.offsets - displacement - shells * loads  # (D - M P)_i
+        top = hertz.indentation(box, k) - shells * box  # h' at the box's upper end
+        # s = (x / box)^(1/3) solves k box^(2/3) s^2 - shell box s^3 = slope, by Newton's method
+        # from a lower bound.
+        k_box, shell_box = hertz.indentation(box, k), shells * box
+        target = np.clip(slope, 0.0, top)
+        s = np.sqrt(np.where(k_box > 0, target / np.where(k_box > 0, k_box, 1.0), 0.0))
+        for _ in range(60):
+            value = s * s * (k_box - shell_box * s) - target
+            rate = s * (2.0 * k_box - 3.0 * shell_box * s)
+            step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
+            s = np.clip(s - step, 0.0, 1.0)
+            if np.abs(step).max(initial=0.0) < 1e-15:
+                break
+        best = box * s**3
+
+        def charge(x: Array) -> Array:
+            return np.asarray(x * (0.6 * hertz.indentation(x, k) - shells * x / 2.0 - slope))
+
+        return float(np.maximum(charge(loads) - charge(best), 0.0).sum())
+
     def overhang(self, weights: Array, displacement: Array) -> float:
         """Upper bound on D0 at every solution of load control, from any trial loads.
 

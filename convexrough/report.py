@@ -199,6 +199,7 @@ def _judged(certificate: Certificate, loads: Array) -> Summary:
             "convexity_number": certificate.convexity_number,
             "load_error": certificate.load_error,
             "gap_error": certificate.gap_error,
+            "duality_gap": certificate.duality_gap,
         },
     }
 

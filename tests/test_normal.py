@@ -194,6 +194,40 @@ def test_newton_converges_from_any_start(
         assert_allclose(again.loads, contact.loads, rtol=1e-9, atol=1e-12 * contact.loads.max())
 
 
+@settings(max_examples=60, deadline=None)
+@given(random_scenes(crowding=0.95), st.integers(0, 2**32 - 1), st.floats(-9, 0))
+def test_the_duality_gap_bounds_the_suboptimality(
+    drawn: tuple[cr.Scene, float], seed: int, size: float
+) -> None:
+    """For arbitrary feasible loads; and it vanishes at the solution, under both controls."""
+    scene, approach = drawn
+    rng = np.random.default_rng(seed)
+    contact = cr.press(scene, approach=approach)
+    if contact.load == 0 or contact.certificate.scope != "global":
+        return
+    for control in ({"approach": approach}, {"load": contact.load}):
+        problem = assembled(scene, **control)
+        solution = Newton().solve(problem)
+        box = np.maximum(problem.bounds(problem.ceiling), solution.loads)
+        if problem.convexity_number(box) > 1:
+            continue
+        best = phi(problem, solution.loads)
+        wrong = np.abs(solution.loads + 10**size * box * rng.standard_normal(len(problem)))
+        wrong = np.minimum(wrong, box)
+        if problem.load is not None:
+            wrong *= problem.load / wrong.sum()
+        for loads, least in ((solution.loads, 0.0), (wrong, phi(problem, wrong) - best)):
+            if (loads > box).any():
+                continue
+            displacement = problem.influence.apply(loads)
+            gap = problem.duality_gap(loads, displacement, solution.approach, box)
+            assert gap >= least - 1e-13
+        at_best = problem.duality_gap(
+            solution.loads, problem.influence.apply(solution.loads), solution.approach, box
+        )
+        assert at_best < 1e-13
+
+
 def test_newton_takes_few_steps() -> None:
     for scene in (paper(), rough(), rough("closest")):
         for control in ({"approach": PAPER_APPROACH}, {"load": 3.6e-7}):

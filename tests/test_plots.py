@@ -5,15 +5,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from io import BytesIO
-from itertools import combinations
 from typing import Any
 
 import matplotlib
 import numpy as np
 import pytest
+from drawn import fits, words
 from matplotlib.collections import EllipseCollection
-from matplotlib.figure import Figure
-from matplotlib.text import Text
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel
 
@@ -87,31 +85,9 @@ def contact(request: pytest.FixtureRequest) -> cr.Contact:
     return CASES[request.param]()
 
 
-def words(figure: Figure) -> list[Text]:
-    """Every text that is drawn, after drawing the figure."""
-    figure.draw_without_rendering()
-    ticks, drawn = set(), []
-    for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            low, high = sorted(axis.get_view_interval())
-            slack = 1e-9 * (high - low)
-            for place, label in zip(axis.get_majorticklocs(), axis.get_ticklabels(), strict=True):
-                ticks.add(label)
-                if low - slack <= place <= high + slack:
-                    drawn.append(label)
-    others = [t for t in figure.findobj(Text) if isinstance(t, Text) and t not in ticks]
-    return [t for t in drawn + others if t.get_visible() and t.get_text().strip()]
-
-
 def test_fit_to_print(contact: cr.Contact) -> None:
     for figure in press_figures(contact, length_unit="µm", force_unit="mN").values():
-        boxes = {text: text.get_window_extent() for text in words(figure)}
-        for text, box in boxes.items():
-            assert 6 < float(text.get_fontsize()) < 10
-            assert figure.bbox.padded(1).contains(box.x0, box.y0), text
-            assert figure.bbox.padded(1).contains(box.x1, box.y1), text
-        for one, other in combinations(boxes, 2):
-            assert not boxes[one].overlaps(boxes[other]), (one, other)
+        fits(figure)
         for axes in figure.axes[:2]:
             assert axes.get_xlabel()
             assert axes.get_ylabel()

@@ -27,7 +27,7 @@ from convexrough.plots.style import (
 
 #: Amplitude Q / (f P) at which the paper reads off its Fig. 9 that the curves cross: "about".
 READ_CROSSING = 0.37
-AMPLITUDES = 201
+AMPLITUDES = 401
 
 
 def forces_figure(
@@ -97,7 +97,7 @@ def loss_figure(contact: Contact, scale: ShearScale) -> Figure:
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     whole, zoom = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     even = np.linspace(0.0, 1.0, AMPLITUDES)
-    amplitude = np.union1d(even, 1.0 - 0.02 * even[:-1:10] ** 2)  # steep at gross sliding
+    amplitude = np.union1d(even, 1.0 - 0.02 * even[:-1:20] ** 2)  # steep at gross sliding
     steady = cycles(contact, amplitude * scale.force)
     rough = np.array([each.energy_normalised for each in steady])
     smooth = np.array([each.smooth_normalised for each in steady])

@@ -1,0 +1,363 @@
+"""Figures of shear, cycles, histories and the paper say what the states say; nothing collides."""
+
+import dataclasses
+from functools import cache
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pytest
+from drawn import discs, fits, words
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from numpy.testing import assert_allclose
+from scenes import MATERIAL, PAPER_APPROACH, paper, rough
+
+import convexrough as cr
+from convexrough import fields, hertz, plots
+from convexrough.plots import cycle as loops
+from convexrough.plots import style
+from convexrough.plots.shear import SLIDING
+from convexrough.smooth import smooth
+
+UNITS: Any = dict(length_unit="µm", force_unit="mN")
+
+
+def pressed(name: str) -> cr.Contact:
+    scenes = {
+        "paper": paper(),
+        "rough": rough(),
+        "one": cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL),
+        "nothing": paper(),
+    }
+    scene = dataclasses.replace(scenes[name], friction=0.5)
+    return cr.press(scene, approach=-1e-6 if name == "nothing" else PAPER_APPROACH)
+
+
+contact = cache(pressed)
+
+
+def limit(name: str) -> float:
+    return 0.5 * contact(name).load
+
+
+def states(name: str, shares: list[float]) -> list[cr.ShearState]:
+    return [cr.shear(contact(name), force=share * limit(name)) for share in shares]
+
+
+def steady(name: str, maximum: Any, minimum: Any = None) -> list[cr.Cycle]:
+    lower = None if minimum is None else np.multiply(minimum, limit(name))
+    return cr.cycles(contact(name), np.multiply(maximum, limit(name)), lower)
+
+
+def past(name: str, shares: Any) -> cr.History:
+    return cr.history(contact(name), forces=np.multiply(shares, limit(name)))
+
+
+@cache
+def of_paper(name: str) -> dict[str, Figure]:
+    return plots.paper_figures(contact(name), **UNITS)
+
+
+def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
+    """The state with doubt cast on the last of its touching asperities."""
+    status = state.status.copy()
+    status[np.flatnonzero(state.contact.loads)[-count:]] = "undecided"
+    certificate = dataclasses.replace(state.certificate, scope=scope, status=status)
+    return dataclasses.replace(state, certificate=certificate)
+
+
+# --- nothing collides -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "shares"),
+    [("paper", [0.1, 0.37, 0.5]), ("paper", [-0.5, 0.1, 0.2, 1.0]), ("one", [0.5]),
+     ("rough", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])],
+)  # fmt: skip
+def test_stick_slip_fits_to_print(name: str, shares: list[float]) -> None:
+    fits(plots.shear_figures(states(name, shares), **UNITS)["stick_slip"])
+
+
+@pytest.mark.parametrize(
+    ("name", "maximum", "minimum"),
+    [("paper", [0.1, 0.37, 0.5], None), ("paper", [0.9, 0.5], [-0.1, -0.9]),
+     ("rough", np.geomspace(1e-4, 1, 30), None)],
+)  # fmt: skip
+def test_cycles_fit_to_print(name: str, maximum: Any, minimum: Any) -> None:
+    for figure in plots.cycle_figures(steady(name, maximum, minimum), **UNITS).values():
+        fits(figure)
+
+
+@pytest.mark.parametrize(
+    ("name", "shares"),
+    [("one", [0.5]),
+     ("paper", [0.9, -0.5, 0.6, -0.2, 0.4, 0.1, 0.8, 0.95])],
+)  # fmt: skip
+def test_histories_fit_to_print(name: str, shares: list[float]) -> None:
+    fits(plots.history_figures(past(name, shares), **UNITS)["history"])
+
+
+def test_figures_of_the_paper_fit_to_print() -> None:
+    for figure in of_paper("paper").values():
+        fits(figure)
+    for stem in ("fig4_rings", "fig7_asperities"):
+        fits(of_paper("one")[stem])
+
+
+def test_saved_without_a_warning() -> None:
+    of_paper("paper")["fig5_traction"].savefig(file := BytesIO(), format="png", dpi=200)
+    assert 30_000 < len(file.getvalue()) < 1_000_000
+
+
+# --- stick-slip map -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["paper", "rough"])
+def test_a_disc_for_every_word(name: str) -> None:
+    shown = states(name, [0.1, 0.37, 0.5, 0.7])
+    figure = plots.shear_figures(shown)["stick_slip"]
+    for axes, state in zip(figure.axes, shown, strict=True):
+        sliding = int((state.status == "sliding").sum())
+        assert discs(axes, "sliding") == sliding
+        assert discs(axes, "stick") == discs(axes, "slip") == (state.status == "partial").sum()
+        share = state.force / limit(name)
+        assert axes.get_title() == f"$Q/(fP)$ = {share:g}:\n{sliding} of 37 slide"
+
+
+def test_discs_have_the_radii_of_the_state() -> None:
+    (state,) = states("rough", [0.5])
+    (axes,) = plots.shear_figures([state])["stick_slip"].axes
+    a_H = smooth(state.contact.scene, load=state.contact.load).contact_radius
+    drawn: Any = {each.get_label(): each for each in axes.collections}
+    partial = state.status == "partial"
+    assert_allclose(drawn["stick"].get_widths(), 2 * state.stick_radii[partial] / a_H, rtol=1e-12)
+    whole = state.contact.contact_radii[partial]
+    assert_allclose(drawn["slip"].get_widths(), 2 * whole / a_H, rtol=1e-12)
+    assert_allclose(drawn["sliding"].get_facecolor(), [to_rgba(SLIDING)])
+
+
+@pytest.mark.parametrize(("scope", "count"), [("global", 4), ("none", 37)])
+def test_doubt_is_marked(scope: str, count: int) -> None:
+    state = doubted(states("paper", [0.5])[0], scope, count)
+    (axes,) = plots.shear_figures([state])["stick_slip"].axes
+    (marks,) = [line for line in axes.lines if line.get_marker() == "x"]
+    assert len(np.asarray(marks.get_xdata())) == discs(axes, "undecided") == count
+    assert axes.get_title().endswith("(not proved)" if scope == "none" else "(4 undecided)")
+    fits(plots.shear_figures([state] * 3)["stick_slip"])
+
+
+def test_at_most_twelve_states() -> None:
+    shown = states("one", list(np.linspace(0, 1, 30)))
+    titles = [axes.get_title() for axes in plots.shear_figures(shown)["stick_slip"].axes]
+    assert len(titles) == 12
+    assert "= 0:" in titles[0]
+    assert "= 1:" in titles[-1]
+
+
+def test_many_asperities_stay_pixels() -> None:
+    asperities = cr.Asperities.hexagonal(spacing=8e-4, tip_radius=6.4e-3, within=8.5e-3)
+    dense = cr.press(cr.Scene(1.0, asperities, MATERIAL, friction=0.5), approach=PAPER_APPROACH)
+    state = cr.shear(dense, force=0.25 * dense.load)
+    figure = plots.shear_figures([state])["stick_slip"]
+    assert discs(figure.axes[0], "stick") > style.DENSE
+    figure.savefig(file := BytesIO(), format="svg", dpi=200)
+    assert len(file.getvalue()) < 500_000
+
+
+# --- cycles ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("maximum", "minimum"), [(0.5, -0.5), (0.9, -0.1), (0.1, -0.9), (1.0, -1.0), (0.6, 0.2)]
+)
+def test_drawn_loops_close_on_the_loss(maximum: float, minimum: float) -> None:
+    (cycle,) = steady("paper", [maximum], [minimum])
+    whole = plots.cycle_figures([cycle])["hysteresis"].axes[0]
+    sphere = smooth(cycle.contact.scene, load=cycle.contact.load)
+    unit = sphere.energy_scale / (sphere.largest_force * sphere.displacement(sphere.largest_force))
+    for line, loss in zip(
+        whole.lines, (cycle.energy_normalised, cycle.smooth_normalised), strict=True
+    ):
+        x, q = np.asarray(line.get_data(), dtype=float)
+        assert_allclose([x[0], q[0]], [x[-1], q[-1]], atol=1e-12)
+        assert np.trapezoid(q, x) == pytest.approx(unit * loss, rel=2e-3)
+
+
+def test_the_smooth_loop_is_its_closed_form() -> None:
+    sphere = smooth(contact("paper").scene, load=contact("paper").load)
+    q = np.linspace(1.0, -1.0, 41) * 0.6 * limit("paper")
+    x = loops.smooth_loop(sphere, np.append(q, q[-2::-1]))
+    assert_allclose(x[:41], sphere.branch(q, q[0]), rtol=1e-12, atol=1e-15 * x[0])
+    assert_allclose(x[40:], -x[:41], rtol=1e-12, atol=1e-12 * x[0])
+
+
+def test_drawn_loops_are_those_of_the_cycle() -> None:
+    (cycle,) = steady("rough", [0.2], [-0.8])
+    drawn, computed = loops.drawn_loop(cycle), cycle.loop(400)
+    down = np.argmin(drawn.forces) + 1, np.argmin(computed.forces) + 1
+    for i in np.flatnonzero(cycle.contact.loads):
+        seen = np.interp(
+            computed.forces[: down[1]][::-1],
+            drawn.forces[: down[0]][::-1],
+            drawn.asperity_forces[: down[0], i][::-1],
+        )
+        expected = computed.asperity_forces[: down[1], i][::-1]
+        assert_allclose(seen, expected, atol=1e-3 * limit("rough"))
+
+
+def test_chosen_asperities_are_named_by_distance() -> None:
+    cycles = steady("paper", [0.5, 0.3])
+    legend: Any = plots.cycle_figures(cycles)["hysteresis"].axes[2].get_legend()
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == ["0.00", "0.39", "0.67", "0.77", "1.02", "1.16"]
+    figures = plots.cycle_figures(cycles, asperities=[0, 36])
+    single = figures["hysteresis"].axes[2]
+    assert single.get_title(loc="left") == "asperities, $Q/(fP)$ = ±0.5"  # the widest
+    force = np.asarray(single.lines[1].get_ydata(), dtype=float)
+    assert_allclose([force.max(), force.min()], [1, -1], rtol=1e-12)  # ring A slides
+    assert np.asarray(single.lines[0].get_ydata(), dtype=float).max() < 0.5
+
+
+def test_the_loss_is_that_of_the_cycles() -> None:
+    cycles = steady("paper", [0.5, 0.1, 0.0, 0.37])
+    loss, ratio = plots.cycle_figures(cycles)["loss"].axes
+    sphere, points = loss.lines
+    t, e = np.asarray(sphere.get_data(), dtype=float)
+    assert_allclose(e, hertz.loss(t), rtol=1e-12)
+    x, w = np.asarray(points.get_data(), dtype=float)
+    assert_allclose(x, [0.1, 0.37, 0.5], rtol=1e-12)  # no loss at 0
+    assert_allclose(w, [cycles[i].energy_normalised for i in (1, 3, 0)], rtol=1e-12)
+    y = np.asarray(ratio.lines[1].get_ydata(), dtype=float)
+    assert_allclose(y, w / hertz.loss(x), rtol=1e-12)
+    assert "loss" not in plots.cycle_figures(cycles[:1])
+
+
+# --- histories ------------------------------------------------------------------------------------
+
+
+def test_the_path_passes_through_every_step() -> None:
+    done = past("paper", [0.6, -0.2, 0.3, -0.6, 0.6])
+    path, cost, _ = plots.history_figures(done)["history"].axes
+    sphere = smooth(done.contact.scene, load=done.contact.load)
+    X0 = sphere.displacement(sphere.largest_force)
+    ends, energies = (np.asarray(axes.collections[1].get_offsets()) for axes in (path, cost))
+    assert_allclose(ends[1:, 0], done.displacements / X0, rtol=1e-9, atol=1e-15)
+    assert_allclose(ends[1:, 1], done.applied / limit("paper"), rtol=1e-12)
+    assert_allclose(energies[:, 0], range(6))
+    assert_allclose(energies[1:, 1], done.energy / sphere.energy_scale, rtol=1e-9)
+    numbers = {text.get_text() for text in path.texts}
+    assert numbers == {"0", "1, 5", "2", "3", "4"}  # the loop closes on its first point
+
+
+def test_long_histories_are_drawn_as_they_are() -> None:
+    rng = np.random.default_rng(5)
+    done = past("one", rng.uniform(-1, 1, 3000))
+    path, *_ = plots.history_figures(done)["history"].axes
+    (lines,) = path.collections
+    assert len(lines.get_paths()) == 3000
+    assert not path.texts
+
+
+# --- the paper's figures --------------------------------------------------------------------------
+
+
+def test_figures_3_to_9() -> None:
+    stems = [stem.split("_")[0] for stem in of_paper("paper")]
+    assert stems == [f"fig{k}" for k in range(3, 10)]
+
+
+def test_rings_have_the_letters_of_the_paper() -> None:
+    chart, bars = of_paper("paper")["fig4_rings"].axes
+    letters = [text.get_text() for text in chart.texts]
+    assert {letter: letters.count(letter) for letter in letters} == dict(
+        F=1, E=6, D=6, C=6, B=12, A=6
+    )
+    assert chart.get_title(loc="left") == "slide at $Q/(fP)$ = 0.5: A"
+    assert discs(chart, "sliding") == 6
+    written = [text.get_text() for text in bars.texts]
+    onsets = cr.onset_of_sliding(contact("paper")) / limit("paper")
+    assert written[:-1] == [f"{onsets[i]:.4f}" for i in (0, 1, 7, 13, 19, 31)]
+
+
+def test_the_traction_drawn_is_the_field() -> None:
+    _, profile, _ = of_paper("paper")["fig5_traction"].axes
+    (state,) = states("paper", [0.5])
+    drawn = {line.get_label(): np.asarray(line.get_data(), dtype=float) for line in profile.lines}
+    a, c = state.contact.contact_radii[0], state.stick_radii[0]
+    p0 = smooth(state.contact.scene, load=state.contact.load).peak_pressure
+    x, q = drawn["$q$"]
+    points = np.column_stack((x * a, 0 * x))
+    assert_allclose(q, fields.traction(state, points) / (0.5 * p0), rtol=1e-9, atol=1e-12)
+    assert x[q.argmax()] == pytest.approx(-c / a, abs=1e-9) or x[q.argmax()] == pytest.approx(c / a)
+    _, fp = drawn["$fp$"]
+    slipping = np.abs(x) > c / a * (1 + 1e-9)
+    assert_allclose(q[slipping], fp[slipping], rtol=1e-9)
+
+
+def test_the_section_shows_cattaneo_and_mindlin() -> None:
+    (axes,) = of_paper("paper")["fig6_section"].axes
+    drawn = {line.get_label(): np.asarray(line.get_data(), dtype=float) for line in axes.lines}
+    x, q = drawn["smooth sphere: $q$"]
+    c = 0.5 ** (1 / 3)
+    inner = np.where(np.abs(x) < c, np.sqrt(np.maximum(c**2 - x**2, 0)), 0)
+    assert_allclose(q, np.sqrt(1 - x**2) - inner, atol=1e-7)
+
+
+def test_each_ring_stops_where_it_slides() -> None:
+    left, right = of_paper("paper")["fig7_asperities"].axes
+    onsets = cr.onset_of_sliding(contact("paper")) / limit("paper")
+    loads = contact("paper").loads / contact("paper").load
+    dots = [line for line in left.lines if line.get_label() == "_onset"]
+    at = np.array([np.asarray(dot.get_data(), dtype=float).ravel() for dot in dots])
+    firsts = [0, 1, 7, 13, 19, 31]
+    assert_allclose(at[:, 0], onsets[firsts], rtol=1e-12)
+    assert_allclose(at[:, 1], 100 * loads[firsts], rtol=1e-6)
+    assert [text.get_text() for text in left.texts] == list("ABCDEF")
+    assert [text.get_text() for text in right.texts] == list("FEDCBA")
+
+
+def test_the_crossing_is_marked_where_it_is() -> None:
+    _, zoom = of_paper("paper")["fig9_energy"].axes
+    (mark,) = [line for line in zoom.lines if line.get_label() == "_crossing"]
+    t, w = (float(np.ravel(v)[0]) for v in mark.get_data())
+    (cycle,) = steady("paper", [t])
+    assert t == pytest.approx(0.3877, abs=1e-4)
+    assert cycle.energy_normalised == pytest.approx(cycle.smooth_normalised, rel=3e-4)
+    assert w == pytest.approx(cycle.energy_normalised, rel=1e-3)
+    said = " ".join(text.get_text() for text in zoom.texts)
+    assert "0.388" in said
+    assert "paper's\ngraph: about 0.37" in said
+
+
+def test_one_sphere_crosses_nothing() -> None:
+    _, zoom = of_paper("one")["fig9_energy"].axes
+    assert not zoom.texts
+
+
+# --- nothing touches ------------------------------------------------------------------------------
+
+
+def test_no_contact_is_said() -> None:
+    nothing = contact("nothing")
+    figures = (
+        plots.shear_figures([cr.shear(nothing, force=0.0)] * 2, **UNITS)
+        | plots.cycle_figures(cr.cycles(nothing, [0.0, 0.0]), **UNITS)
+        | plots.history_figures(cr.history(nothing, forces=[0.0, 0.0]), **UNITS)
+        | plots.paper_figures(nothing, **UNITS)
+    )
+    assert len(figures) == 10
+    for figure in figures.values():
+        assert "no contact" in {text.get_text() for text in words(figure)}
+        fits(figure)
+
+
+def test_nothing_to_show() -> None:
+    assert plots.shear_figures([]) == {}
+    assert plots.cycle_figures([]) == {}
+
+
+def test_units_are_said_where_given() -> None:
+    figures = plots.cycle_figures(steady("one", [0.5, 0.8]), length_unit="$mm", force_unit="N")
+    assert r"N \$mm)" in figures["loss"].axes[0].get_ylabel()
+    assert "N" not in plots.cycle_figures(steady("one", [0.5, 0.8]))["loss"].axes[0].get_ylabel()
