@@ -43,7 +43,7 @@ def dense(spacing: float) -> cr.Contact:
     nothing = np.zeros(len(scene))
     status = np.where(loads > 0, "contact", "open")
     certificate = cr.Certificate(
-        "global", 0.5, status, nothing, nothing, nothing, approach=4.9e-5, approach_error=0.0
+        "global", 0.5, status, nothing, nothing, nothing, 4.9e-5, approach_error=0, duality_gap=0
     )
     radii = hertz.contact_radius(loads, 1.0, scene.relative_radii)
     return dataclasses.replace(
