@@ -164,12 +164,20 @@ def figure_data(contact: cr.Contact) -> dict[str, Columns]:
             "load": contact.loads,
             "status_at_half": half.status,
         },
+        "fig5_traction": {
+            "x": x_i,
+            "y": y_i,
+            "contact_radius": contact.contact_radii,
+            "stick_radius": half.stick_radii,
+            "load": contact.loads,
+            "force": half.forces,
+        },
         "fig5_centre": {
             "r": close,
             "friction_limit": 0.5 * fields.pressure(contact, radial),
             "traction": fields.traction(half, radial),
         },
-        "fig6_traction": {
+        "fig6_section": {
             "x": x,
             "friction_limit": 0.5 * fields.pressure(contact, line),
             "traction": fields.traction(half, line),
@@ -194,7 +202,7 @@ def figure_data(contact: cr.Contact) -> dict[str, Columns]:
                 for n, i in zip(RINGS, first, strict=True)
             },
         },
-        "fig9_loss": {
+        "fig9_energy": {
             "fraction": AMPLITUDES,
             "loss": np.array([cycle.energy_normalised for cycle in cycles]),
             "smooth_loss": np.array([cycle.smooth_normalised for cycle in cycles]),

@@ -126,8 +126,8 @@ def test_paper(command: Any, tmp_path: Path) -> None:
     assert re.search(r"^asperities in contact +37 +37$", again.out, re.M)
     folder = tmp_path / "paper-results"
     assert {path.stem for path in folder.glob("fig*.csv")} == {
-        *("fig3_pressure", "fig4_rings", "fig5_centre", "fig6_traction", "fig7_asperities"),
-        *("fig8_loops", "fig9_loss"),
+        *("fig3_pressure", "fig4_rings", "fig5_centre", "fig5_traction", "fig6_section"),
+        *("fig7_asperities", "fig8_loops", "fig9_energy"),
     }
     assert (folder / "summary.json").exists()
     assert paper["sliding_at_half"] == {"paper": 6, "computed": 6}
@@ -137,7 +137,7 @@ def test_paper(command: Any, tmp_path: Path) -> None:
     assert paper["crossover"]["computed"] == pytest.approx(0.388, abs=5e-4)
     loss = [
         (float(row["fraction"]), float(row["loss"]) - float(row["smooth_loss"]))
-        for row in rows(folder / "fig9_loss.csv")
+        for row in rows(folder / "fig9_energy.csv")
     ]
     crossing = paper["crossover"]["computed"]
     assert all((difference > 0) == (fraction > crossing) for fraction, difference in loss)
