@@ -73,10 +73,12 @@ class Cycle:
         return frozen(self.partial_slip_energies + self.sliding_energies)
 
     def loop(self, points: int = 200) -> Loop:
-        """The loop through about `points` points, as many down as up."""
+        """The loop through about `points` points, as many down as up, denser at the ends."""
         if points < 4:
             raise InputError("points", found=points, expected="at least 4")
-        down = np.linspace(self.maximum, self.minimum, points // 2 + 1)
+        middle, amplitude = (self.maximum + self.minimum) / 2, (self.maximum - self.minimum) / 2
+        down = middle + amplitude * np.cos(np.linspace(0.0, np.pi, points // 2 + 1))
+        down[0], down[-1] = self.maximum, self.minimum
         there_and_back = [self.maximum, self.minimum]
         if abs(self.minimum) > abs(self.maximum):
             there_and_back.insert(0, self.minimum)

@@ -89,13 +89,15 @@ def loops_figure(
     whole, upright, single = figure.subplots(1, 3, width_ratios=[1, 1, 1.1])
     for cycle in cycles:
         loop = drawn_loop(cycle)
-        x = smooth_loop(scale.sphere, loop.forces)
+        forces = _around(cycle, POINTS)
+        smooth = smooth_loop(scale.sphere, forces) / scale.displacement
+        rough = loop.displacements / scale.displacement
+        up, smooth_up = loop.forces / scale.force, forces / scale.force
         for axes, elastic in ((whole, 0.0), (upright, 2.0 / 3.0)):
-            across, up = loop.displacements / scale.displacement, loop.forces / scale.force
             look: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "label": "asperities"}
-            axes.plot(across - elastic * up, up, **look)
+            axes.plot(rough - elastic * up, up, **look)
             look = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": "smooth sphere"}
-            axes.plot(x / scale.displacement - elastic * up, up, **look)
+            axes.plot(smooth - elastic * smooth_up, smooth_up, **look)
     label(whole, "$X\\,/\\,X_0$", "$Q\\,/\\,(fP)$")
     label(upright, r"$X\,/\,X_0 - \frac{2}{3}\,Q\,/\,(fP)$", "")
     upright.sharey(whole)
@@ -123,15 +125,14 @@ def loops_figure(
 
 
 def drawn_loop(cycle: Cycle) -> Loop:
-    """`cycle.loop`, but with its points close together at the ends, where X bends sharply."""
-    middle, half = (cycle.maximum + cycle.minimum) / 2, (cycle.maximum - cycle.minimum) / 2
-    down = np.clip(
-        middle + half * np.cos(np.linspace(0.0, np.pi, POINTS // 2 + 1)),
-        cycle.minimum,
-        cycle.maximum,
-    )
+    """`cycle.loop` with its points close together at the ends, where X bends sharply.
+
+    Fewer points where many asperities touch: each takes time.
+    """
+    touching = np.count_nonzero(cycle.contact.loads)
+    path = _around(cycle, int(np.clip(40_000 // touching, 40, POINTS)))
     first = [cycle.minimum] if abs(cycle.minimum) > abs(cycle.maximum) else []
-    past = history(cycle.contact, forces=np.concatenate((first, down, down[-2::-1])))
+    past = history(cycle.contact, forces=np.concatenate((first, path)))
     body = slice(len(first), None)
     return Loop(
         forces=past.applied[body],
@@ -139,6 +140,14 @@ def drawn_loop(cycle: Cycle) -> Loop:
         asperity_forces=past.forces[body],
         asperity_displacements=past.asperity_displacements[body],
     )
+
+
+def _around(cycle: Cycle, points: int) -> Array:
+    """Forces from the maximum to the minimum and back [force]."""
+    middle, half = (cycle.maximum + cycle.minimum) / 2, (cycle.maximum - cycle.minimum) / 2
+    down = middle + half * np.cos(np.linspace(0.0, np.pi, points // 2 + 1))
+    down = np.clip(down, cycle.minimum, cycle.maximum)
+    return np.append(down, down[-2::-1])
 
 
 def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:

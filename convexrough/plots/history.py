@@ -79,10 +79,14 @@ def _darkening() -> Any:
 
 
 def _between_steps(past: History) -> tuple[Array, Array, Array, Array]:
-    """Step (from 0), X, Q and energy, at the steps and, where these are few, between them too."""
+    """Step (from 0), X, Q and energy, at the steps and, where these are few, between them too.
+
+    Fewer points where many asperities touch: each takes time.
+    """
     stops = np.concatenate(([0.0], past.applied))
     steps = len(past.applied)
-    each = int(np.clip(MOST_POINTS // max(1, steps), 1, 80))
+    affordable = min(MOST_POINTS, 80_000 // int(np.count_nonzero(past.contact.loads)))
+    each = int(np.clip(affordable // max(1, steps), 1, 80))
     at = np.arange(steps * each + 1) / each
     if each > 1:
         whole = np.floor(at[:-1]).astype(int)
