@@ -1,0 +1,79 @@
+"""Powers of a number between 0 and 1 as second-order cones.
+
+For t in [0, 1] a *lift* stands for the powers of t by linear variables
+
+    y2, y3, y4, y5 for t^2, ..., t^5    and    z for t^5 - t^6,
+
+(and y1 for t in the five-cone form), tied to each other by rotated cones x y >= w^2, x, y >= 0:
+
+    four cones                                     five cones
+    1 * y4              >= y2^2                    (1 - y1) * (y2 - y3)  >= (y1 - y2)^2
+    (y2 - y3)(y4 - y5)  >= (y3 - y4)^2             (y1 - y2)(y3 - y4)    >= (y2 - y3)^2
+    y3 * y5             >= y4^2                    and the last three of the four
+    (y3 - y4) * z       >= (y4 - y5)^2
+
+Over them, min (3/5 - S/3) y5 + (S/3) z at fixed y3 = t^3 is (3/5) t^5 - (S/3) t^6 exactly: for
+0 <= S <= 21/25 with four cones, for 0 <= S <= 1 with five. docs/theory/exact-cones.md proves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from convexrough.checks import Array, Indices
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
+#: The largest S at which the four cones are exact, and the largest at which five are.
+FOUR_CONES_LIMIT, FIVE_CONES_LIMIT = 21 / 25, 1.0
+
+# Each cone x y >= w^2 as a row for x, y and w, in the columns 1, y1, y2, y3, y4, y5, z.
+_Y1_AND_Y3 = [[1, -1, 0, 0, 0, 0, 0], [0, 0, 1, -1, 0, 0, 0], [0, 1, -1, 0, 0, 0, 0]]
+_Y2_AND_Y4 = [[0, 1, -1, 0, 0, 0, 0], [0, 0, 0, 1, -1, 0, 0], [0, 0, 1, -1, 0, 0, 0]]
+_SQUARE = [[1, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 1, 0, 0], [0, 0, 1, 0, 0, 0, 0]]
+_Y3_AND_Y5 = [[0, 0, 1, -1, 0, 0, 0], [0, 0, 0, 0, 1, -1, 0], [0, 0, 0, 1, -1, 0, 0]]
+_PRODUCT = [[0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 1, 0, 0]]
+_WITH_Z = [[0, 0, 0, 1, -1, 0, 0], [0, 0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 1, -1, 0]]
+
+#: (cones, 3, 7): the forms x, y, w of each cone in the columns 1, y1, ..., y5, z.
+FOUR_CONES = np.array([_SQUARE, _Y3_AND_Y5, _PRODUCT, _WITH_Z], dtype=np.float64)
+FIVE_CONES = np.array([_Y1_AND_Y3, _Y2_AND_Y4, _Y3_AND_Y5, _PRODUCT, _WITH_Z], dtype=np.float64)
+
+#: x y >= w^2 with x, y >= 0 is the second-order cone  x + y >= || (x - y, 2 w) ||.
+_SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
+
+
+class ConeRows(NamedTuple):
+    """Rows with  constant - matrix @ variables  in `cones` second-order cones of dimension 3."""
+
+    matrix: csc_array  # (3 cones, width)
+    constant: Array  # (3 cones,)
+    cones: int
+
+
+def power_cones(lifts: Sequence[Indices], width: int) -> ConeRows:
+    """The cones of n lifts in Clarabel's form  A x + s = b,  s in the cones; all lifts at once.
+
+    lifts : columns, (n,) each, of y2, y3, y4, y5, z (four-cone form), or of y1, y2, y3, y4, y5, z
+        (five-cone form), among all variables of the program
+    width : how many variables the program has
+
+    Rows are grouped by lift: the cones of the first, three rows each, then those of the second.
+    """
+    from scipy.sparse import csc_array  # 0.1 s to import: only when solving
+
+    columns = np.stack(lifts)
+    names, n = columns.shape
+    cones = _SECOND_ORDER @ (FIVE_CONES if names == 6 else FOUR_CONES)
+    rows = cones.reshape(-1, 7)  # of one lift
+    constant, coefficients = rows[:, 0], rows[:, 7 - names :]
+    row, name = np.nonzero(coefficients)
+    at = (len(rows) * np.arange(n) + row[:, None], columns[name])
+    values = np.broadcast_to(-coefficients[row, name][:, None], at[1].shape)
+    entries = (values.ravel(), (at[0].ravel(), at[1].ravel()))
+    matrix = csc_array(entries, shape=(len(rows) * n, width))
+    return ConeRows(matrix, np.tile(constant, n), len(cones) * n)

@@ -1,0 +1,243 @@
+"""The contact as one quadratic program: Hertz's law as a row of bristles, through OSQP.
+
+The method of dimensionality reduction (Popov and Hess 2015) makes Hertz's energy the value of a
+quadratic program. On |x| <= b lies a row of independent springs, the bristles, with the stiffness
+2 E* per length of the half row and the profile x^2 / R_i above the first to touch:
+
+    (3/5) k P^(5/3) = min { integral f^2 / (4 E*) + (x^2 / R_i) f  dx :  f >= 0,  integral f = P },
+
+all over 0 <= x <= b, for every P whose contact radius is at most b; f = 2 E* (delta - x^2 / R_i)+.
+A force constant on each of m equal cells turns x^2 / R_i into its mean over the cell, and the
+minimum into an upper bound on the energy. In own units, with the loads B_i at contact radius b_i,
+their indentation d_i = k B_i^(2/3) and their stiffness h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i),
+and phi_ij the force on cell j if every cell bore as much as it does,
+
+    P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
+    c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
+
+P is exact where the contact ends on the edge of a cell, and off by 0.375 B_i b / (b_i m^2) at worst
+in between: second order.
+
+Convexity. With phi_ij = P_i + e_ij, sum_j e_ij = 0, the squares fall apart, and the program is
+
+    minimise    P'(A + diag(h)) P / 2 + sum_ij h_i e_ij^2 / (2 m) + sum_ij d_i c_j phi_ij / m - D'P
+    subject to  P_i + e_ij >= 0,   sum_j e_ij = 0        (and sum P_i = L under load control).
+
+Its matrix is positive definite exactly if A + diag(h) is: the Hessian of the contact energy at the
+upper corner of the box P <= B. No shift is needed, and m does not matter. The box is that of the
+a priori bounds if a Cholesky factorisation finds the matrix positive definite there. Else it is
+cut at b_i = 0.99 (pi/2) s_i, where the shell lemma proves it. Beyond the box the row has no more
+bristles: an answer that gets there is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import checks, hertz
+from convexrough.checks import Array
+from convexrough.errors import InputError, SolverError
+from convexrough.normal import NormalProblem
+from convexrough.solvers.libraries import load_library
+from convexrough.solvers.lifted import TooDenseError
+from convexrough.solvers.newton import newton_step
+from convexrough.solvers.solution import Solution
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+
+#: The convexity number of a box that has to be cut to the convex range.
+CUT = 0.99
+
+#: A box is not smaller than this part of the largest: of loads as small nothing need be resolved.
+SMALLEST_BOX = 1e-6
+
+
+@dataclass(frozen=True)
+class BristleQP:
+    """Settings of the bristle program: OSQP (1.0 or newer) with polishing.
+
+    bristles    : m, over half the contact width of each asperity; the loads are off by about
+        0.4 / m^2 of the largest load
+    newton_step : end with one Newton step, which squares the error and costs little
+    tolerance   : OSQP's, absolute and relative, in the problem's units; polishing then solves the
+        equations of the bristles in contact to rounding, where OSQP has found these
+
+    Raises TooDenseError where the contact leaves the convex range, and SolverError where OSQP is
+    missing or does not solve the program.
+    """
+
+    bristles: int = 64
+    newton_step: bool = True
+    tolerance: float = 1e-6
+    max_iterations: int = 20_000
+
+    def __post_init__(self) -> None:
+        for name in ("bristles", "max_iterations"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise InputError(name, found=repr(value), expected="a positive whole number")
+        checks.positive("tolerance", self.tolerance)
+
+    @property
+    def name(self) -> str:
+        return "bristles + Newton step" if self.newton_step else "bristles"
+
+    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
+        """Loads of the candidates (own units). OSQP starts where it likes: `start` is not used."""
+        program = _assemble(problem, self.bristles)
+        x, multipliers, iterations = _run_osqp(program, self)
+        loads, approach = _read(problem, program, x, multipliers)
+        _refuse_beyond(problem, program, loads, self.name)
+        if self.newton_step:
+            last = newton_step(problem, loads)
+            loads, approach = last.loads, last.approach
+            iterations += last.iterations
+        return Solution(loads, approach, iterations, problem.residual(loads, approach))
+
+
+class _Program(NamedTuple):
+    """minimise x'Qx / 2 + q'x,  lower <= C x <= upper,  x = (P, e row by row).
+
+    box : (n,) loads B;  cut : (n,) whether the convex range ends there
+    """
+
+    box: Array
+    cut: NDArray[np.bool_]
+    matrix: csc_matrix  # Q, upper triangle
+    linear: Array
+    constraints: csc_matrix  # C: phi_ij, then sum_j e_ij / m, then the total load if prescribed
+    lower: Array
+    upper: Array
+
+
+def _assemble(problem: NormalProblem, m: int) -> _Program:
+    from scipy import sparse  # 0.1 s to import: only when solving
+
+    n = len(problem)
+    checks.fits_in_memory("asperities of the bristle program", n, 60 * n + 1000 * m)
+    box, cut, hessian = _convex_box(problem)
+    k = problem.coefficients
+    h, depth = problem.stiffness(box), hertz.indentation(box, k)
+    cell = np.arange(1, m + 1)
+    profile = depth[:, None] * (cell**2 - cell + 1 / 3) / m**2
+    prescribed = problem.offsets + (problem.approach or 0.0)
+
+    rows = sparse.kron(sparse.identity(n), np.ones((m, 1)))  # one entry per bristle
+    bristles = sparse.hstack((rows, sparse.identity(n * m)))
+    means = sparse.hstack((sparse.csc_matrix((n, n)), rows.T / m))
+    blocks = [bristles, means]
+    lower, upper = np.zeros(n * m + n), np.concatenate((np.full(n * m, np.inf), np.zeros(n)))
+    if problem.load is not None:
+        blocks.append(sparse.csc_matrix(np.repeat([1.0, 0.0], [n, n * m])[None]))
+        lower, upper = np.append(lower, problem.load), np.append(upper, problem.load)
+    springs = sparse.diags(np.repeat(h / m, m))
+    return _Program(
+        box=box,
+        cut=cut,
+        matrix=sparse.csc_matrix(sparse.block_diag((np.triu(hessian), springs))),
+        linear=np.concatenate((profile.mean(axis=1) - prescribed, profile.ravel() / m)),
+        constraints=sparse.csc_matrix(sparse.vstack(blocks)),
+        lower=lower,
+        upper=upper,
+    )
+
+
+def _convex_box(problem: NormalProblem) -> tuple[Array, NDArray[np.bool_], Array]:
+    """The box of loads, where the convex range cuts it, and A + diag(h): positive definite."""
+    ceiling = problem.ceiling
+    if problem.load is not None:
+        trial = hertz.load(problem.smooth_indentation(), problem.coefficients)
+        ceiling = min(ceiling, problem.overhang(trial, problem.influence.apply(trial)))
+    with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
+        faces = (2.0 / 3.0 * problem.coefficients * CUT / problem.shells) ** 3
+    box = problem.bounds(ceiling)
+    box = np.maximum(box, np.minimum(faces, SMALLEST_BOX * box.max()))
+    if (hessian := _positive_definite(problem, box)) is not None:
+        return box, np.zeros(len(box), dtype=bool), hessian
+    cut = faces < box
+    box = np.minimum(box, faces)
+    if (hessian := _positive_definite(problem, box)) is not None:
+        return box, cut, hessian
+    raise SolverError("bristles: the matrix is not positive definite within the convex range")
+
+
+def _positive_definite(problem: NormalProblem, box: Array) -> Array | None:
+    """A + diag(h) on the box; None unless Cholesky finds it so with 0.1 % of its diagonal off."""
+    root = np.sqrt(1.0 / problem.stiffness(box))
+    scaled = problem.influence.matrix * root * root[:, None]
+    np.fill_diagonal(scaled, 0.999)
+    try:
+        np.linalg.cholesky(scaled)
+    except np.linalg.LinAlgError:
+        return None
+    hessian: Array = problem.influence.matrix + np.diag(problem.stiffness(box))
+    return hessian
+
+
+def _run_osqp(program: _Program, settings: BristleQP) -> tuple[Array, Array, int]:
+    """x, the multipliers of the constraints, the iterations."""
+    osqp = _import_osqp(settings.name)
+    solver = osqp.OSQP()
+    try:
+        solver.setup(
+            program.matrix,
+            program.linear,
+            program.constraints,
+            program.lower,
+            program.upper,
+            verbose=False,
+            polishing=True,
+            eps_abs=settings.tolerance,
+            eps_rel=settings.tolerance,
+            max_iter=settings.max_iterations,
+        )
+        result = solver.solve(raise_error=True)
+    except osqp.OSQPException as error:
+        reasons = {int(status): status.name for status in osqp.SolverStatus}
+        reason = reasons.get(error.args[0] if error.args else 0, f"error {error}")
+        if reason == "OSQP_SIGINT":  # OSQP takes the signal for itself
+            raise KeyboardInterrupt from error
+        raise SolverError(f"{settings.name}: OSQP did not solve the program: {reason}") from error
+    x, multipliers = np.asarray(result.x), np.asarray(result.y)
+    if not (np.isfinite(x).all() and np.isfinite(multipliers).all()):
+        raise SolverError(f"{settings.name}: OSQP returned numbers that are not finite")
+    return x, multipliers, int(result.info.iter)
+
+
+def _import_osqp(solver: str) -> Any:
+    osqp = load_library("osqp", solver)
+    if int(osqp.__version__.split(".")[0]) < 1:
+        raise SolverError(f'{solver}: OSQP {osqp.__version__} is too old; pip install "osqp>=1.0"')
+    return osqp
+
+
+def _read(
+    problem: NormalProblem, program: _Program, x: Array, multipliers: Array
+) -> tuple[Array, float]:
+    """Loads and approach. A bristle is in contact where h phi exceeds its multiplier.
+
+    The sign of their difference is decided, where phi itself is 0 to the solver's accuracy only.
+    """
+    n = len(problem)
+    h = problem.stiffness(program.box)
+    m = len(x) // n - 1
+    force = (program.constraints @ x)[: n * m].reshape(n, m)
+    pushed = multipliers[: n * m].reshape(n, m) * m / h[:, None]  # not positive
+    loads = np.maximum(force + pushed, 0.0).mean(axis=1)
+    if problem.load is None:
+        assert problem.approach is not None  # exactly one of the two
+        return loads, problem.approach
+    return loads * (problem.load / loads.sum()), -float(multipliers[-1])
+
+
+def _refuse_beyond(problem: NormalProblem, program: _Program, loads: Array, solver: str) -> None:
+    """Raise TooDenseError if the answer lies on a face where the convex range was cut."""
+    beyond = np.flatnonzero(program.cut & (loads >= program.box))
+    if len(beyond):
+        ratios = problem.shells[beyond] / problem.stiffness(loads[beyond], beyond)
+        raise TooDenseError(solver, problem.candidates[beyond], ratios, CUT)

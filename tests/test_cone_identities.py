@@ -1,0 +1,199 @@
+"""The proof of docs/theory/exact-cones.md, step by step, on the cones that the package sends.
+
+With the lift replaced by the powers of t every cone is a square; on the lift itself the tangents of
+the one-asperity energy are sums of cones with the weights below. Weights are shown not to be
+negative by their Bernstein coefficients, in rational arithmetic.
+"""
+
+from fractions import Fraction
+from math import comb
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from convexrough.cones import (
+    FIVE_CONES,
+    FIVE_CONES_LIMIT,
+    FOUR_CONES,
+    FOUR_CONES_LIMIT,
+    power_cones,
+)
+
+S, s, t = sp.symbols("S s t", nonnegative=True)
+LIFT = sp.symbols("y1 y2 y3 y4 y5 z")
+Y1, Y2, Y3, Y4, Y5, Z = LIFT
+CURVE = dict(zip(LIFT, (t, t**2, t**3, t**4, t**5, t**5 - t**6), strict=True))
+LIMIT_FOUR = sp.Rational(21, 25)
+
+# The tangent of (3/5) t^5 - (S/3) t^6 in t^3 at t = s:  lam t^3 - mu.
+ENERGY = sp.Rational(3, 5) * t**5 - S / 3 * t**6
+LIFTED_ENERGY = (sp.Rational(3, 5) - S / 3) * Y5 + S / 3 * Z
+LAM = s**2 - 2 * S / 3 * s**3
+MU = sp.Rational(2, 5) * s**5 - S / 3 * s**6
+
+# Weights of the cones, in the order of FOUR_CONES and FIVE_CONES.
+C = 4 * s / 5 - 2 * S / 3 * s**2
+D = 2 * s / 5 - S / 3 * s**2
+E = sp.Rational(3, 5) - S / 3 - 2 * S / 3 * s + C
+FOUR_WEIGHTS = (D, C, E, S / 3)
+
+A0 = sp.Rational(2, 5) * s**3 - S / 3 * s**4
+B1 = s**2 * (s + 2) * (sp.Rational(2, 5) - S / 3 * s)
+C2 = s * (s**2 + 2 * s + 3) * (sp.Rational(2, 5) - S / 3 * s)
+E3 = sp.Rational(3, 5) - S / 3 - 2 * S / 3 * s + C2
+FIVE_WEIGHTS = (A0, B1, C2, E3, S / 3)
+
+
+def forms(cones: Any) -> list[tuple[Any, Any, Any]]:
+    """x, y, w of every cone as expressions in the lift."""
+    columns = sp.Matrix([1, *LIFT])
+    return [tuple(sp.Matrix(cone).applyfunc(sp.nsimplify) * columns) for cone in cones]
+
+
+def tangents(cones: Any) -> list[Any]:
+    """x s^2 - 2 w s + y of every cone: not negative where x y >= w^2 and x, y >= 0.
+
+    s^2 in place of s for y4 >= y2^2, whose slots are powers of t^2.
+    """
+    slopes = [s**2 if x == 1 else s for x, _, _ in forms(cones)]
+    return [
+        x * slope**2 - 2 * w * slope + y
+        for (x, y, w), slope in zip(forms(cones), slopes, strict=True)
+    ]
+
+
+def bernstein(polynomial: Any, limit: Any) -> list[Fraction]:
+    """Its coefficients in the Bernstein basis of 0 <= s <= 1, 0 <= S <= limit.
+
+    The polynomial is a combination of products s^i (1-s)^(m-i) (S/limit)^j (1-S/limit)^(n-j) with
+    these, times binomials, as weights: none negative proves it not negative on the box.
+    """
+    scaled = sp.Poly(polynomial.subs(S, limit * S), s, S)
+    m, n = scaled.degree(s), scaled.degree(S)
+    power = {(i, j): scaled.coeff_monomial(s**i * S**j) for i in range(m + 1) for j in range(n + 1)}
+    return [
+        sum(
+            power[i, j] * Fraction(comb(a, i) * comb(b, j), comb(m, i) * comb(n, j))
+            for i in range(a + 1)
+            for j in range(b + 1)
+        )
+        for a in range(m + 1)
+        for b in range(n + 1)
+    ]
+
+
+def test_the_tangent() -> None:
+    """Equal to the energy at t = s, with its slope in the load, t^3."""
+    assert sp.expand((ENERGY - LAM * t**3 + MU).subs(t, s)) == 0
+    assert sp.expand(sp.diff(ENERGY, t).subs(t, s) - LAM * 3 * s**2) == 0
+
+
+@pytest.mark.parametrize("cones", [FOUR_CONES, FIVE_CONES])
+def test_powers_satisfy_the_cones_with_equality(cones: Any) -> None:
+    for x, y, w in forms(cones):
+        on_curve = [sp.expand(form.subs(CURVE)) for form in (x, y, w)]
+        assert sp.expand(on_curve[0] * on_curve[1] - on_curve[2] ** 2) == 0
+        for form in on_curve[:2]:
+            assert all(value >= 0 for value in bernstein(form.subs(t, s) + 0 * S, 1))
+    assert sp.expand(LIFTED_ENERGY.subs(CURVE) - ENERGY) == 0
+
+
+@pytest.mark.parametrize(
+    ("cones", "weights"), [(FOUR_CONES, FOUR_WEIGHTS), (FIVE_CONES, FIVE_WEIGHTS)]
+)
+def test_the_lifted_energy_less_a_tangent_is_a_sum_of_cones(cones: Any, weights: Any) -> None:
+    combination = sum(w * cone for w, cone in zip(weights, tangents(cones), strict=True))
+    assert sp.expand(LIFTED_ENERGY - LAM * Y3 + MU - combination) == 0
+
+
+def test_the_four_cone_identity_as_printed() -> None:
+    right = (t - s) ** 2 * (S / 3 * t**3 * (1 - t) + C * t**2 * (1 - t) + E * t**3)
+    right += D * (t**2 - s**2) ** 2
+    assert sp.expand(ENERGY - LAM * t**3 + MU - right) == 0
+
+
+def test_the_five_cone_identity_as_printed() -> None:
+    right = S / 3 * t**3 * (1 - t) + C2 * t**2 * (1 - t) + E3 * t**3
+    right += B1 * t * (1 - t) + A0 * (1 - t)
+    assert sp.expand(ENERGY - LAM * t**3 + MU - (t - s) ** 2 * right) == 0
+
+
+@pytest.mark.parametrize(
+    ("weights", "limit"), [(FOUR_WEIGHTS, LIMIT_FOUR), (FIVE_WEIGHTS, sp.Integer(1))]
+)
+def test_no_weight_is_negative(weights: Any, limit: Any) -> None:
+    for weight in weights:
+        assert min(bernstein(weight, limit)) >= 0
+    assert float(limit) in (FOUR_CONES_LIMIT, FIVE_CONES_LIMIT)
+
+
+def test_the_limits_are_sharp() -> None:
+    """At t = s = 1 the weight of y3 y5 >= y4^2 passes through 0 at the limit, downwards in S."""
+    assert sp.expand(E.subs(s, 1) - sp.Rational(5, 3) * (LIMIT_FOUR - S)) == 0
+    assert sp.expand(E3.subs(s, 1) - 3 * (1 - S)) == 0
+    # Beyond S = 1 there is nothing left to answer: the energy itself is not convex in the load.
+    slope = sp.diff(LAM, s)
+    assert sp.expand(slope.subs(s, 1) - 2 * (1 - S)) == 0
+    factored = (1 - s) * (5 * s**3 + 9 * s**2 + 12 * s + 4) / 15
+    assert sp.expand(E3.subs(S, 1) - factored) == 0
+
+
+def test_the_four_weights_are_the_only_ones() -> None:
+    """A tight dual certificate at s uses each cone's tangent there: only these weights fit.
+
+    So where e < 0 the four-cone program lies strictly below the energy, and 21/25 is the limit of
+    the cones and not of the proof.
+    """
+    unknown = sp.symbols("w1 w2 w3 w4")
+    combination = sum(w * cone for w, cone in zip(unknown, tangents(FOUR_CONES), strict=True))
+    defect = sp.Poly(sp.expand(LIFTED_ENERGY - LAM * Y3 + MU - combination), *LIFT)
+    solution = sp.solve(defect.coeffs(), unknown, dict=True)
+    assert len(solution) == 1
+    for w, weight in zip(unknown, FOUR_WEIGHTS, strict=True):
+        assert sp.simplify(solution[0][w] - weight) == 0
+
+
+def lowest(number: float, at: float, names: int) -> float:
+    """How far the lifted energy comes below the tangent at `at`, by Clarabel."""
+    import clarabel
+    from scipy.sparse import csc_matrix
+
+    lam, mu = (float(f.subs({S: number, s: at})) for f in (LAM, MU))
+    rows = power_cones([np.array([column]) for column in range(names)], names)
+    objective = np.zeros(names)
+    objective[[-4, -2, -1]] = -lam, 3 / 5 - number / 3, number / 3
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    cones = [clarabel.SecondOrderConeT(3)] * rows.cones
+    quadratic, matrix = csc_matrix((names, names)), csc_matrix(rows.matrix)
+    solver = clarabel.DefaultSolver(quadratic, objective, matrix, rows.constant, cones, settings)
+    return float(solver.solve().obj_val) + mu
+
+
+@pytest.mark.parametrize(
+    ("number", "names", "exact"),
+    [(0.84, 5, True), (0.9, 5, False), (1.0, 5, False), (0.9, 6, True), (1.0, 6, True)],
+)
+def test_the_limits_in_a_solver(number: float, names: int, exact: bool) -> None:
+    below = min(lowest(number, at, names) for at in (0.5, 0.9, 0.97, 0.99))
+    assert below > -1e-7 if exact else below < -1e-5
+
+
+def test_rows_of_many_lifts_are_those_of_each() -> None:
+    """Lifts scattered among other variables: every row says what its cone says."""
+    rng = np.random.default_rng(1)
+    for cones, names in ((FOUR_CONES, 5), (FIVE_CONES, 6)):
+        n, width = 4, 40
+        columns = rng.permutation(width)[: names * n].reshape(names, n)
+        rows = power_cones(list(columns), width)
+        assert rows.cones == len(cones) * n
+        x = rng.normal(size=width)
+        slack = (rows.constant - rows.matrix @ x).reshape(n, len(cones), 3)
+        for lift in range(n):
+            values = np.zeros(7)
+            values[0], values[7 - names :] = 1.0, x[columns[:, lift]]
+            product, other, mean = np.moveaxis(cones @ values, 1, 0)
+            expected = np.stack((product + other, product - other, 2 * mean), axis=1)
+            np.testing.assert_allclose(slack[lift], expected, atol=1e-14)

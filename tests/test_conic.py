@@ -1,0 +1,289 @@
+"""The cone programs against 50 digits, Newton's method, the certificate and each other."""
+
+import sys
+from dataclasses import dataclass, replace
+from typing import Any
+
+import multiprecision
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, reference
+
+import convexrough as cr
+from convexrough.normal import NormalProblem
+from convexrough.solvers import Conic, ConicCVXPY, Newton, Solution, TooDenseError
+from convexrough.solvers.lifted import Answer, Boxes, solve_in
+
+SOLVERS = [Conic(), ConicCVXPY()]
+RAW = [Conic(newton_step=False), ConicCVXPY(newton_step=False)]
+CONTROLS = ["approach", "load"]
+
+
+def by_name(value: Any) -> str:
+    return value.name if hasattr(value, "name") else str(value)
+
+
+def problem_of(scene: cr.Scene, approach: float, control: str = "approach") -> NormalProblem:
+    """Under load control with the load of that approach: one solution, found in two ways."""
+    if control == "load":
+        return NormalProblem.assemble(scene, load=cr.press(scene, approach=approach).load)
+    return NormalProblem.assemble(scene, approach=approach)
+
+
+def hexagonal(density: float, tip_radius: float = 0.02) -> cr.Scene:
+    """The paper's sphere and its asperities, made smaller and put closer."""
+    asperities = cr.Asperities.hexagonal(
+        spacing=0.0025 / density, tip_radius=tip_radius / density**2, within=0.0102
+    )
+    return cr.Scene(1.0, asperities, MATERIAL)
+
+
+def disagreement(found: Solution, expected: Solution) -> float:
+    """Largest difference of the loads over the largest load."""
+    return float(np.abs(found.loads - expected.loads).max() / expected.loads.max())
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("solver", SOLVERS, ids=by_name)
+@pytest.mark.parametrize("name", NAMED)
+def test_named_scenes(name: str, solver: cr.solvers.Solver, control: str) -> None:
+    """Judged by the certificate, and by the proved multiprecision solution."""
+    scene, approach = NAMED[name]
+    prescribed = {control: getattr(cr.press(scene, approach=approach), control)}
+    contact = cr.press(scene, **prescribed, solver=solver)
+    assert contact.solver == solver.name
+    assert contact.certificate.holds
+    assert contact.certificate.scope == "global"
+    assert contact.certificate.load_error < 1e-10 * contact.loads.max()
+    assert contact.certificate.duality_gap < 1e-15 * contact.load * contact.approach
+    exact = reference(scene, **prescribed)
+    errors = np.abs(multiprecision.errors(contact.loads, exact.loads))
+    assert errors.max() < 1e-12 * contact.loads.max()
+    assert (errors <= contact.certificate.load_errors).all()
+    drift = abs(float(multiprecision.errors([contact.approach], [exact.approach])[0]))
+    assert drift < 1e-12 * approach
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("name", NAMED)
+def test_what_the_solver_itself_finds(name: str, control: str) -> None:
+    """Without the Newton step: 1e-7, the right active set, and two ways to Clarabel alike."""
+    problem = problem_of(*NAMED[name], control)
+    expected = Newton().solve(problem)
+    direct, modelled = (solver.solve(problem) for solver in RAW)
+    for found in (direct, modelled):
+        assert disagreement(found, expected) < 1e-7
+        assert ((found.loads > 0) == (expected.loads > 0)).all()
+        assert abs(found.approach - expected.approach) < 1e-7
+    assert disagreement(direct, modelled) < 1e-7
+
+
+@pytest.mark.parametrize(("density", "contacts"), [(1, 37), (2.31, 199), (4.18, 637)])
+def test_larger_scenes(density: float, contacts: int) -> None:
+    problem = problem_of(hexagonal(density), PAPER_APPROACH)
+    expected = Newton().solve(problem)
+    assert (expected.loads > 0).sum() == contacts
+    solver = Recorded()
+    assert disagreement(solver.solve(problem), expected) < 1e-12
+    raw = expected.loads * 0
+    raw[solver.members[0]] = solver.answers[0].loads
+    assert np.abs(raw - expected.loads).max() < 1e-7 * expected.loads.max()
+
+
+@dataclass(frozen=True)
+class Recorded(Conic):
+    """Keeps what Clarabel answered, so that one solve serves two tests."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "answers", [])
+        object.__setattr__(self, "members", [])
+
+    answers: Any = None
+    members: Any = None
+
+    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
+        self.answers.append(super().answer(problem, boxes))
+        self.members.append(boxes.members)
+        return self.answers[-1]
+
+
+@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("control", CONTROLS)
+def test_gaps_and_approach_from_the_multipliers(name: str, control: str) -> None:
+    scene, approach = NAMED[name]
+    problem = problem_of(scene, approach, control)
+    model = ConicCVXPY().model(problem)
+    model.solve()
+    contact = cr.press(scene, approach=approach)
+    gaps = contact.gaps[problem.candidates[model.boxes.members]]
+    assert_allclose(model.gaps * problem.units.length, gaps, atol=1e-7 * contact.gaps.max())
+    assert model.approach * problem.units.length == pytest.approx(approach, rel=1e-7)
+    # y2 is the contact area, in that of the box.
+    y2 = model.variables["y2"].value[model.loads > 1e-3]
+    area = np.cbrt(model.loads / model.boxes.loads)[model.loads > 1e-3] ** 2
+    assert_allclose(y2, area, atol=1e-6)
+
+
+@pytest.mark.parametrize("five", [False, True])
+@pytest.mark.parametrize("control", CONTROLS)
+def test_the_model_is_convex_by_the_rules(five: bool, control: str) -> None:
+    model = ConicCVXPY().model(problem_of(paper(), PAPER_APPROACH, control), five=five)
+    assert model.program.is_dcp()
+    assert model.program.is_dpp()
+    names = ["p", *(f"y{power}" for power in range(1 if five else 2, 6)), "z"]
+    assert sorted(model.variables) == names
+    expected = Newton().solve(model.normal)
+    assert disagreement(model.solve(), expected) < 1e-12
+
+
+def test_a_model_is_solved_again_at_another_approach() -> None:
+    problem = problem_of(paper(), PAPER_APPROACH)
+    model = ConicCVXPY().model(problem)
+    for part in (1.0, 0.9, 0.2, 0.7):
+        expected = cr.press(paper(), approach=part * PAPER_APPROACH)
+        found = model.solve(part * problem.ceiling)
+        assert_allclose(
+            problem.to_scene(found.loads) * problem.units.force,
+            expected.loads,
+            atol=1e-12 * expected.loads.max(),
+        )
+    with pytest.raises(cr.InputError, match="approach: found"):
+        model.solve(1.01 * problem.ceiling)
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=by_name)
+@pytest.mark.parametrize("control", CONTROLS)
+def test_five_cones_where_four_do_not_reach(solver: Any, control: str) -> None:
+    """Blunt asperities, of which one or more are between S = 21/25 and 1."""
+    scene = hexagonal(1, tip_radius=0.35)
+    problem = problem_of(scene, PAPER_APPROACH, control)
+    expected = Newton().solve(problem)
+    assert 0.84 < problem.convexity_number(expected.loads) < 1
+    four = Boxes.choose(problem)
+    assert four.S.max() == pytest.approx(21 / 25)
+    with pytest.raises(TooDenseError, match=r"asperity: 0 \(0\.9.*less than 0.84"):
+        solve_in(solver, problem, four)
+    assert disagreement(solver.solve(problem), expected) < 1e-12
+    assert disagreement(replace(solver, newton_step=False).solve(problem), expected) < 1e-6
+    contact = cr.press(scene, approach=PAPER_APPROACH, solver=solver)
+    assert contact.certificate.scope == "local"
+    assert contact.certificate.holds
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_cut_boxes_that_stop_nobody(control: str) -> None:
+    """A priori up to S = 1.4, at the solution 0.6: four cones suffice, and that is checked."""
+    problem = problem_of(hexagonal(1, tip_radius=0.12), PAPER_APPROACH, control)
+    boxes = Boxes.choose(problem)
+    assert boxes.cut.any()
+    assert disagreement(solve_in(Conic(), problem, boxes), Newton().solve(problem)) < 1e-12
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=by_name)
+@pytest.mark.parametrize("control", CONTROLS)
+def test_too_dense_is_refused(solver: Any, control: str) -> None:
+    """The refusal names exactly the asperities that Newton's method finds beyond the range."""
+    scene = hexagonal(1, tip_radius=0.6)
+    problem = problem_of(scene, PAPER_APPROACH, control)
+    loads = Newton().solve(problem).loads
+    theta = problem.shells / problem.stiffness(loads)
+    with pytest.raises(TooDenseError, match=r"0 \(1\.\d+\).*expected less than 1$") as refusal:
+        solver.solve(problem)
+    assert isinstance(refusal.value, cr.ConvexroughError)
+    assert set(problem.candidates[theta > 1]) <= set(refusal.value.asperities)
+    assert (refusal.value.ratios > 1 - 1e-6).all()
+    assert refusal.value.ratios.max() == pytest.approx(theta.max(), rel=0.15)
+
+
+def test_a_load_that_no_convex_state_carries_is_refused() -> None:
+    load = cr.press(hexagonal(1, tip_radius=0.02), approach=PAPER_APPROACH).load
+    with pytest.raises(TooDenseError, match="less than 1"):
+        cr.press(hexagonal(1, tip_radius=0.02), load=1e4 * load, solver=Conic())
+
+
+@settings(max_examples=30, deadline=None)
+@given(random_scenes(crowding=1.4), st.sampled_from(CONTROLS))
+def test_any_scene_is_solved_or_refused(drawn: tuple[cr.Scene, float], control: str) -> None:
+    """Solved where Newton's answer is in the convex range, and refused where it is not."""
+    scene, approach = drawn
+    if cr.press(scene, approach=approach).load == 0:
+        return
+    problem = problem_of(scene, approach, control)
+    expected = Newton().solve(problem)
+    theta = problem.convexity_number(expected.loads)
+    try:
+        found = Conic().solve(problem)
+    except TooDenseError:
+        assert theta > 1 - 1e-6
+    else:
+        assert theta < 1 + 1e-6
+        assert disagreement(found, expected) < 1e-11
+
+
+@pytest.mark.parametrize("solver", SOLVERS + RAW, ids=by_name)
+@pytest.mark.parametrize("control", CONTROLS)
+def test_a_single_asperity(solver: Any, control: str) -> None:
+    """No neighbour: S = 0, and no bound on its box but its own."""
+    scene = cr.Scene(2.0, cr.Asperities([[0.0, 0.0]], 0.5), MATERIAL)
+    approach = 1e-3
+    load = 4 / 3 * np.sqrt(0.4) * approach**1.5
+    contact = cr.press(
+        scene, **{control: {"approach": approach, "load": load}[control]}, solver=solver
+    )
+    rel = 1e-14 if solver.newton_step else 1e-4
+    assert contact.loads[0] == pytest.approx(load, rel=rel)
+    assert contact.approach == pytest.approx(approach, rel=rel)
+
+
+@pytest.mark.parametrize(
+    ("solver", "library"),
+    [(Conic(), "clarabel"), (ConicCVXPY(), "cvxpy")],
+    ids=by_name,
+)
+def test_a_missing_library(solver: Any, library: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(cr.SolverError, match=rf"^{solver.name[:5]}.*pip install {library}$"):
+        cr.press(paper(), approach=PAPER_APPROACH, solver=solver)
+
+
+def test_cvxpy_without_clarabel(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = ConicCVXPY().model(problem_of(paper(), PAPER_APPROACH))
+    monkeypatch.setitem(sys.modules, "clarabel", None)
+    with pytest.raises(cr.SolverError, match=r"^conic in CVXPY.*clarabel"):
+        model.solve()
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=by_name)
+def test_a_solver_that_stops_early(solver: Any) -> None:
+    few = replace(solver, max_iterations=3)
+    with pytest.raises(cr.SolverError, match=r"^conic.*(MaxIterations|user_limit)"):
+        cr.press(paper(), approach=PAPER_APPROACH, solver=few)
+
+
+@dataclass(frozen=True)
+class Wrong(Conic):
+    """A solver that claims to have solved it."""
+
+    factor: float = 1.0
+
+    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
+        true = super().answer(problem, boxes)
+        return true._replace(loads=self.factor * true.loads)
+
+
+@pytest.mark.parametrize("factor", [0.99, 0.0, np.nan])
+def test_wrong_loads_are_not_returned(factor: float) -> None:
+    problem = problem_of(paper(), PAPER_APPROACH)
+    solver = Wrong(newton_step=False, factor=factor)
+    with pytest.raises(cr.SolverError, match=r"^conic: loads"):
+        solver.solve(problem)
+
+
+@pytest.mark.parametrize("solver", [Conic, ConicCVXPY])
+def test_settings_are_checked(solver: Any) -> None:
+    with pytest.raises(cr.InputError, match="tolerance"):
+        solver(tolerance=0.0)
