@@ -5,6 +5,7 @@ from convexrough.certificate import Certificate, certify
 from convexrough.contact import Contact, press
 from convexrough.cycle import Cycle, Loop, cycle, cycles
 from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
+from convexrough.friction import VectorShearState, shear_vector
 from convexrough.history import History, history
 from convexrough.scene import Asperities, Material, Scene
 from convexrough.scene_file import SceneFile, read_scene
@@ -30,6 +31,7 @@ __all__ = [
     "ShearState",
     "SmoothSphere",
     "SolverError",
+    "VectorShearState",
     "certify",
     "cycle",
     "cycles",
@@ -38,6 +40,7 @@ __all__ = [
     "press",
     "read_scene",
     "shear",
+    "shear_vector",
     "smooth",
     "solvers",
 ]

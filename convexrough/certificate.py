@@ -51,8 +51,9 @@ class Certificate:
     gap_errors : [length] bounds on |gap - solution|
     approach : [length] prescribed, or the one that fits the loads best
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
-    duality_gap : [force length] bound on the energy of these loads above the least in the box, by
-        a dual point made from the loads alone; 0 to rounding at a solution
+    duality_gap : [force length] bound on the energy of these loads above that of the solution, by
+        a dual point made from the loads alone; 0 to rounding at a solution, infinite where the
+        shells do not prove the energy convex up to there
     """
 
     scope: Scope
@@ -155,7 +156,7 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
         gap_errors=frozen(error * problem.units.length),
         approach=fit.approach * problem.units.length,
         approach_error=approach_error * problem.units.length,
-        duality_gap=problem.duality_gap(loads, fit.displacement, fit.approach, box.loads)
+        duality_gap=problem.duality_gap(loads, fit.displacement, fit.approach, near)
         * (problem.units.force * problem.units.length),
     )
 
@@ -193,7 +194,7 @@ def _scaled_to(load: float, given: Array) -> Array:
     if total == 0.0:
         expected = "a load on some asperity that could touch, as the total is prescribed"
         raise InputError("loads", found="none", expected=expected)
-    return given * (load / total)
+    return given / total * load
 
 
 def _fit(problem: NormalProblem, loads: Array) -> _Fit:
@@ -269,12 +270,13 @@ def _screened(
     """Of the asperities that cannot touch: indices, delta = D - A P, its rounding, the spread."""
     scene, length = problem.scene, problem.units.length
     others = np.setdiff1d(np.arange(len(scene)), problem.candidates, assume_unique=True)
-    for block, rows in problem.influence.elsewhere(scene.contact_points[others]):
+    for block, rows, error in problem.influence.elsewhere(scene.contact_points[others]):
         index = others[block]
         product, offsets = rows @ loads, scene.offsets[index] / length
-        rounding = 2 * problem.influence.product_error * product
+        rounding = error * product + scene.offset_errors[index] / length
         rounding += SUM_ROUNDOFFS * ROUNDOFF * (product + np.abs(offsets) + abs(approach))
-        yield index, approach + offsets - product, rounding, np.sqrt(rows**2 @ variances)
+        reach = np.sqrt(rows**2 @ variances) * (1.0 + error)
+        yield index, approach + offsets - product, rounding, reach
 
 
 def _unproved(problem: NormalProblem, loads: Array, fit: _Fit) -> Certificate:

@@ -53,6 +53,8 @@ def array(what: str, values: ArrayLike, *, length: int | None = None, sign: str 
     A number stands for a vector of `length` equal values.
     """
     try:
+        if np.iscomplexobj(values):
+            raise TypeError("complex")
         vector = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(what, found=repr(values)[:60], expected="numbers") from error

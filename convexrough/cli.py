@@ -65,7 +65,7 @@ maximum = [0.1, 0.37, 0.5]               # of f P
 fractions = [0.6, -0.2, 0.3, -0.6, 0.6]  # of f P
 
 # [solver]
-# name = "newton"
+# name = "newton"            # or "conic", "conic_cvxpy", "bristles"
 """
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -139,6 +139,48 @@ def verify(scene: Path, loads: Path, as_json: bool) -> int:
         certificate = certify(file.scene, values, approach=file.approach, load=file.load)
     summary = certificate_summary(certificate, values)
     return _say(summary, as_json, units=file.units)
+
+
+@program.command()
+@click.argument("scene", type=_PATH)
+@_json
+def compare(scene: Path, as_json: bool) -> int:
+    """Run every formulation and solver on one scene: agreement, certificate, time.
+
+    Exit status 3 also where a solver refuses the scene, or where two certified answers exclude each
+    other: that would be a mistake in the mathematics.
+    """
+    from convexrough.compare import compare as compare_solvers
+    from convexrough.report import (
+        comparison_summary,
+        comparison_warnings,
+        describe_comparison,
+        to_json,
+    )
+    from convexrough.scene_file import read_scene
+
+    file = read_scene(scene)
+    with _blamed_on(scene), _progress(f"pressing on {len(file.scene)} asperities") as show:
+        comparison = compare_solvers(
+            file.scene,
+            approach=file.approach,
+            load=file.load,
+            announce=lambda name: show(f"pressing on {len(file.scene)} asperities: {name}"),
+        )
+    summary = comparison_summary(comparison)
+    if as_json:
+        click.echo(to_json(summary))
+    else:
+        length, force = file.units
+        click.echo("\n".join(describe_comparison(summary, length_unit=length, force_unit=force)))
+    for warning in comparison_warnings(summary):
+        _say_aside("warning", warning)
+    outcomes = {entry.outcome for entry in comparison.entries}
+    if "failed" in outcomes and not comparison.contradictions:
+        return SOLVER_FAILED
+    if comparison.contradictions or "refused" in outcomes or not comparison.certified:
+        return NOT_CERTIFIED
+    return DONE
 
 
 @program.command()
@@ -238,12 +280,15 @@ def _blamed_on(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _progress(message: str) -> Iterator[None]:
-    """A moving line on standard error while the body runs, if that is a terminal."""
+def _progress(message: str) -> Iterator[Callable[[str], object]]:
+    """A moving line on standard error while the body runs, if that is a terminal.
+
+    Yields what changes the message.
+    """
     if not sys.stderr.isatty():
-        yield
+        yield lambda message: None
         return
     from rich.console import Console
 
-    with Console(stderr=True).status(message):
-        yield
+    with Console(stderr=True).status(message) as status:
+        yield status.update

@@ -105,7 +105,7 @@ def press(
 
 def _model_limits(scene: Scene, loads: Array, radii: Array, approach: float) -> tuple[float, float]:
     """How far the point-force model is stretched: `model_error` and `crowding` of Contact."""
-    touching = np.flatnonzero(loads)
+    touching = np.flatnonzero((loads > 0) & (approach + scene.offsets > 0))
     if len(touching) < 2:
         return 0.0, 0.0
     points, a = scene.contact_points[touching], radii[touching]

@@ -74,8 +74,8 @@ class Cycle:
 
     def loop(self, points: int = 200) -> Loop:
         """The loop through about `points` points, as many down as up, denser at the ends."""
-        if points < 4:
-            raise InputError("points", found=points, expected="at least 4")
+        if not isinstance(points, int) or points < 4:
+            raise InputError("points", found=points, expected="a whole number, at least 4")
         middle, amplitude = (self.maximum + self.minimum) / 2, (self.maximum - self.minimum) / 2
         down = middle + amplitude * np.cos(np.linspace(0.0, np.pi, points // 2 + 1))
         down[0], down[-1] = self.maximum, self.minimum
@@ -109,7 +109,7 @@ def cycles(contact: Contact, maximum: ArrayLike, minimum: ArrayLike | None = Non
     lower = -upper
     if minimum is not None:
         lower = checks.array("minimum", minimum, length=len(upper))
-        checks.bearable("minimum", lower, limit)
+        lower = checks.bearable("minimum", lower, limit)
     if (upper < lower).any():
         i = int(np.argmax(upper < lower))
         expected = f"at least the minimum, {lower[i]:g}; by default that is its negative"
@@ -121,7 +121,7 @@ def cycles(contact: Contact, maximum: ArrayLike, minimum: ArrayLike | None = Non
     problem = family.problem
     totals = problem.limited((upper - lower) / (2.0 * family.force_unit))
     states = family.states(totals)
-    bounds = judge_states(problem, contact.certificate, states)
+    bounds = judge_states(problem, contact, states)
     slip = family.spread(family.partial_slip(states), family.energy_unit)
     slide = family.spread(family.sliding(states), family.energy_unit)
     energies = (slip + slide).sum(axis=1)

@@ -21,6 +21,8 @@ from convexrough import checks
 from convexrough.checks import Array, frozen
 from convexrough.contact import Contact
 from convexrough.family import Family
+from convexrough.normal import SAFETY
+from convexrough.shear_certificate import judge_states
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +31,7 @@ class History:
 
     applied       : (m,) Q [force]
     displacements : (m,) X [length], both bodies
+    displacement_errors : (m,) [length] proved bounds on |X - solution|, infinite without proof
     forces        : (m, n) Q_i [force]
     asperity_displacements : (m, n) X_i + slip_i [length]
     slips         : (m, n) gross slip [length]
@@ -38,6 +41,7 @@ class History:
     contact: Contact
     applied: Array
     displacements: Array
+    displacement_errors: Array
     forces: Array
     asperity_displacements: Array
     slips: Array
@@ -60,7 +64,7 @@ def history(contact: Contact, *, forces: ArrayLike) -> History:
     if contact.load == 0.0 or len(applied) == 0:
         none = frozen(np.zeros((len(applied), len(contact.scene))))
         zero = frozen(np.zeros(len(applied)))
-        return History(contact, applied, zero, none, none, none, zero)
+        return History(contact, applied, zero, zero, none, none, none, zero)
     family = Family(contact)
     steps = _remember(applied / family.force_unit)
     totals = [step.total for step in steps]
@@ -69,17 +73,21 @@ def history(contact: Contact, *, forces: ArrayLike) -> History:
         family.problem.limited(np.array(totals + costs)), return_inverse=True
     )
     states = family.problem.solve(distinct)
+    bounds = judge_states(family.problem, contact, states)
     w = (family.partial_slip(states) + family.sliding(states)).sum(axis=1)
     deflections = family.problem.deflections(states.increments) + states.slips
 
     looked_up = (states.rises[:, None], states.increments, deflections, states.slips)
     results = [np.empty((len(steps), field.shape[1])) for field in looked_up]
     energy, spent = np.empty(len(steps)), iter(back[len(steps) :])
+    errors = np.empty(len(steps))
     lost = 0.0
     for m, step in enumerate(steps):
         for result, field in zip(results, looked_up, strict=True):
             base = result[step.base] if step.base >= 0 else 0.0
             result[m] = base + step.scale * field[back[m]]
+        moved = abs(step.scale) * bounds.rises[back[m]] if step.scale else 0.0
+        errors[m] = (errors[step.base] if step.base >= 0 else 0.0) + moved
         lost += sum(factor * w[next(spent)] for factor, _ in step.lost)
         energy[m] = lost
     rises, increments, deflections, slips = results
@@ -87,6 +95,7 @@ def history(contact: Contact, *, forces: ArrayLike) -> History:
         contact=contact,
         applied=applied,
         displacements=frozen(rises[:, 0] * family.length_unit),
+        displacement_errors=frozen(errors * family.length_unit * (1 + SAFETY)),
         forces=frozen(family.spread(increments, family.force_unit)),
         asperity_displacements=frozen(family.spread(deflections, family.length_unit)),
         slips=frozen(family.spread(slips, family.length_unit)),

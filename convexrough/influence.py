@@ -33,15 +33,25 @@ def inverse_distances(points: Array, others: Array) -> Array:
     return inverse
 
 
-def shell_radii(points: Array) -> Array:
+def shell_radii(points: Array, point_error: float = 0.0) -> Array:
     """(n,) [length] radii s_i with s_i + s_j <= r_ij: half the distance to the nearest neighbour.
 
     With them A + diag(1 / (pi E* s_i)) is positive semidefinite (docs/theory/convexity.md).
-    A single asperity has no neighbour and an infinite shell.
+    A single asperity has no neighbour and an infinite shell. Coordinates may be off by point_error.
     """
     if len(points) < 2:
         return np.full(len(points), np.inf)
-    return nearest_distances(points) / 2.0
+    return np.maximum(nearest_distances(points) / 2.0 - 1.5 * point_error, 0.0)
+
+
+def _entry_error(point_error: float, inverse: Array) -> float:
+    """Relative error of a computed scale / r, for the smallest of these distances r.
+
+    Each end may be off by sqrt(2) point_error, the distance by x r: 1/r by up to x / (1 - x).
+    """
+    x = 2.0 * np.sqrt(2.0) * point_error * float(inverse.max(initial=0.0))
+    moved = x / (1.0 - x) if x < 1 else np.inf
+    return 1.01 * (ENTRY_ROUNDOFFS * ROUNDOFF + moved)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,20 +61,21 @@ class DenseInfluence:
     points      : (n, 2) [length]
     scale       : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
     point_error : [length] bound on the error of each coordinate of the points
+    entry_error : bound on the relative error of each A_ij
     """
 
     points: Array
     scale: float
     matrix: Array
+    point_error: float
     entry_error: float
 
     @classmethod
     def assemble(cls, points: Array, scale: float, point_error: float = 0.0) -> DenseInfluence:
         matrix = inverse_distances(points, points)
-        # Moving both ends by point_error sqrt(2) each changes 1/r by at most this, relatively.
-        moved = 2.0 * np.sqrt(2.0) * point_error * float(matrix.max(initial=0.0))
+        entry_error = _entry_error(point_error, matrix)
         matrix *= scale
-        return cls(points, scale, matrix, 1.01 * (ENTRY_ROUNDOFFS * ROUNDOFF + moved))
+        return cls(points, scale, matrix, point_error, entry_error)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -91,12 +102,18 @@ class DenseInfluence:
         """(n,)  sqrt(sum_j A_ij^2 v_j): how far an error of the loads moves each displacement."""
         return np.sqrt(self.matrix**2 @ variances)
 
-    def elsewhere(self, points: Array) -> Iterator[tuple[slice, Array]]:
-        """Rows of the coupling from these asperities to other points, in blocks of rows."""
+    def elsewhere(self, points: Array) -> Iterator[tuple[slice, Array, float]]:
+        """Rows of the coupling from these asperities to other points, in blocks of rows.
+
+        With each block a bound on the relative error of its products with loads not negative.
+        """
         rows = max(1, 2**22 // max(1, len(self)))
         for start in range(0, len(points), rows):
             block = slice(start, min(start + rows, len(points)))
-            yield block, self.scale * inverse_distances(points[block], self.points)
+            inverse = inverse_distances(points[block], self.points)
+            entry_error = _entry_error(self.point_error, inverse)
+            error = 1.01 * ((len(self) + 1) * ROUNDOFF + entry_error)
+            yield block, self.scale * inverse, error
 
     @property
     def _block(self) -> int:

@@ -86,7 +86,7 @@ class NormalProblem:
     ) -> NormalProblem:
         """Screen, scale and couple. `approach` [length] or `load` [force], exactly one."""
         checks.exactly_one("approach", approach, "load", load)
-        errors = 6 * ROUNDOFF * (np.abs(scene.asperities.heights) + scene.drops)
+        errors = scene.offset_errors
         modulus = scene.material.contact_modulus
         coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
         if approach is not None:
@@ -113,7 +113,7 @@ class NormalProblem:
             coefficients=coefficients[candidates] * units.local,
             offsets=scene.offsets[candidates] / units.length,
             offset_errors=errors[candidates] / units.length,
-            shells=scale / shell_radii(points),
+            shells=_shells(points, scale, scene.point_error),
             influence=DenseInfluence.assemble(points, scale, scene.point_error),
             approach=None if approach is None else approach / units.length,
             load=None if load is None else load / units.force,
@@ -160,7 +160,7 @@ class NormalProblem:
         distances = self.scene.asperities.distances[self.candidates]
         sunk = hertz.surface_displacement(distances, a, radius) / self.units.length
         indentation: Array = self.offsets - sunk
-        return indentation + shift_to_load(indentation, self.coefficients, load)
+        return shifted_to_load(indentation, self.coefficients, load)
 
     def convexity_number(self, loads: Array) -> float:
         """theta = max 2 a_i / (pi s_i) over the box 0 <= P <= loads; Phi is convex where < 1.
@@ -179,8 +179,8 @@ class NormalProblem:
             min Phi >= -P'MP / 2 + sum min over 0 <= x <= box_i of [h_i(x) - (D - M P)_i x].
 
         Phi(P) less that is a sum of terms that are not negative. Under load control `approach` is
-        any estimate of the multiplier and `loads` must add up to the load. Infinite where the box
-        is not convex.
+        any estimate of the multiplier and `loads` must add up to the load. Infinite where the
+        shells do not prove the box convex. Rounding is counted, so it is never quite 0.
 
         displacement : A P
         """
@@ -206,7 +206,9 @@ class NormalProblem:
         def charge(x: Array) -> Array:
             return np.asarray(x * (0.6 * hertz.indentation(x, k) - shells * x / 2.0 - slope))
 
-        return float(np.maximum(charge(loads) - charge(best), 0.0).sum())
+        size = 0.6 * k_box + shell_box + np.abs(slope)
+        rounding = 32 * ROUNDOFF * float(((loads + best) * size).sum())
+        return float(np.maximum(charge(loads) - charge(best), 0.0).sum()) + rounding
 
     def overhang(self, weights: Array, displacement: Array) -> float:
         """Upper bound on D0 at every solution of load control, from any trial loads.
@@ -215,6 +217,7 @@ class NormalProblem:
         displacement : A times weights
         """
         assert self.load is not None
+        displacement = displacement * (1.0 + self.influence.product_error)
         return approach_bound(weights, displacement, self.coefficients, self.offsets, self.load)
 
     def to_scene(self, values: NDArray[Any]) -> Array:
@@ -229,21 +232,30 @@ def fits_densely(count: int) -> None:
     checks.fits_in_memory("asperities that could touch", count, 5 * 8 * count)
 
 
-def shift_to_load(indentation: Array, coefficients: Array, load: float) -> float:
-    """The shift tau for which  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
+def _shells(points: Array, scale: float, point_error: float) -> Array:
+    """(n,) scale / s_i, infinite where rounding leaves no shell."""
+    with np.errstate(divide="ignore"):
+        shells: Array = scale / shell_radii(points, point_error)
+    return shells
 
-    The sum grows and is convex in tau, so Newton's method from the right descends on the root.
+
+def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Array:
+    """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
+
+    The sum grows and is convex in tau, so Newton's method from the right descends on the root. The
+    shift is counted from the highest, so that loads of any size come out to all digits.
     """
+    indentation = indentation - indentation.max()
     single = hertz.indentation(load, coefficients)  # one asperity alone would carry it all
     shift = float((single - indentation).min())
     for _ in range(200):
         loads = hertz.load(indentation + shift, coefficients)
         slope = float(np.sum(np.cbrt(loads) / coefficients)) * 1.5
         step = (float(loads.sum()) - load) / slope
-        if not step > 4 * ROUNDOFF * (abs(shift) + float(single.min())):
+        if not step > 4 * ROUNDOFF * shift:
             break
         shift -= step
-    return shift
+    return indentation + shift
 
 
 def approach_bound(
@@ -258,10 +270,10 @@ def approach_bound(
     total = float(weights.sum())
     q, c = weights / total, displacement / total
     alpha = q * coefficients
-    active = alpha > 0
+    active = alpha**3 > 0  # others count for nothing
     cubes, c_active = alpha[active] ** 3, c[active]
     # The best lambda solves (8/27) sum alpha^3 / (lambda - c)^3 = L; Newton from the left.
-    height = float((c_active + np.cbrt(8.0 * cubes / (27.0 * load))).max())
+    height = float((c_active + np.cbrt(8.0 * cubes / (27.0 * load))).max()) * (1 + SAFETY)
     for _ in range(100):
         excess = cubes / (height - c_active) ** 3
         step = (float(excess.sum()) - 27.0 * load / 8.0) / float(
@@ -289,14 +301,16 @@ def highest_approach(scene: Scene, load: float) -> float:
     a = float(hertz.contact_radius(load, modulus, radius))
     sunk = hertz.surface_displacement(scene.asperities.distances, a, radius)
     indentation = scene.offsets - sunk
-    weights = hertz.load(indentation + shift_to_load(indentation, coefficients, load), coefficients)
+    weights = hertz.load(shifted_to_load(indentation, coefficients, load), coefficients)
     touching = np.flatnonzero(weights)
     fits_densely(len(touching))
     points = scene.contact_points
-    sources = DenseInfluence(points[touching], 1.0 / (np.pi * modulus), np.empty((0, 0)), 0.0)
+    sources = DenseInfluence(
+        points[touching], 1.0 / (np.pi * modulus), np.empty((0, 0)), scene.point_error, 0.0
+    )
     displacement = np.empty(len(scene))
-    for block, rows in sources.elsewhere(points):
-        displacement[block] = rows @ weights[touching]
+    for block, rows, error in sources.elsewhere(points):
+        displacement[block] = rows @ weights[touching] * (1.0 + error)
     bound = approach_bound(weights, displacement, coefficients, scene.offsets, load)
     if not np.isfinite(bound):
         raise InputError("load", found=load, expected="a load this scene's units can hold")

@@ -12,6 +12,7 @@ import numpy as np
 import convexrough
 from convexrough.certificate import Certificate
 from convexrough.checks import Array
+from convexrough.compare import Comparison, Entry
 from convexrough.contact import Contact
 from convexrough.stages import Outcome
 
@@ -87,6 +88,80 @@ def certificate_summary(certificate: Certificate, loads: Array) -> Summary:
     return _headed(_judged(certificate, loads))
 
 
+def comparison_summary(comparison: Comparison) -> Summary:
+    """The summary of a comparison, in the scene's units."""
+    rows = [_entry_summary(entry) for entry in comparison.entries]
+    found = {"compare": rows, "contradictions": list(comparison.contradictions)}
+    return {"schema": 1, "version": convexrough.__version__} | found
+
+
+def _entry_summary(entry: Entry) -> Summary:
+    row: Summary = {
+        "solver": entry.solver,
+        "outcome": entry.outcome,
+        "message": entry.message,
+        "disagreement": entry.disagreement,
+        "different_words": entry.different_words,
+        "memory": entry.memory,
+    }
+    if (contact := entry.contact) is not None:
+        proof, words = contact.certificate, contact.status
+        row |= {
+            **{word: int(np.sum(words == word)) for word in _WORDS},
+            "approach": contact.approach,
+            "load": contact.load,
+            "largest_load": float(contact.loads.max()),
+            "scope": proof.scope,
+            "load_error": proof.load_error,
+            "duality_gap": proof.duality_gap,
+            "iterations": contact.iterations,
+            "seconds": contact.seconds,
+        }
+    return row
+
+
+def describe_comparison(
+    summary: Summary, *, length_unit: str = "", force_unit: str = ""
+) -> list[str]:
+    """Aligned lines for people, of the summary of a comparison."""
+    work = f"{force_unit} {length_unit}".strip()
+    heading = ["solver", "disagreement", "load error", "duality gap", "certificate", "words"]
+    heading += ["iterations", "seconds", "MB"]
+    rows = []
+    for row in summary["compare"]:
+        if row["outcome"] == "answered":
+            largest, memory = row["largest_load"], row["memory"]
+            cells = [_two(row["disagreement"]), _relative_bound(row["load_error"], largest)]
+            cells += [_two(row["duality_gap"]), row["scope"], _wording(row)]
+            cells += [str(row["iterations"]), _two(row["seconds"])]
+            cells.append("-" if memory is None else f"{memory / 1e6:.1f}")
+        else:
+            cells = [row["outcome"], *["-"] * (len(heading) - 2)]
+        rows.append([row["solver"], *cells])
+    first = summary["compare"][0]
+    lines = []
+    if first["outcome"] == "answered":
+        words = ", ".join(f"{first[word]} {word}" for word in _WORDS if first[word])
+        lines.append(f"asperities         {words}")
+    lines += [
+        f"disagreement       with {first['solver']}, over the largest load, as is the load error",
+        f"duality gap        {f'in {work}, ' if work else ''}from the loads alone",
+        "MB                 by which the memory of the process rose while the solver worked",
+        "",
+        *_columns([heading, *rows], left=1),
+    ]
+    for row in summary["compare"]:
+        lines += ["", row["message"]] if row["message"] else []
+    return lines
+
+
+def _wording(row: Summary) -> str:
+    """How the words compare with those of the reference, and whether any is missing."""
+    different, undecided = row["different_words"], row["undecided"]
+    said = {None: "-", 0: "same"}.get(different, f"{different} differ")
+    return f"{said}, {undecided} undecided" if undecided else said
+
+
 def to_json(summary: Summary) -> str:
     """Valid JSON: infinities, and what is no number, are null."""
     return json.dumps(_finite(summary), indent=2, allow_nan=False)
@@ -151,10 +226,18 @@ def _titled(name: str, *quantities: str) -> str:
 
 def _aligned(heading: Sequence[str], rows: Sequence[Sequence[float]]) -> list[str]:
     cells = [[f"{x:d}" if isinstance(x, int) else f"{x:.7g}" for x in row] for row in rows]
-    widths = [max(map(len, column)) for column in zip(heading, *cells, strict=True)]
+    return _columns([heading, *cells])
+
+
+def _columns(rows: Sequence[Sequence[str]], *, left: int = 0) -> list[str]:
+    """Lines of a table, the first `left` columns aligned to the left."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
-        "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-        for row in (heading, *cells)
+        "  ".join(
+            f"{cell:{'<' if column < left else '>'}{width}}"
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in rows
     ]
 
 
@@ -172,6 +255,18 @@ def warnings(summary: Summary) -> list[str]:
             found.append(f"not certified: {doubtful} of the rows in {stage} have undecided words")
     if normal.get("crowding", 0.0) > 1:
         found.append("contact discs overlap (crowding above 1): the asperity model does not hold")
+    return found
+
+
+def comparison_warnings(summary: Summary) -> list[str]:
+    """What a user must not overlook, of the summary of a comparison."""
+    found = [f"contradiction: {each}" for each in summary["contradictions"]]
+    for row in summary["compare"]:
+        if row["outcome"] != "answered":
+            found.append(f"{row['solver']}: {row['outcome']}")
+    answered = [row for row in summary["compare"] if row["outcome"] == "answered"]
+    if not any(row["scope"] != "none" and not row["undecided"] for row in answered):
+        found.append("not certified: no answer has a proved word for every asperity")
     return found
 
 
@@ -227,3 +322,11 @@ def _ratio(error: float, largest: float) -> str:
     if largest == 0 or not math.isfinite(error):
         return ""
     return f"  ({_bound(error / largest)} of the largest load)"
+
+
+def _relative_bound(error: float, largest: float) -> str:
+    return _bound(error / largest) if largest else _bound(np.inf if error else 0.0)
+
+
+def _two(value: float) -> str:
+    return f"{value:.2g}" if math.isfinite(value) else "-"

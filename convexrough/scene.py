@@ -181,6 +181,10 @@ class Scene:
     geometry: Geometry = "summit"
 
     def __post_init__(self) -> None:
+        if not isinstance(self.asperities, Asperities):
+            raise InputError("asperities", found=repr(self.asperities)[:60], expected="Asperities")
+        if not isinstance(self.material, Material):
+            raise InputError("material", found=repr(self.material)[:60], expected="a Material")
         radius = checks.positive("sphere_radius", self.sphere_radius)
         object.__setattr__(self, "sphere_radius", radius)
         if self.friction is not None:
@@ -235,6 +239,11 @@ class Scene:
         """(n,) [length]  d_i = z_i - drop_i: prescribed approach of each asperity, less D0."""
         return frozen(self.asperities.heights - self.drops)
 
+    @cached_property
+    def offset_errors(self) -> Array:
+        """(n,) [length] bound on the rounding error of `offsets`."""
+        return frozen(6 * 2.0**-53 * (np.abs(self.asperities.heights) + self.drops))
+
     def reach(self, approach: float) -> float:
         """Distance from the axis beyond which none of these asperities' kind could touch [length].
 
@@ -268,7 +277,7 @@ def refuse_coincident(points: Array) -> None:
     if len(points) < 2:
         return
     distances = nearest_distances(points)
-    blur = 4 * np.finfo(float).eps * np.abs(points).max()
+    blur = 16 * np.finfo(float).eps * np.abs(points).max()  # well beyond the points' rounding
     if (worst := float(distances.min())) <= blur:
         first = int(np.argmin(distances))
         others = np.hypot(*(points[first + 1 :] - points[first]).T)
@@ -329,7 +338,7 @@ def _integers(top: int) -> tuple[Indices, Indices]:
 
 
 def _seed(seed: int | None) -> int:
-    if seed is None or isinstance(seed, bool) or int(seed) != seed or seed < 0:
+    if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or seed < 0:
         expected = "a whole number that is not negative, as heights or tip radii are random"
         raise InputError("seed", found=seed, expected=expected)
     return int(seed)

@@ -25,7 +25,12 @@ from convexrough import solvers
 from convexrough.checks import nearest
 
 #: What `[solver] name` may say.
-SOLVERS: dict[str, Callable[[], solvers.Solver]] = {"newton": solvers.Newton}
+SOLVERS: dict[str, Callable[[], solvers.Solver]] = {
+    "newton": solvers.Newton,
+    "conic": solvers.Conic,
+    "conic_cvxpy": solvers.ConicCVXPY,
+    "bristles": solvers.BristleQP,
+}
 
 #: In sensible units every number is well inside; the cube of one outside may overflow.
 LARGEST = 1e40

@@ -79,14 +79,15 @@ def shear(contact: Contact, *, force: float) -> ShearState:
     """
     scene = contact.scene
     friction = checks.friction(scene.friction)
-    force = float(checks.bearable("force", force, friction * contact.load))
+    force = checks.finite("force", force)
+    checks.bearable("force", force, friction * contact.load)
     sign = float(np.sign(force))
     if contact.load == 0.0:
         return _nothing_loaded(contact)
     problem = TangentialProblem.of(contact)
     total = abs(force) / friction / problem.units.force
     states = problem.solve(problem.limited(np.array([total])))
-    bounds = judge_states(problem, contact.certificate, states)
+    bounds = judge_states(problem, contact, states)
 
     touching, force_unit, length_unit = problem.touching, problem.units.force, problem.units.length
     travel = hertz.mindlin_ratio(scene.material.poisson_ratio) * friction * length_unit
@@ -99,6 +100,7 @@ def shear(contact: Contact, *, force: float) -> ShearState:
     increments, slips = states.increments[0], states.slips[0]
     left = np.maximum(1.0 - np.abs(increments) / problem.loads, 0.0)
     errors = np.where(contact.loads > 0, 0.0, contact.certificate.load_errors)
+    slip_errors = np.where((contact.loads > 0) | (contact.status == "open"), 0.0, np.inf)
     words = np.full(len(scene), "undecided", dtype="<U9")
     words[contact.status == "open"] = "open"
     words[touching[bounds.partial[0]]] = "partial"
@@ -109,7 +111,7 @@ def shear(contact: Contact, *, force: float) -> ShearState:
         force_errors=frozen(
             friction * errors + everywhere(bounds.increments[0], friction * force_unit)
         ),
-        slip_errors=frozen(everywhere(bounds.slips[0], travel)),
+        slip_errors=frozen(slip_errors + everywhere(bounds.slips[0], travel)),
         displacement_error=float(bounds.rises[0]) * travel,
     )
     return ShearState(

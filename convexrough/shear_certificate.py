@@ -19,8 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.certificate import SUM_ROUNDOFFS, Certificate
+from convexrough.certificate import SUM_ROUNDOFFS
 from convexrough.checks import Array
+from convexrough.contact import Contact
 from convexrough.influence import ROUNDOFF
 from convexrough.normal import SAFETY
 from convexrough.tangential import States, TangentialProblem
@@ -37,11 +38,11 @@ class Bounds(NamedTuple):
     partial: NDArray[np.bool_]  # (m, n) proved not to slide
 
 
-def judge_states(problem: TangentialProblem, certificate: Certificate, states: States) -> Bounds:
-    """Bounds on friction states of a contact whose loads have this certificate."""
-    if certificate.scope == "none":
+def judge_states(problem: TangentialProblem, contact: Contact, states: States) -> Bounds:
+    """Bounds on friction states of a contact, whose loads are known to its certificate."""
+    if contact.certificate.scope == "none":
         return _nothing(states)
-    known = _Known.of(problem, certificate)
+    known = Known.of(problem, contact)
     near_elastic = _by_convexity(problem, known, states)
     near_gross = _by_exhaustion(problem, known, states)
     # At Q = f P itself there is nothing to prove: |Q_i| <= f P_i leaves one state.
@@ -51,26 +52,35 @@ def judge_states(problem: TangentialProblem, certificate: Certificate, states: S
     return Bounds(
         proved=rows | near_gross.proved,
         increments=np.where(use, near_elastic.increments, near_gross.increments),
-        slips=np.where(use, near_elastic.slips, near_gross.slips),
+        slips=np.where(known.sure, np.where(use, near_elastic.slips, near_gross.slips), np.inf),
         rises=np.where(rows, near_elastic.rises, near_gross.rises),
         sliding=np.where(use, near_elastic.sliding, near_gross.sliding) | gross,
         partial=np.where(use, near_elastic.partial, near_gross.partial),
     )
 
 
-class _Known(NamedTuple):
+class Known(NamedTuple):
     """What the normal certificate says of the loads P, in own units."""
 
     errors: Array  # (n,) b
     sure: NDArray[np.bool_]  # (n,) proved to touch, and known to some digits
     relative: Array  # (n,) b / P of those, 0 of the others
+    stray: float  # most that asperities with no load here, but not proved open, carry in all
+    stray_effect: Array  # (n,) most that this moves each of the others
 
     @classmethod
-    def of(cls, problem: TangentialProblem, certificate: Certificate) -> _Known:
-        errors = certificate.load_errors[problem.touching] / problem.units.force
+    def of(cls, problem: TangentialProblem, contact: Contact) -> Known:
+        certificate, scene, force = contact.certificate, contact.scene, problem.units.force
+        errors = certificate.load_errors[problem.touching] / force
         sure = certificate.status[problem.touching] == "contact"
         sure &= errors < 0.1 * problem.loads
-        return cls(errors, sure, np.where(sure, errors / problem.loads, 0.0))
+        strays = np.flatnonzero((contact.loads == 0) & (certificate.status != "open"))
+        most = certificate.load_errors[strays] / force
+        effect = np.zeros(len(sure))
+        for block, rows, error in problem.influence.elsewhere(scene.contact_points[strays]):
+            effect += most[block] @ rows * (1.0 + error)
+        relative = np.where(sure, errors / problem.loads, 0.0)
+        return cls(errors, sure, relative, float(most.sum()), effect)
 
     def moved(self, loads: Array, increments: Array) -> Array:
         """How far each u can be from its image on the true loads; |u| <= P is all known of some."""
@@ -78,7 +88,7 @@ class _Known(NamedTuple):
         return size * self.relative + np.where(self.sure, 0.0, loads + self.errors + size)
 
 
-def _by_convexity(problem: TangentialProblem, known: _Known, states: States) -> Bounds:
+def _by_convexity(problem: TangentialProblem, known: Known, states: States) -> Bounds:
     P, ceilings, A = problem.loads, problem.ceilings, problem.influence
     u, rises = states.increments, states.rises
     size = np.abs(u)
@@ -90,7 +100,7 @@ def _by_convexity(problem: TangentialProblem, known: _Known, states: States) -> 
     # The image on the true loads misses the total; a shift of eta where it sticks mends that.
     moved = known.moved(P, u)
     missing = moved.sum(axis=1) + np.abs(u.sum(axis=1) - states.totals)
-    missing += len(P) * ROUNDOFF * size.sum(axis=1)
+    missing += len(P) * ROUNDOFF * size.sum(axis=1) + known.stray
     sticking = known.sure & (size < P)
     slopes = np.where(sticking, problem.slopes(states.deflections), 0.0)
     weights = slopes.sum(axis=1)
@@ -107,6 +117,7 @@ def _by_convexity(problem: TangentialProblem, known: _Known, states: States) -> 
         np.abs(local) + problem.couple(size) + rises[:, None]
     )
     unsure += problem.couple(moved + mended) + np.abs(local) * known.relative
+    unsure += known.stray_effect
     surplus = asked * np.sign(u) - ceilings
     residual = np.where(
         size < P, np.abs(asked - local) + unsure + bent, np.maximum(unsure - surplus, 0.0)
@@ -128,13 +139,13 @@ def _by_convexity(problem: TangentialProblem, known: _Known, states: States) -> 
     return Bounds(proved, off + moved, slip_errors, rise_errors, sliding, partial)
 
 
-def _by_exhaustion(problem: TangentialProblem, known: _Known, states: States) -> Bounds:
+def _by_exhaustion(problem: TangentialProblem, known: Known, states: States) -> Bounds:
     """Near gross sliding: |u| <= P and sum u = T leave each asperity within sum P - T of P.
 
     The last asperity to slide, i, then fixes the rise: it is at most k_i P_i^(2/3) + (A P)_i, and
     at least what u_i = P_i - (sum P - T) asks.
     """
-    if not known.sure.all():
+    if known.stray > 0 or not known.sure.all():
         return _nothing(states)
     P, ceilings, A = problem.loads, problem.ceilings, problem.influence
     u, rises = states.increments, states.rises
@@ -152,8 +163,11 @@ def _by_exhaustion(problem: TangentialProblem, known: _Known, states: States) ->
     rise_errors = (np.abs(asked - ceilings) + lowest + spread)[every, last] + spread.max(axis=1)
     slip_errors = spread + rise_errors[:, None]
     sliding = asked - ceilings > slip_errors
+    # Where all but one are sure to slide, and not all can, that one does not.
+    short = P.sum() * (1 - 2 * len(P) * ROUNDOFF) - known.errors.sum() - states.totals > 0
+    alone = short & (sliding.sum(axis=1) == len(P) - 1)
     proved = np.ones(len(rises), dtype=bool)
-    return Bounds(proved, errors, slip_errors, rise_errors, sliding, np.zeros_like(sliding))
+    return Bounds(proved, errors, slip_errors, rise_errors, sliding, ~sliding & alone[:, None])
 
 
 def _nothing(states: States) -> Bounds:

@@ -94,7 +94,7 @@ class TangentialProblem:
             loads=loads,
             ceilings=ceilings,
             influence=influence,
-            shells=scale / shell_radii(points),
+            shells=scale / shell_radii(points, scene.point_error),
             elastic=shares / shares.sum(),
             compliance=1.0 / float(shares.sum()),
         )

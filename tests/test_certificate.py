@@ -235,6 +235,35 @@ def test_the_rounding_of_the_residual_is_counted() -> None:
     assert computed >= 0
 
 
+def test_gaps_of_screened_asperities() -> None:
+    """A small difference of a large height and a large drop keeps the rounding of both."""
+    height = 3.1**2 / 2 - 1e-8 - 1e-12
+    scene = cr.Scene(1.0, cr.Asperities([[0, 0], [3.1, 0]], 0.02, [0, height]), MATERIAL)
+    certificate = cr.press(scene, approach=1e-8).certificate
+    exact = reference(scene, approach=1e-8)
+    assert_honest(certificate, cr.press(scene, approach=1e-8).loads, exact)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:
+    """Where contact points are rounded, so is their distance, to whom it may concern."""
+    rng = np.random.default_rng(seed)
+    first = rng.uniform(-1, 1, 2)
+    second = first + 10.0 ** rng.uniform(-11, -2) * rng.normal(size=2)
+    tips = np.array([1e-3, 1e-4])
+    drops = np.array([(p**2).sum() / 2 / (1 + t) for p, t in [(first, tips[0]), (second, tips[1])]])
+    heights = drops + np.array([1e-4, -2e-4])
+    scene = cr.Scene(1.0, cr.Asperities([first, second], tips, heights), MATERIAL, None, "closest")
+    contact = cr.press(scene, approach=1e-4)
+    assert_honest(contact.certificate, contact.loads, reference(scene, approach=1e-4))
+
+
+def test_loads_too_small_to_scale() -> None:
+    tiny = np.full(61, 5e-324)
+    certificate = cr.certify(paper(), tiny, load=5e-7)
+    assert certificate.load_error > 1e-9
+
+
 def test_judging_loads_of_screened_asperities() -> None:
     """A load on an asperity that cannot touch is proved to be wrong by just that load."""
     scene = paper()

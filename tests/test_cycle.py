@@ -212,6 +212,19 @@ def test_first_loading_costs_a_quarter_and_each_branch_a_half() -> None:
     assert_allclose(np.array(path.slips.sum(axis=1)) / path.slips[0].sum(), [1, -1, 1, -1])
 
 
+def test_each_state_of_a_history_is_certified() -> None:
+    """Bounds on the displacement add up over the turning points that a state hangs on."""
+    contact = pressed("rough")
+    limit = limit_of(contact)
+    path = cr.history(contact, forces=np.array([0.6, -0.2, 0.3, 0.3, -0.6, 0.9]) * limit)
+    assert (path.displacement_errors > 0).all()
+    assert (path.displacement_errors < 1e-8 * np.abs(path.displacements)).all()
+    single = cr.shear(contact, force=0.6 * limit).certificate.displacement_error
+    assert path.displacement_errors[0] == pytest.approx(single, rel=1e-3)
+    assert path.displacement_errors[1] > path.displacement_errors[0]
+    assert path.displacement_errors[3] == path.displacement_errors[2]
+
+
 def test_nested_loops_are_forgotten() -> None:
     steps = _remember(np.array([0.6, -0.2, 0.3, -0.1, 0.3, -0.6, 0.7, 0.65]))
     assert [step.base for step in steps] == [-1, 0, 1, 2, 1, -1, -1, 6]

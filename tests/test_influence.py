@@ -71,8 +71,9 @@ def test_matrix_spread_and_rows_elsewhere() -> None:
     assert (np.diag(operator.matrix) == 0).all()
     assert_allclose(operator.spread(loads), np.sqrt(operator.matrix**2 @ loads))
     others = rng.uniform(-1, 1, (7, 2))
-    ((block, rows),) = operator.elsewhere(others)
+    ((block, rows, error),) = operator.elsewhere(others)
     assert block == slice(0, 7)
+    assert 0 < error < 1e-14
     assert_allclose(rows, SCALE * inverse_distances(others, points))
 
 

@@ -234,6 +234,22 @@ def test_the_start_does_not_matter(start: str, control: str) -> None:
     assert_allclose(again.loads, contact.loads, rtol=1e-12, atol=1e-13 * contact.loads.max())
 
 
+@pytest.mark.parametrize("load", [1e-59, 1e-35, 1e-20, 1e-10])
+def test_loads_of_any_size(load: float) -> None:
+    """Also where the indentation of the only asperity that touches is lost in the approach."""
+    contact = cr.press(rough(), load=load)
+    assert contact.load == pytest.approx(load, rel=1e-14)
+    assert (contact.loads > 0).sum() >= 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(-30, 5), st.floats(-30, 5))
+def test_one_asperity_from_any_start(load: float, start: float) -> None:
+    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL)
+    contact = cr.press(scene, load=10**load, start=[10**start])
+    assert contact.load == pytest.approx(10**load, rel=1e-14)
+
+
 def test_contact_fields() -> None:
     contact = cr.press(paper(), approach=PAPER_APPROACH)
     assert contact.solver == "newton"

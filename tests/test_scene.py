@@ -130,6 +130,19 @@ BAD = [
         "seed: found None",
     ),
     (
+        lambda: cr.Asperities.square(
+            spacing=1,
+            tip_radius=1,
+            within=1,
+            height_std=1,
+            seed="a",  # type: ignore[arg-type]
+        ),
+        "seed: found a",
+    ),
+    (lambda: cr.Scene(1.0, [[0, 0]], MATERIAL), "asperities: found"),  # type: ignore[arg-type]
+    (lambda: cr.Asperities([[0, 0]], 1 + 2j), "tip_radii: .* expected numbers"),
+    (lambda: cr.press(paper(), approach=1e-80), "choose other units"),
+    (
         lambda: cr.Asperities.square(spacing=1, tip_radius=[1, 2], within=1),
         "tip_radius: .* expected 5 values",
     ),

@@ -197,7 +197,7 @@ def test_gross_sliding_is_refused() -> None:
     for force in (1.01 * limit, -1.01 * limit):
         with pytest.raises(cr.InputError, match=r"gross sliding, 0\.01 beyond it"):
             cr.shear(contact, force=force)
-    with pytest.raises(cr.InputError, match="found nan, expected at most f P"):
+    with pytest.raises(cr.InputError, match="found nan, expected a finite number"):
         cr.shear(contact, force=float("nan"))
     frictionless = cr.press(paper(), approach=PAPER_APPROACH)
     with pytest.raises(cr.InputError, match="coefficient of friction"):
@@ -265,7 +265,7 @@ def test_attacks_on_the_words(name: str, fraction: float, kind: str, seed: int) 
     wrong = good._replace(
         increments=u, deflections=eta, slips=np.maximum(eta - problem.ceilings, 0)
     )
-    bounds = judge_states(problem, contact.certificate, wrong)
+    bounds = judge_states(problem, contact, wrong)
     truly_sliding = good.slips > 0
     assert not (bounds.sliding & ~truly_sliding).any()
     assert not (bounds.partial & truly_sliding).any()
@@ -295,6 +295,42 @@ def test_doubt_about_the_loads_is_counted(fraction: float, digits: int) -> None:
         assert off(state.slips[i], truth.slips[i]) <= certificate.slip_errors[i]
         assert certificate.status[i] != ("partial" if truth.slips[i] > 0 else "sliding")
     assert off(state.displacement, truth.displacement) <= certificate.displacement_error
+
+
+@pytest.mark.parametrize("ulps", [0, 2, -2, 8, -8])
+@pytest.mark.parametrize("fraction", [1e-12, 1e-9, 0.25, 0.9])
+def test_an_asperity_that_may_or_may_not_touch(fraction: float, ulps: int) -> None:
+    """Its slip is unknown, and what it could carry is in the bounds of the other."""
+    spacing, approach = 0.0025, 5e-5
+
+    def scene(height: float) -> cr.Scene:
+        asperities = cr.Asperities([[0, 0], [spacing, 0]], 0.02, [0, height])
+        return cr.Scene(1.0, asperities, MATERIAL, FRICTION)
+
+    alone = cr.press(scene(-1.0), approach=approach).loads[0]
+    height = alone / (np.pi * spacing) - approach + spacing**2 / 2
+    contact = cr.press(scene(height + ulps * np.spacing(height)), approach=approach)
+    state = cr.shear(contact, force=fraction * FRICTION * contact.load)
+    if contact.status[1] == "undecided":
+        assert state.status[1] == "undecided"
+        assert np.isinf(state.certificate.slip_errors[1])
+        lost = FRICTION * contact.certificate.load_errors[1]
+        assert state.certificate.force_errors[1] >= lost
+        assert state.certificate.force_errors[0] >= 0.5 * lost
+
+
+def test_just_before_gross_sliding_the_last_one_sticks() -> None:
+    contact = pressed("paper")
+    state = cr.shear(contact, force=FRICTION * contact.load * (1 - 1e-11))
+    assert (state.status == "sliding").sum() == 36
+    assert state.status[0] == "partial"
+    assert state.certificate.holds
+
+
+@pytest.mark.parametrize("force", [[1e-8, 2e-8], "a", None, 1 + 1j])
+def test_a_force_is_a_number(force: object) -> None:
+    with pytest.raises(cr.InputError):
+        cr.shear(pressed("paper"), force=force)  # type: ignore[arg-type]
 
 
 def test_an_uncertified_contact_gets_no_word() -> None:

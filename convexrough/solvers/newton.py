@@ -25,7 +25,7 @@ import numpy as np
 from convexrough import hertz
 from convexrough.checks import Array, Indices
 from convexrough.errors import SolverError
-from convexrough.normal import SAFETY, NormalProblem, shift_to_load
+from convexrough.normal import SAFETY, NormalProblem, shifted_to_load
 from convexrough.solvers.solution import Solution
 
 
@@ -92,7 +92,7 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
 def _on_constraint(problem: NormalProblem, indentation: Array) -> Array:
     """Cut to the a priori box (approach control), or shifted to the prescribed total load."""
     if problem.load is not None:
-        return indentation + shift_to_load(indentation, problem.coefficients, problem.load)
+        return shifted_to_load(indentation, problem.coefficients, problem.load)
     return np.minimum(indentation, problem.ceiling + problem.offsets)
 
 

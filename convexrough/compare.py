@@ -1,0 +1,252 @@
+"""Every formulation and solver on one scene: do they agree, what is proved, what does it cost?
+
+Answers found in different ways are certified by the same code, which knows no solver. Each bound
+is on the distance to one and the same solution: certificates of different scope and box speak of
+boxes of which one holds the other, and each box holds one solution. So two certified answers that
+are further apart than their bounds allow would be a contradiction in the mathematics of this
+package, or a mistake in its code.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from convexrough import solvers
+from convexrough.certificate import Certificate
+from convexrough.checks import Array
+from convexrough.contact import Contact, press
+from convexrough.errors import ConvexroughError, InputError, SolverError
+from convexrough.scene import Asperities, Material, Scene
+
+#: How many asperities a message names before it says "and so many more".
+MOST_NAMED = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """What one solver made of the scene.
+
+    outcome : "answered"; "refused": the scene is not one for this solver; or "failed"
+    message : why, where it did not answer; else ""
+    contact : its answer, judged; None without one
+    disagreement : max |load - reference| over the largest load of the reference; nan without both
+    different_words : asperities whose word is not that of the reference; None without both
+    memory : [bytes] by which the resident memory of the process rose at most while it worked.
+        An allocator that reuses what it holds hides some. None where the system is not Linux
+    """
+
+    solver: str
+    outcome: Literal["answered", "refused", "failed"]
+    message: str = ""
+    contact: Contact | None = None
+    disagreement: float = np.nan
+    different_words: int | None = None
+    memory: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """All entries, that of the reference (Newton's method) first.
+
+    contradictions : pairs of certified answers that exclude each other, in words; each would be a
+        mistake in the mathematics or in the code
+    """
+
+    entries: tuple[Entry, ...]
+    contradictions: tuple[str, ...]
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The answers, in the order of their entries."""
+        return tuple(entry.contact for entry in self.entries if entry.contact is not None)
+
+    @property
+    def certified(self) -> bool:
+        """Some answer has a proved word for every asperity."""
+        return any(contact.certificate.holds for contact in self.contacts)
+
+
+def compare(
+    scene: Scene,
+    *,
+    approach: float | None = None,
+    load: float | None = None,
+    solvers: Sequence[solvers.Solver] | None = None,
+    announce: Callable[[str], object] = lambda name: None,
+) -> Comparison:
+    """Press on the scene with every solver.
+
+    approach [length] or load [force] : what is prescribed, exactly one
+    solvers  : settings objects; the default is `every_solver()`. Newton's method is the reference
+        and always the first
+    announce : called with the name of each solver before it starts
+
+    Raises InputError where the reference refuses the scene or what is prescribed. What happens to
+    the others is in their entries.
+    """
+    reference = _REFERENCE
+    others = every_solver() if solvers is None else solvers
+    entries: list[Entry] = []
+    for solver in (reference, *(each for each in others if each != reference)):
+        announce(solver.name)
+        known = entries[0].contact if entries else None
+        entries.append(_enter(solver, scene, approach, load, known))
+    answers = [entry.contact for entry in entries if entry.contact is not None]
+    pairs = combinations([Answer.of(contact) for contact in answers], 2)
+    return Comparison(
+        entries=tuple(entries),
+        contradictions=tuple(found for pair in pairs for found in contradictions(*pair)),
+    )
+
+
+def every_solver() -> tuple[solvers.Solver, ...]:
+    """Each formulation, and without its final Newton step where it can end with one."""
+    return (
+        solvers.Newton(),
+        solvers.Conic(),
+        solvers.Conic(newton_step=False),
+        solvers.ConicCVXPY(),
+        solvers.ConicCVXPY(newton_step=False),
+        solvers.BristleQP(),
+        solvers.BristleQP(newton_step=False),
+    )
+
+
+_REFERENCE = solvers.Newton()
+
+
+def _enter(
+    solver: solvers.Solver,
+    scene: Scene,
+    approach: float | None,
+    load: float | None,
+    reference: Contact | None,
+) -> Entry:
+    _load_code_of(solver)
+    memory = _Memory()
+    try:
+        contact = press(scene, approach=approach, load=load, solver=solver)
+    except SolverError as error:
+        return Entry(solver.name, "failed", str(error))
+    except InputError as error:
+        if solver == _REFERENCE:
+            raise
+        return Entry(solver.name, "refused", str(error))
+    risen = memory.risen()
+    if reference is None:
+        reference = contact if solver == _REFERENCE else None
+    if reference is None:
+        return Entry(solver.name, "answered", contact=contact, memory=risen)
+    return Entry(
+        solver=solver.name,
+        outcome="answered",
+        contact=contact,
+        disagreement=_relative(contact.loads - reference.loads, reference.loads),
+        different_words=int(np.sum(contact.status != reference.status)),
+        memory=risen,
+    )
+
+
+def _relative(difference: Array, loads: Array) -> float:
+    largest = float(np.abs(difference).max())
+    return largest / float(loads.max()) if largest > 0 else 0.0
+
+
+def _load_code_of(solver: solvers.Solver) -> None:
+    """Have a solver import what it needs, so that the time of the comparison is that of solving."""
+    two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
+    small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
+    with suppress(ConvexroughError):  # it will come again
+        press(small, approach=1e-2, solver=solver)
+
+
+class Answer(NamedTuple):
+    """Loads from somewhere, with what is proved of them; `name` says from where."""
+
+    name: str
+    loads: Array
+    certificate: Certificate
+
+    @classmethod
+    def of(cls, contact: Contact) -> Answer:
+        return cls(contact.solver, contact.loads, contact.certificate)
+
+
+def contradictions(first: Answer, second: Answer) -> list[str]:
+    """Where two answers to one problem exclude each other, one line for each kind; else none.
+
+    Loads, gaps or approaches further apart than the sum of their bounds, or an asperity that is
+    proved to touch by one and to be open by the other. An answer without proof excludes nothing.
+    """
+    one, other = first.certificate, second.certificate
+    if "none" in (one.scope, other.scope):
+        return []
+    lines = []
+
+    def note(kind: str, values: tuple[Array, Array], bounds: tuple[Array, Array]) -> None:
+        apart = np.abs(values[0] - values[1])
+        if len(where := np.flatnonzero(apart > bounds[0] + bounds[1])):
+            each = (
+                f"{i}: {values[0][i]:.6g} +- {bounds[0][i]:.2g} and {values[1][i]:.6g} +- "
+                f"{bounds[1][i]:.2g}"
+                for i in where[np.argsort(-apart[where])]
+            )
+            lines.append(f"{kind} of asperities {listed(each)}")
+
+    note("loads", (first.loads, second.loads), (one.load_errors, other.load_errors))
+    note("gaps", (one.gaps, other.gaps), (one.gap_errors, other.gap_errors))
+    if abs(one.approach - other.approach) > one.approach_error + other.approach_error:
+        lines.append(
+            f"approach {one.approach:.17g} +- {one.approach_error:.2g} and {other.approach:.17g} "
+            f"+- {other.approach_error:.2g}"
+        )
+    proved = (one.status != "undecided") & (other.status != "undecided")
+    if len(where := np.flatnonzero(proved & (one.status != other.status))):
+        each = (f"{i}: {one.status[i]} and {other.status[i]}" for i in where)
+        lines.append(f"words of asperities {listed(each)}")
+    return [f"{first.name} and {second.name}: {line}" for line in lines]
+
+
+def listed(items: Iterator[str]) -> str:
+    """The first few, and how many more there are."""
+    named = list(items)
+    more = f"; and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
+    return "; ".join(named[:MOST_NAMED]) + more
+
+
+class _Memory:
+    """How far the resident memory of this process has risen above its level at the start.
+
+    Linux keeps the highest level and forgets it on request, whatever language asked for the memory.
+    """
+
+    def __init__(self) -> None:
+        self._before: int | None = None
+        with suppress(AttributeError, OSError, TypeError):  # glibc: give back what is freed
+            ctypes.CDLL(None).malloc_trim(0)
+        with suppress(OSError):
+            Path("/proc/self/clear_refs").write_text("5")
+            self._before = self._level("VmRSS")
+
+    def risen(self) -> int | None:
+        """[bytes] None where the system does not say."""
+        peak = self._level("VmHWM")
+        if self._before is None or peak is None:
+            return None
+        return max(0, peak - self._before)
+
+    @staticmethod
+    def _level(name: str) -> int | None:
+        with suppress(OSError):
+            for line in Path("/proc/self/status").read_text().splitlines():
+                if line.startswith(f"{name}:"):
+                    return 1024 * int(line.split()[1])
+        return None

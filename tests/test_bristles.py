@@ -1,0 +1,203 @@
+"""The bristle program: its order of convergence, its convexity, what it refuses."""
+
+import sys
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, scattered
+
+import convexrough as cr
+from convexrough.normal import NormalProblem
+from convexrough.solvers import BristleQP
+
+CONTROLS = ("approach", "load")
+
+
+def pressed(scene: cr.Scene, approach: float, control: str) -> tuple[cr.Contact, dict[str, Any]]:
+    """The reference, and how to prescribe it."""
+    contact = cr.press(scene, approach=approach)
+    return contact, {control: getattr(contact, control)}
+
+
+def errors(reference: cr.Contact, prescribed: dict[str, Any], solver: BristleQP) -> Any:
+    """(n,) errors of the loads over the largest load."""
+    loads = cr.press(reference.scene, solver=solver, **prescribed).loads
+    return (loads - reference.loads) / reference.loads.max()
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("name", ["rough", "rough, closest"])
+def test_second_order(name: str, control: str) -> None:
+    reference, prescribed = pressed(*NAMED[name], control)
+    counts = np.array([16, 32, 64, 128])
+    found = [errors(reference, prescribed, BristleQP(int(m), newton_step=False)) for m in counts]
+    assert all(np.abs(e).max() < 0.65 / m**2 for m, e in zip(counts, found, strict=True))
+    mean_square = [np.sqrt(np.mean(e**2)) for e in found]
+    order = -np.polyfit(np.log(counts), np.log(mean_square), 1)[0]
+    assert order == pytest.approx(2.0, abs=0.15)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("name", NAMED)
+def test_every_scene(name: str, control: str) -> None:
+    reference, prescribed = pressed(*NAMED[name], control)
+    for solver, limit in ((BristleQP(newton_step=False), 0.6 / 64**2), (BristleQP(), 3e-9)):
+        contact = cr.press(reference.scene, solver=solver, **prescribed)
+        assert contact.solver == solver.name
+        assert contact.certificate.holds
+        assert list(contact.status) == list(reference.status)
+        assert np.abs(contact.loads - reference.loads).max() < limit * reference.loads.max()
+        assert (contact.loads[contact.status == "open"] == 0).all()  # by the sign, not a tolerance
+        assert contact.approach == pytest.approx(reference.approach, rel=limit)
+        assert contact.load == pytest.approx(reference.load, rel=limit)
+
+
+def test_names_tell_the_last_step() -> None:
+    assert BristleQP().name == "bristles + Newton step"
+    assert BristleQP(newton_step=False).name == "bristles"
+
+
+@pytest.mark.parametrize("bristles", [1, 2, 5])
+def test_exact_where_the_contact_ends_on_an_edge(bristles: int) -> None:
+    """A single asperity fills its box, and the force on each cell is then the mean of Hertz's."""
+    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], tip_radii=0.02), MATERIAL)
+    reference, prescribed = pressed(scene, PAPER_APPROACH, "approach")
+    assert abs(errors(reference, prescribed, BristleQP(bristles, False))[0]) < 1e-10
+
+
+def test_polishing_ends_at_the_answer_of_the_program() -> None:
+    """OSQP's tolerance decides what it takes to find the bristles in contact, not the answer."""
+    loose, tight = (
+        cr.press(paper(), approach=5e-5, solver=BristleQP(32, False, tolerance=t)).loads
+        for t in (1e-4, 1e-10)
+    )
+    assert np.abs(loose - tight).max() < 1e-9 * tight.max()
+
+
+@pytest.fixture
+def matrices(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The matrices that OSQP is given."""
+    import osqp
+
+    seen: list[Any] = []
+    setup = osqp.OSQP.setup
+
+    def spy(self: Any, P: Any, *arguments: Any, **options: Any) -> None:
+        assert options["polishing"]
+        seen.append(P)
+        setup(self, P, *arguments, **options)
+
+    monkeypatch.setattr(osqp.OSQP, "setup", spy)
+    return seen
+
+
+@settings(max_examples=25, deadline=None)
+@given(random_scenes(crowding=3.0, most=12))
+def test_osqp_never_sees_an_indefinite_matrix(found: tuple[cr.Scene, float]) -> None:
+    scene, approach = found
+    with pytest.MonkeyPatch.context() as patch:
+        seen = matrices.__wrapped__(patch)  # type: ignore[attr-defined]
+        try:
+            contact = cr.press(scene, approach=approach, solver=BristleQP(8))
+        except cr.solvers.TooDenseError:
+            contact = None
+    for matrix in seen:
+        dense = matrix.toarray()
+        assert not np.tril(dense, -1).any()
+        dense += np.triu(dense, 1).T
+        root = 1 / np.sqrt(np.diag(dense))
+        assert np.linalg.eigvalsh(dense * root * root[:, None])[0] > 9e-4
+    if contact is not None and contact.certificate.scope != "none":
+        reference = cr.press(scene, approach=approach)
+        assert np.abs(contact.loads - reference.loads).max() <= 1e-4 * reference.loads.max()
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_a_box_cut_to_the_convex_range(control: str, matrices: list[Any]) -> None:
+    """The a priori bounds are not convex, the contact is: answered, and certified as local."""
+    wide = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.03)
+    scene, approach = cr.Scene(1.0, wide, MATERIAL), 5e-4
+    problem = NormalProblem.assemble(scene, approach=approach)
+    assert problem.convexity_number(problem.bounds(problem.ceiling)) > 1.5
+    reference, prescribed = pressed(scene, approach, control)
+    contact = cr.press(scene, solver=BristleQP(32), **prescribed)
+    assert len(matrices) == 1
+    assert contact.certificate.holds
+    assert np.abs(contact.loads - reference.loads).max() < 1e-6 * reference.loads.max()
+    if control == "approach":
+        assert contact.certificate.scope == reference.certificate.scope == "local"
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_too_dense(control: str) -> None:
+    """Refused by name: the asperities that Newton's method also finds beyond the convex range."""
+    scene, approach = scattered(4, 5, 3.0, 0.0)
+    reference, prescribed = pressed(scene, approach, control)
+    assert reference.certificate.scope == "none"
+    with pytest.raises(cr.solvers.TooDenseError, match="bristles") as caught:
+        cr.press(scene, solver=BristleQP(), **prescribed)
+    points = scene.contact_points
+    apart = np.hypot(*(points[:, None] - points).T)
+    np.fill_diagonal(apart, np.inf)
+    ratio = reference.contact_radii / (np.pi / 4 * apart.min(axis=0))
+    assert set(np.flatnonzero(ratio > 1.05)) <= set(caught.value.asperities)
+    assert set(caught.value.asperities) <= set(np.flatnonzero(ratio > 0.9))
+    assert (caught.value.ratios > 0.98).all()
+
+
+# What stops it, in words.
+
+
+def press_with(solver: BristleQP) -> None:
+    cr.press(paper(), approach=PAPER_APPROACH, solver=solver)
+
+
+def test_without_osqp(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "osqp", None)
+    with pytest.raises(cr.SolverError, match=r"bristles.* osqp.*pip install"):
+        press_with(BristleQP())
+
+
+def test_with_an_old_osqp(monkeypatch: pytest.MonkeyPatch) -> None:
+    old = ModuleType("osqp")
+    old.__version__ = "0.6.7"  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "osqp", old)
+    with pytest.raises(cr.SolverError, match=r"OSQP 0\.6\.7 is too old; pip install"):
+        press_with(BristleQP())
+
+
+def test_osqp_that_gives_up() -> None:
+    with pytest.raises(cr.SolverError, match=r"bristles.*did not solve.*MAX_ITER_REACHED"):
+        press_with(BristleQP(max_iterations=3))
+
+
+@pytest.mark.parametrize(("status", "raised"), [(10, KeyboardInterrupt), (3, cr.SolverError)])
+def test_osqp_stopped(monkeypatch: pytest.MonkeyPatch, status: int, raised: Any) -> None:
+    """Status 10 is an interrupt from the keyboard, which OSQP takes for itself."""
+    import osqp
+
+    def solve(*_: Any, **__: Any) -> None:
+        raise osqp.OSQPException(status)
+
+    monkeypatch.setattr(osqp.OSQP, "solve", solve)
+    with pytest.raises(raised):
+        press_with(BristleQP())
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("bristles", 0),
+        ("bristles", 2.5),
+        ("bristles", True),
+        ("tolerance", 0.0),
+        ("tolerance", np.nan),
+        ("max_iterations", -1),
+    ],
+)
+def test_settings(setting: str, value: Any) -> None:
+    with pytest.raises(cr.InputError, match=f"{setting}: found"):
+        BristleQP(**{setting: value})

@@ -1,0 +1,385 @@
+"""The comparison of all solvers: what it finds, what it makes of those that fail, its command."""
+
+import json
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import NAMED, PAPER_APPROACH, paper, random_scenes, scattered
+from test_cli import Outcome
+from test_io import scene_text
+
+import convexrough as cr
+from convexrough import cli
+from convexrough import compare as comparing
+from convexrough.compare import Answer, compare, contradictions, every_solver
+from convexrough.normal import NormalProblem
+from convexrough.solvers import BristleQP, Newton, Solution
+
+NAMES = [
+    "newton",
+    "conic + Newton step",
+    "conic",
+    "conic in CVXPY + Newton step",
+    "conic in CVXPY",
+    "bristles + Newton step",
+    "bristles",
+]
+
+
+@dataclass(frozen=True)
+class Sloppy:
+    """Newton's loads, each off by up to `error` of the largest; or what `instead` raises."""
+
+    error: float = 0.0
+    instead: Exception | None = None
+    name: str = "sloppy"
+
+    def solve(self, problem: NormalProblem, start: Any = None) -> Solution:
+        if self.instead is not None:
+            raise self.instead
+        solution = Newton().solve(problem, start)
+        noise = np.random.default_rng(0).uniform(-1, 1, len(problem)) * solution.loads.max()
+        noise[problem.ceiling + problem.offsets < 1e-9] = 0.0
+        return replace(solution, loads=np.maximum(solution.loads + self.error * noise, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "control"), [("paper", "approach"), ("rough, closest", "load"), ("steel", "approach")]
+)
+def test_all_agree(name: str, control: str) -> None:
+    scene, approach = NAMED[name]
+    reference = cr.press(scene, approach=approach)
+    comparison = compare(scene, **{control: getattr(reference, control)})
+    assert [entry.solver for entry in comparison.entries] == NAMES
+    assert comparison.contradictions == ()
+    assert comparison.certified
+    limits = dict(zip(NAMES, [0.0, 1e-12, 1e-7, 1e-12, 1e-7, 3e-9, 0.6 / 64**2], strict=True))
+    for entry in comparison.entries:
+        assert (entry.outcome, entry.message) == ("answered", "")
+        assert entry.disagreement <= limits[entry.solver], entry.solver
+        assert entry.different_words == 0
+        assert entry.contact is not None
+        assert entry.contact.certificate.holds
+        assert entry.contact.certificate.duality_gap >= 0
+    raw = comparison.entries[-1]
+    assert raw.disagreement > 1e-6  # it is another discretisation, not the reference again
+
+
+def test_the_reference_comes_first_and_once() -> None:
+    told: list[str] = []
+    comparison = compare(
+        paper(),
+        approach=PAPER_APPROACH,
+        solvers=[BristleQP(8), Newton(), Newton(tolerance=1e-3)],
+        announce=told.append,
+    )
+    names = [entry.solver for entry in comparison.entries]
+    assert names == told == ["newton", "bristles + Newton step", "newton"]
+    assert len(every_solver()) == len(NAMES)
+
+
+def test_a_poor_answer_is_measured_and_contradicts_nothing() -> None:
+    comparison = compare(paper(), approach=PAPER_APPROACH, solvers=[Sloppy(1e-3)])
+    (reference, poor) = comparison.entries
+    assert reference.contact is not None
+    assert poor.contact is not None
+    apart = np.abs(poor.contact.loads - reference.contact.loads).max()
+    assert poor.disagreement == pytest.approx(apart / reference.contact.loads.max())
+    assert 1e-4 < poor.disagreement < 1e-3
+    different = int(np.sum(poor.contact.status != reference.contact.status))
+    assert poor.different_words == different > 0
+    assert comparison.contradictions == ()
+    assert comparison.certified  # by the reference
+
+
+@settings(max_examples=60, deadline=None)
+@given(random_scenes(crowding=2.0), st.floats(1e-12, 0.3), st.booleans())
+def test_certified_answers_never_exclude_each_other(
+    found: tuple[cr.Scene, float], error: float, by_load: bool
+) -> None:
+    scene, approach = found
+    prescribed = {"approach": approach}
+    if by_load and (load := cr.press(scene, approach=approach).load) > 0:
+        prescribed = {"load": load}
+    comparison = compare(scene, **prescribed, solvers=[Sloppy(error), BristleQP(16, False)])
+    assert comparison.contradictions == ()
+
+
+def test_nothing_touches() -> None:
+    comparison = compare(paper(), approach=-1e-6)
+    assert {entry.disagreement for entry in comparison.entries} == {0.0}
+    assert comparison.certified
+
+
+def test_solvers_that_do_not_answer() -> None:
+    others = [
+        Sloppy(instead=cr.SolverError("sloppy: stopped")),
+        Sloppy(instead=cr.InputError("scene", found="this", expected="another")),
+        BristleQP(16),
+    ]
+    failed, refused, answered = compare(paper(), approach=5e-5, solvers=others).entries[1:]
+    assert (failed.outcome, failed.message) == ("failed", "sloppy: stopped")
+    assert (refused.outcome, refused.message) == ("refused", "scene: found this, expected another")
+    for entry in (failed, refused):
+        assert np.isnan(entry.disagreement)
+        assert (entry.contact, entry.different_words, entry.memory) == (None, None, None)
+    assert answered.outcome == "answered"
+
+
+def test_without_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve = Newton.solve
+
+    def fail(self: Newton, problem: NormalProblem, start: Any = None) -> Solution:
+        if self.tolerance == Newton().tolerance:
+            raise cr.SolverError("newton: stopped")
+        return solve(self, problem, start)
+
+    monkeypatch.setattr(Newton, "solve", fail)
+    comparison = compare(paper(), approach=5e-5, solvers=[BristleQP(16), Newton(tolerance=1e-3)])
+    assert [entry.outcome for entry in comparison.entries] == ["failed", "answered", "answered"]
+    assert all(np.isnan(entry.disagreement) for entry in comparison.entries)
+    assert all(entry.different_words is None for entry in comparison.entries)
+    assert comparison.certified
+
+
+def test_wrong_input_is_raised() -> None:
+    with pytest.raises(cr.InputError, match="approach, load: found neither"):
+        compare(paper())
+    with pytest.raises(cr.InputError, match="load: found -1"):
+        compare(paper(), load=-1.0)
+
+
+def test_memory() -> None:
+    @dataclass(frozen=True)
+    class Greedy(Sloppy):
+        def solve(self, problem: NormalProblem, start: Any = None) -> Solution:
+            self.fill(80_000_000 if len(problem) > 2 else 8)
+            return super().solve(problem, start)
+
+        @staticmethod
+        def fill(size: int) -> None:
+            np.ones(size, dtype=np.uint8)
+
+    entries = compare(paper(), approach=5e-5, solvers=[Greedy(), Sloppy()]).entries
+    greedy, modest = (entry.memory for entry in entries[1:])
+    if greedy is None or modest is None:
+        assert not Path("/proc/self/clear_refs").exists()
+    else:
+        assert 7.5e7 < greedy < 2e8
+        assert modest < 2e7
+
+
+# Forged proofs: what a mistake in the mathematics would look like.
+
+
+def forged(contact: cr.Contact, **changes: Any) -> Answer:
+    return Answer("forged", contact.loads, replace(contact.certificate, **changes))
+
+
+def shifted(values: Any, index: int, by: float) -> Any:
+    values = np.array(values)
+    values[index] += by
+    return values
+
+
+@pytest.fixture(scope="module")
+def contact() -> cr.Contact:
+    return cr.press(paper(), approach=PAPER_APPROACH)
+
+
+def test_each_kind_of_contradiction(contact: cr.Contact) -> None:
+    true, proof = Answer.of(contact), contact.certificate
+    assert contradictions(true, true) == []
+    bound = proof.load_errors[7]
+    near = true._replace(loads=shifted(true.loads, 7, 1.9 * bound))
+    assert contradictions(true, near) == []
+    far = true._replace(loads=shifted(true.loads, 7, 2.1 * bound))
+    (line,) = contradictions(true, far)
+    assert line.startswith(f"newton and newton: loads of asperities 7: {true.loads[7]:.6g} +- ")
+
+    outermost = int(np.argmax(proof.gaps))
+    wide = shifted(proof.gaps, outermost, 3 * proof.gap_errors[outermost])
+    (line,) = contradictions(true, forged(contact, gaps=wide))
+    assert f"gaps of asperities {outermost}: " in line
+
+    (line,) = contradictions(true, forged(contact, approach=6e-5))
+    assert "approach 5.0000000000000002e-05 +- 0 and 6" in line
+    assert contradictions(true, forged(contact, approach=6e-5, approach_error=2e-5)) == []
+
+    words = np.where(proof.status == "open", "contact", "open")
+    (line,) = contradictions(true, forged(contact, status=words))
+    assert "words of asperities 0: contact and open; 1: " in line
+    assert line.endswith("; and 56 more")
+    undecided = np.full(len(words), "undecided")
+    assert contradictions(true, forged(contact, status=undecided)) == []
+    assert contradictions(true, forged(contact, status=words, scope="none")) == []
+
+
+@pytest.fixture
+def contradicting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every load of the bristles is called exact."""
+    press = cr.press
+
+    def lying(*arguments: Any, solver: Any, **options: Any) -> cr.Contact:
+        contact = press(*arguments, solver=solver, **options)
+        if solver.name != "bristles":
+            return contact
+        exact = np.zeros(len(contact.loads))
+        return replace(contact, certificate=replace(contact.certificate, load_errors=exact))
+
+    monkeypatch.setattr(comparing, "press", lying)
+
+
+@pytest.mark.usefixtures("contradicting")
+def test_contradictions_of_a_scene() -> None:
+    found = compare(paper(), approach=5e-5).contradictions
+    assert len(found) == len(NAMES) - 1
+    assert all("bristles: loads of asperities" in each for each in found)
+
+
+# The command.
+
+
+@pytest.fixture
+def command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Any:
+    """Run the command line in an empty folder, in this process."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> Outcome:
+        status = cli.main(arguments)
+        return Outcome(status, *capsys.readouterr())
+
+    return call
+
+
+def test_command(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(more='[units]\nlength = "m"\nforce = "N"\n'))
+    ran = command("compare", "a.toml")
+    assert (ran.status, ran.err) == (0, "")
+    assert "asperities         37 contact, 24 open\n" in ran.out
+    assert "duality gap        in N m, " in ran.out
+    table = ran.out.splitlines()[-len(NAMES) - 1 :]
+    assert table[0].split() == [
+        *("solver", "disagreement", "load", "error", "duality", "gap", "certificate", "words"),
+        *("iterations", "seconds", "MB"),
+    ]
+    assert len({len(line) for line in table}) == 1
+    for name, line in zip(NAMES, table[1:], strict=True):
+        assert re.match(rf"{re.escape(name)} +\S+ +\S+ +\S+ +global +same +\d+ +\S+ +\S+$", line)
+    assert list(tmp_path.iterdir()) == [tmp_path / "a.toml"]
+
+
+def test_command_in_json(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    ran = command("compare", "a.toml", "--json")
+    assert (ran.status, ran.err) == (0, "")
+    summary = json.loads(ran.out)
+    assert (summary["schema"], summary["version"]) == (1, cr.__version__)
+    assert summary["contradictions"] == []
+    assert [row["solver"] for row in summary["compare"]] == NAMES
+    for row in summary["compare"]:
+        assert (row["outcome"], row["message"]) == ("answered", "")
+        assert (row["contact"], row["open"], row["undecided"]) == (37, 24, 0)
+        assert row["load"] == pytest.approx(3.60853389e-7, rel=1e-3)
+        assert row["scope"] == "global"
+        assert 0 <= row["disagreement"] <= row["load_error"] / row["largest_load"] * 1.001
+        assert row["seconds"] > 0
+        assert row["iterations"] > 0
+
+
+def fail(*_: Any, **__: Any) -> None:
+    raise cr.SolverError("bristles: stopped")
+
+
+def test_command_when_a_solver_fails(
+    command: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    monkeypatch.setattr(BristleQP, "solve", fail)
+    ran = command("compare", "a.toml")
+    assert ran.status == 4
+    assert re.search(r"^bristles  +failed( +-){7}$", ran.out, re.M)
+    assert ran.out.endswith("\nbristles: stopped\n")
+    assert "convexrough: warning: bristles: failed\n" in ran.err
+    ran = command("compare", "a.toml", "--json")
+    assert ran.status == 4
+    row = json.loads(ran.out)["compare"][-1]
+    assert (row["outcome"], row["message"]) == ("failed", "bristles: stopped")
+    assert row["disagreement"] is None
+
+
+@pytest.mark.usefixtures("contradicting")
+@pytest.mark.parametrize("also_failed", [False, True])
+def test_command_on_a_contradiction(
+    command: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    also_failed: bool,
+) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    if also_failed:
+        monkeypatch.setattr(cr.solvers.ConicCVXPY, "solve", fail)
+    ran = command("compare", "a.toml")
+    assert ran.status == 3
+    assert "convexrough: warning: contradiction: newton and bristles: loads of " in ran.err
+
+
+def test_command_beyond_the_convex_range(command: Any, tmp_path: Path) -> None:
+    """Newton's method answers without a proof; the convex programs refuse by asperity."""
+    dense = scene_text().replace("tip_radius = 0.02", "tip_radius = 5.0")
+    (tmp_path / "a.toml").write_text(dense)
+    ran = command("compare", "a.toml", "--json")
+    assert ran.status == 3
+    first, *rest = json.loads(ran.out)["compare"]
+    assert (first["outcome"], first["scope"], first["load_error"]) == ("answered", "none", None)
+    assert {row["outcome"] for row in rest} == {"refused"}
+    assert all("too dense for a convex program" in row["message"] for row in rest)
+    assert "not certified: no answer has a proved word for every asperity" in ran.err
+    assert re.search(r"^newton +0 +unknown +- +none +", command("compare", "a.toml").out, re.M)
+
+
+def test_command_with_wrong_input(command: Any, tmp_path: Path) -> None:
+    assert command("compare", "none.toml").status == 2
+    (tmp_path / "a.toml").write_text(scene_text(normal="approach = nan"))
+    ran = command("compare", "a.toml")
+    assert (ran.status, ran.out) == (2, "")
+    assert "a.toml: [normal] approach: found nan" in ran.err
+
+
+@pytest.mark.parametrize(
+    ("name", "solver"),
+    [
+        ("newton", "newton"),
+        ("conic", "conic + Newton step"),
+        ("conic_cvxpy", "conic in CVXPY + Newton step"),
+        ("bristles", "bristles + Newton step"),
+    ],
+)
+def test_a_solver_by_its_name_in_a_scene_file(
+    command: Any,
+    tmp_path: Path,
+    name: str,
+    solver: str,
+) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(more=f'[solver]\nname = "{name}"\n'))
+    ran = command("run", "a.toml", "--json", "--no-figures")
+    assert ran.status == 0
+    assert json.loads(ran.out)["normal"]["solver"] == solver
+
+
+def test_scattered_scenes_of_one_asperity() -> None:
+    scene, approach = scattered(3, 1, 0.5, 0.0)
+    comparison = compare(scene, approach=approach)
+    assert comparison.contradictions == ()
+    assert comparison.certified
+    assert [entry.outcome for entry in comparison.entries] == ["answered"] * len(NAMES)

@@ -1,0 +1,130 @@
+"""What downstream tests call: it must pass what is right, and say what is wrong."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import PAPER_APPROACH, paper, scattered
+
+import convexrough as cr
+from convexrough.testing import assert_agree, assert_certified
+
+PAGE = Path(__file__).parent.parent / "docs" / "testing.md"
+
+
+@pytest.fixture(scope="module")
+def contact() -> cr.Contact:
+    return cr.press(paper(), approach=PAPER_APPROACH)
+
+
+def failure(call: Any, *arguments: Any, **options: Any) -> str:
+    """The message of the assertion that fails."""
+    with pytest.raises(AssertionError) as caught:
+        call(*arguments, **options)
+    return str(caught.value)
+
+
+def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    blocks = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.M | re.S)
+    assert len(blocks) == 3
+    exec("\n".join(blocks), {})
+    assert re.match(
+        r"loads are proved to \S+ of the largest, expected 1e-06: ", capsys.readouterr().out
+    )
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_certified(contact: cr.Contact, control: str) -> None:
+    prescribed = {control: getattr(contact, control)}
+    certificate = assert_certified(paper(), contact.loads, **prescribed, within=1e-11)
+    assert list(certificate.status) == list(contact.status)
+    assert_certified(paper(), list(contact.loads), **prescribed)
+
+
+def test_a_scene_out_of_reach_is_certified_too() -> None:
+    assert_certified(paper(), 0.0, approach=-1e-6, within=1e-12)
+
+
+def test_loads_not_certified_as_closely_as_asked(contact: cr.Contact) -> None:
+    loads = np.array(contact.loads)
+    loads[5] *= 1 + 1e-4
+    assert_certified(paper(), loads, approach=PAPER_APPROACH)  # the words are still proved
+    message = failure(assert_certified, paper(), loads, approach=PAPER_APPROACH, within=1e-6)
+    bound = float(
+        re.match(r"loads are proved to (\S+) of the largest, expected 1e-06: ", message)[1]
+    )  # type: ignore[index]
+    assert 1e-6 < bound < 1e-3
+    assert message.count("+-") == 2 * 5
+    assert re.search(r"; and \d+ more$", message)
+
+
+def test_an_asperity_left_out(contact: cr.Contact) -> None:
+    loads = np.array(contact.loads)
+    loads[int(np.argmin(np.where(loads > 0, loads, np.inf)))] = 0.0
+    message = failure(assert_certified, paper(), loads, approach=PAPER_APPROACH)
+    words = cr.certify(paper(), loads, approach=PAPER_APPROACH).status
+    doubtful = np.flatnonzero(words == "undecided")
+    assert message.startswith(f"{len(doubtful)} of 61 asperities are undecided: ")
+    named = [int(i) for i in re.findall(r"(\d+) at \(", message)]
+    assert len(named) == 5
+    assert set(named) < set(doubtful)
+    x, y = paper().asperities.positions[named[0]]
+    assert f" {named[0]} at ({x:.6g}, {y:.6g}) has load 0 +- " in message
+    assert message.count(", undecided") == 5
+
+
+def test_nothing_to_prove() -> None:
+    dense, approach = scattered(4, 5, 3.0, 0.0)
+    loads = cr.press(dense, approach=approach).loads
+    message = failure(assert_certified, dense, loads, approach=approach)
+    assert message.startswith("nothing is proved of the loads: ")
+    assert "convexity number" in message
+    found = failure(assert_agree, loads, loads, scene=dense, approach=approach)
+    assert found.startswith("nothing is proved of the loads of first: ")
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_two_that_agree(contact: cr.Contact, control: str) -> None:
+    prescribed = {control: getattr(contact, control)}
+    first = cr.press(paper(), **prescribed)
+    second = cr.press(paper(), **prescribed, solver=cr.solvers.BristleQP(newton_step=False))
+    assert_agree(first, second)
+    assert_agree(first, second, within=1e-3)
+    assert_agree(second.loads, first, scene=paper(), **prescribed)
+    message = failure(assert_agree, first, second, within=1e-6)
+    assert message.startswith("first (newton) and second (bristles): loads differ by ")
+    assert "expected 1e-06: asperities " in message
+
+
+def test_answers_to_different_problems(contact: cr.Contact) -> None:
+    other = cr.press(paper(), approach=1.01 * PAPER_APPROACH)
+    message = failure(assert_agree, contact, other)
+    assert "loads of asperities " in message
+    assert "approach 5.0000000000000002e-05 +- 0 and 5.05" in message
+    worst = int(np.argmax(np.abs(contact.loads - other.loads)))
+    assert f"asperities {worst}: {contact.loads[worst]:.6g} +- " in message
+
+
+def test_words_that_exclude_each_other(contact: cr.Contact) -> None:
+    words = np.array(contact.status)
+    words[3] = "open"
+    forged = replace(contact, certificate=replace(contact.certificate, status=words))
+    message = failure(assert_agree, contact, forged)
+    assert message == (
+        "first (newton) and second (newton): words of asperities 3: contact and open"
+    )
+    words[3] = "undecided"
+    assert_agree(contact, replace(contact, certificate=replace(contact.certificate, status=words)))
+
+
+def test_wrong_use(contact: cr.Contact) -> None:
+    with pytest.raises(cr.InputError, match="scene: found none"):
+        assert_agree(contact, contact.loads)
+    small, approach = scattered(1, 4, 0.3, 0.0)
+    with pytest.raises(cr.InputError, match="second: found 4, expected as many"):
+        assert_agree(contact, cr.press(small, approach=approach))
+    with pytest.raises(cr.InputError, match=r"loads\[0\]: found -1"):
+        assert_certified(paper(), -1.0, approach=PAPER_APPROACH)
