@@ -93,6 +93,8 @@ def friction(coefficient: float | None) -> float:
 def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
     """Shear forces that friction can bear, |Q| <= limit = f P; of any shape."""
     try:
+        if np.iscomplexobj(forces):
+            raise TypeError("complex")
         given = np.asarray(forces, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(what, found=repr(forces)[:60], expected="numbers") from error

@@ -104,7 +104,7 @@ def judge_vectors(
     return Bounds(
         proved=np.array([np.isfinite(rise_error)]),
         increments=increments[None],
-        slips=slips[None],
+        slips=np.where(known.sure, slips, np.inf)[None],
         rises=np.array([rise_error]),
         sliding=sliding[None],
         partial=partial[None],

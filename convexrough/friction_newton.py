@@ -43,20 +43,17 @@ class FrictionNewton:
         """The state of a total increment (2,), |T| < sum P (own units)."""
         size = float(np.hypot(*total))
         limit = float(problem.scalar.loads.sum())
-        # Below 1e-20 of the limit the state is elastic, so proportional to T: no powers underflow.
-        scale = min(size / (1e-20 * limit), 1.0)
-        reduced = total / scale
-        scalar = problem.scalar.solve(np.array([np.hypot(*reduced)]))
+        scalar = problem.scalar.solve(np.array([size]))
         start = scalar.deflections[0][:, None] * (total / size)
-        iterate = _evaluate(problem, start, reduced)
+        iterate = _evaluate(problem, start, total)
         if iterate is None:
             raise SolverError("friction (newton): no forces of the prescribed total to start from")
         for iteration in range(1, self.max_iterations + 1):
-            following = _step(problem, iterate, reduced)
+            following = _step(problem, iterate, total)
             accurate = iterate.residual <= self.tolerance * float(np.hypot(*iterate.rise))
             if accurate and following.residual >= 0.5 * iterate.residual:
                 best = min(iterate, following, key=lambda each: each.residual)
-                return _state(problem, best, total, scale, iteration)
+                return _state(problem, best, total, iteration)
             iterate = following
         worst = iterate.residual / float(np.hypot(*iterate.rise))
         raise SolverError(
@@ -76,17 +73,15 @@ class _Iterate(NamedTuple):
     energy: float
 
 
-def _state(
-    problem: VectorProblem, iterate: _Iterate, total: Array, scale: float, iterations: int
-) -> VectorState:
+def _state(problem: VectorProblem, iterate: _Iterate, total: Array, iterations: int) -> VectorState:
     """The answer; slips are what eta has beyond the ceiling."""
     size = np.hypot(*iterate.deflections.T)
     beyond = np.maximum(size - problem.scalar.ceilings, 0.0)
     return VectorState(
         total=total,
-        increments=iterate.increments * scale,
-        rise=iterate.rise * scale,
-        slips=along(beyond, iterate.deflections, size) * scale,
+        increments=iterate.increments,
+        rise=iterate.rise,
+        slips=along(beyond, iterate.deflections, size),
         iterations=iterations,
     )
 

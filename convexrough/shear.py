@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from convexrough import checks, hertz
 from convexrough.certificate import Scope
 from convexrough.checks import Array, frozen
+from convexrough.errors import InputError
 from convexrough.contact import Contact
 from convexrough.shear_certificate import judge_states
 from convexrough.tangential import TangentialProblem
@@ -79,8 +80,10 @@ def shear(contact: Contact, *, force: float) -> ShearState:
     """
     scene = contact.scene
     friction = checks.friction(scene.friction)
-    force = checks.finite("force", force)
-    checks.bearable("force", force, friction * contact.load)
+    given = checks.bearable("force", force, friction * contact.load)
+    if given.ndim:
+        raise InputError("force", found=f"shape {given.shape}", expected="one number")
+    force = float(given)
     sign = float(np.sign(force))
     if contact.load == 0.0:
         return _nothing_loaded(contact)

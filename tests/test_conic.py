@@ -58,7 +58,9 @@ def test_named_scenes(name: str, solver: cr.solvers.Solver, control: str) -> Non
     assert contact.certificate.holds
     assert contact.certificate.scope == "global"
     assert contact.certificate.load_error < 1e-10 * contact.loads.max()
-    assert contact.certificate.duality_gap < 1e-15 * contact.load * contact.approach
+    assert (
+        contact.certificate.duality_gap < 1e-14 * contact.load * contact.approach
+    )  # rounding is counted
     exact = reference(scene, **prescribed)
     errors = np.abs(multiprecision.errors(contact.loads, exact.loads))
     assert errors.max() < 1e-12 * contact.loads.max()
