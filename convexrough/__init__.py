@@ -11,8 +11,7 @@ from convexrough.scene import Asperities, Material, Scene
 from convexrough.scene_file import SceneFile, read_scene
 from convexrough.shear import ShearCertificate, ShearState, onset_of_sliding, shear
 from convexrough.smooth import SmoothSphere, smooth
-
-__version__ = "0.1.0"
+from convexrough.version import __version__
 
 __all__ = [
     "Asperities",
@@ -32,6 +31,7 @@ __all__ = [
     "SmoothSphere",
     "SolverError",
     "VectorShearState",
+    "__version__",
     "certify",
     "cycle",
     "cycles",

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from convexrough import __version__
 from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
+from convexrough.version import __version__
 
 if TYPE_CHECKING:
     from convexrough.report import Summary

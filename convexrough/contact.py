@@ -66,7 +66,7 @@ def press(
     """Press the sphere on the asperities by an approach [length] or with a load [force].
 
     solver : default `solvers.Newton()`
-    start  : (n,) [force] loads to start from; the answer does not depend on it
+    start  : (n,) [force] loads to start from; in the convex range the answer is the same for all
 
     Raises InputError for bad values and SolverError where the solver stops without an answer. An
     answer without a certificate is returned: look at `contact.certificate.scope`.

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-import convexrough
 from convexrough.certificate import Certificate
 from convexrough.checks import Array
 from convexrough.compare import Comparison, Entry
 from convexrough.contact import Contact
 from convexrough.stages import Outcome
+from convexrough.version import __version__
 
 Summary = dict[str, Any]
 
@@ -92,7 +92,7 @@ def comparison_summary(comparison: Comparison) -> Summary:
     """The summary of a comparison, in the scene's units."""
     rows = [_entry_summary(entry) for entry in comparison.entries]
     found = {"compare": rows, "contradictions": list(comparison.contradictions)}
-    return {"schema": 1, "version": convexrough.__version__} | found
+    return {"schema": 1, "version": __version__} | found
 
 
 def _entry_summary(entry: Entry) -> Summary:
@@ -278,7 +278,7 @@ def proved(summary: Summary) -> bool:
 
 
 def _headed(normal: Summary) -> Summary:
-    return {"schema": 1, "version": convexrough.__version__, "normal": normal}
+    return {"schema": 1, "version": __version__, "normal": normal}
 
 
 def _judged(certificate: Certificate, loads: Array) -> Summary:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from convexrough import checks, hertz
 from convexrough.certificate import Scope
 from convexrough.checks import Array, frozen
-from convexrough.errors import InputError
 from convexrough.contact import Contact
+from convexrough.errors import InputError
 from convexrough.shear_certificate import judge_states
 from convexrough.tangential import TangentialProblem
 
