@@ -183,6 +183,7 @@ def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
         ("convexity number", f"{proof['convexity_number']:.4g}  (convex below 1)"),
         ("load error", f"{_quantity(_bound(proof['load_error']), force_unit)}{relative}"),
         ("gap error", _quantity(_bound(proof["gap_error"]), length_unit)),
+        ("duality gap", _quantity(_bound(proof["duality_gap"]), f"{force_unit} {length_unit}")),
     ]
     if "solver" in normal:
         steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
