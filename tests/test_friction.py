@@ -16,7 +16,7 @@ import convexrough as cr
 from convexrough import cones, friction_cones, hertz
 from convexrough.friction import FrictionConic, FrictionNewton, VectorShearState, shear_vector
 from convexrough.friction_certificate import judge_vectors
-from convexrough.friction_problem import VectorProblem
+from convexrough.friction_problem import VectorProblem, VectorState
 
 FRICTION = 0.5
 FRACTIONS = [1e-9, 1e-3, 0.1, 0.3, 0.5, 0.8, 0.99]
@@ -519,7 +519,7 @@ def test_rest_and_nothing_loaded() -> None:
 @given(
     st.sampled_from(["paper", "rough"]),
     st.floats(1e-6, 0.999),
-    st.sampled_from(["swap", "perturb", "turn", "drop", "zero", "rise"]),
+    st.sampled_from(["swap", "perturb", "turn", "drop", "zero", "rise", "slip"]),
     st.integers(0, 2**32 - 1),
 )
 def test_attacks_on_the_words(name: str, fraction: float, kind: str, seed: int) -> None:
@@ -529,7 +529,7 @@ def test_attacks_on_the_words(name: str, fraction: float, kind: str, seed: int) 
     total = np.array([0.8, 0.6]) * fraction * problem.scalar.loads.sum()
     good = FrictionNewton().solve(problem, total)
     rng = np.random.default_rng(seed)
-    q, rise = good.increments.copy(), good.rise
+    q, rise, slips = good.increments.copy(), good.rise, good.slips.copy()
     size = 10.0 ** rng.uniform(-14, -1)
     if kind == "swap":
         i, j = rng.integers(len(q), size=2)
@@ -542,10 +542,12 @@ def test_attacks_on_the_words(name: str, fraction: float, kind: str, seed: int) 
         q[rng.integers(len(q))] = 0.0
     elif kind == "zero":
         q[:] = 0.0
+    elif kind == "slip":
+        slips[rng.integers(len(q))] += size * rise
     else:
         rise = rise * (1 + size * rng.standard_normal(2))
     q /= np.maximum(lengths(q) / problem.scalar.loads, 1.0)[:, None]
-    wrong = good._replace(increments=q, rise=rise)
+    wrong = good._replace(increments=q, rise=rise, slips=slips)
     bounds = judge_vectors(problem, contact, wrong, gross=False)
     sliding = lengths(good.slips) > 0
     assert not (bounds.sliding[0] & ~sliding).any()
@@ -556,39 +558,40 @@ def test_attacks_on_the_words(name: str, fraction: float, kind: str, seed: int) 
 
 
 def test_the_residual_sees_every_fault() -> None:
-    """The judge itself is judged: a state with one condition broken, each in its turn."""
-    problem = VectorProblem.of(pressed("paper", 0.5))
-    P = problem.scalar.loads
-    good = FrictionNewton().solve(problem, np.array([0.5, 0.0]) * P.sum())
-    assert problem.residual(good) < 1e-14
-    slides = np.flatnonzero(lengths(good.slips))[0]
-    sticks = np.flatnonzero(lengths(good.slips) == 0)[0]
-    X = np.hypot(*good.rise)
+    """The judge itself is judged: one asperity that slides, one condition broken in its turn."""
+    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.01), cr.Material(1.0, 0.5), FRICTION)
+    problem = VectorProblem.of(cr.press(scene, approach=1e-4))
+    P, ceiling = problem.scalar.loads[0], problem.scalar.ceilings[0]
+    along_x = np.array([[1.0, 0.0]])
 
-    def balanced(increments: np.ndarray, extra: np.ndarray) -> float:
-        """With slips that balance the displacements where there is a slip already, or `extra`."""
-        left = good.rise - problem.own(increments) - problem.couple(increments)
-        some = (lengths(good.slips) > 0)[:, None] | extra
-        return problem.residual(good._replace(increments=increments, slips=np.where(some, left, 0)))
+    def residual(share: float, slip: tuple[float, float], off: float = 0.0) -> float:
+        """Of a state with displacements that balance, but for `off` across."""
+        q, slips = share * P * along_x, ceiling * np.array([slip])
+        rise = (problem.own(q) + slips)[0] + [0.0, off * ceiling]
+        return problem.residual(VectorState(q[0], q, rise, slips, 1))
 
-    none = np.zeros(good.slips.shape, dtype=bool)
-    assert balanced(good.increments, none) < 1e-13
-    turned = good.increments.copy()
-    turned[slides] = turned[slides] @ [[np.cos(0.1), -np.sin(0.1)], [np.sin(0.1), np.cos(0.1)]]
-    slipping = good.slips.copy()
-    slipping[slides] += 1e-3 * X * np.array([-1, 1]) * good.increments[slides, ::-1] / P[slides]
-    faults = {
-        "balance": good._replace(rise=good.rise * (1 + 1e-3)),
-        "direction": good._replace(slips=slipping),
-        "total": good._replace(total=good.total * (1 + 1e-3)),
-        "friction": good._replace(increments=np.where(P[:, None] > 0, 1.1, 1) * good.increments),
-    }
-    for state in faults.values():
-        assert problem.residual(state) > 1e-4
-    weaker, extra = good.increments.copy(), none.copy()
-    weaker[sticks] *= 0.9
-    extra[sticks] = True
-    assert balanced(weaker, extra) > 1e-3  # slips, though it has friction left
+    assert residual(1.0, (0.5, 0.0)) < 1e-14
+    assert residual(0.7, (0.0, 0.0)) < 1e-14
+    assert residual(1.0, (0.5, 0.0), off=1e-3) > 1e-4  # balance
+    assert residual(1.0, (0.5, 1e-3)) > 1e-4  # slip across the force
+    assert residual(1.0, (-0.5, 0.0)) > 1e-4  # slip against it
+    assert residual(0.7, (1e-3, 0.0)) > 1e-4  # slip, though friction is left
+    assert residual(1.001, (0.5, 0.0)) > 1e-4  # more than friction
+    q = P * along_x
+    short = VectorState(1.001 * q[0], q, problem.own(q)[0], 0 * q, 1)
+    assert problem.residual(short) > 1e-4  # total
+
+
+def test_gross_sliding_of_two_that_pull_each_other_aside_alike() -> None:
+    """Then a finite displacement, with a part across the force, slides both along it."""
+    points = [[-2e-3, -2e-3], [2e-3, 2e-3]]
+    scene = cr.Scene(1.0, cr.Asperities(points, 0.01), cr.Material(1.0, 0.5), FRICTION)
+    contact = cr.press(scene, approach=1e-4)
+    state = shear_vector(contact, force=FRICTION * contact.load)
+    assert 0.01 < state.displacement[1] / state.displacement[0] < 0.1
+    assert state.residual < 1e-13
+    assert_solves(state, 1e-12)
+    assert (state.status == "sliding").all()
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-4, 1e-2])
