@@ -175,7 +175,7 @@ class VectorProblem:
     def shift(self) -> Shift:
         """A shift for the cones and the dual bound, confirmed by Cholesky.
 
-        By the neighbours' distances (docs/theory/friction.md), 2 / (2 - nu) times
+        By the neighbours' distances, as proved in docs/theory/friction.md, 2 / (2 - nu) times
 
             1 / (pi E* s_i) at nu = 0,    (9/4) (1 - 2 nu / 3) / (pi E* s_i) for 0 < nu <= 1/2.
 

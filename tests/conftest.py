@@ -1,4 +1,4 @@
-"""Random scenes are drawn anew on every run by hand, and the same ones in continuous integration."""
+"""Random scenes are new on every run by hand, and the same ones in continuous integration."""
 
 import os
 
