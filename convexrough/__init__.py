@@ -6,6 +6,8 @@ from convexrough.contact import Contact, press
 from convexrough.cycle import Cycle, Loop, cycle, cycles
 from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
 from convexrough.friction import VectorShearState, shear_vector
+from convexrough.friction_cones import FrictionConic
+from convexrough.friction_newton import FrictionNewton
 from convexrough.history import History, history
 from convexrough.scene import Asperities, Material, Scene
 from convexrough.scene_file import SceneFile, read_scene
@@ -20,6 +22,8 @@ __all__ = [
     "ConvexroughError",
     "Cycle",
     "FileError",
+    "FrictionConic",
+    "FrictionNewton",
     "History",
     "InputError",
     "Loop",
