@@ -14,7 +14,6 @@ solution delta* = D - A P* is the indentation where positive and minus the gap w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -22,10 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks, hertz
-from convexrough.checks import Array, frozen
+from convexrough.checks import Array, Indices, frozen
 from convexrough.errors import InputError
-from convexrough.influence import ROUNDOFF, DenseInfluence
-from convexrough.normal import SAFETY, NormalProblem
+from convexrough.influence import Coupling, DenseInfluence, Influence, Kind, spread
+from convexrough.normal import NormalProblem
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene import Scene
 
 Scope = Literal["global", "local", "none"]
@@ -33,14 +33,20 @@ Scope = Literal["global", "local", "none"]
 #: Roundoffs lost in k P^(2/3) and in adding it, A P and D up.
 SUM_ROUNDOFFS = 16
 
+WORDS = np.array(["undecided", "contact", "open"])
+
+#: Convexity number of the loads themselves from which shells fitted to them are tried.
+FIT_FROM = 0.8
+
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
     """What is proved of given loads. Arrays are (n,), in the caller's order.
 
     scope : "global": the scene has one solution, and the bounds are on the distance to it;
-        "local": it has one solution with no contact radius above convexity_number * (pi/4) times
-        the distance to the nearest neighbour, and the bounds are on the distance to that;
+        "local": it has one solution with contact radii a_i up to convexity_number (pi/2) s_i,
+        where s_i + s_j <= r_ij share out the room between neighbours (by halves, or by the sizes
+        of their contacts), and the bounds are on the distance to that;
         "none": nothing is proved, every bound is infinite and every asperity undecided
     convexity_number : where below 1, the energy is strictly convex on the box used: the smallest
         eigenvalue of its Hessian, scaled by its local part, is at least 1 - convexity_number
@@ -88,17 +94,20 @@ def certify(
     *,
     approach: float | None = None,
     load: float | None = None,
+    influence: Kind | None = None,
 ) -> Certificate:
     """Judge loads that came from anywhere.
 
     loads : (n,) [force], not negative, in the order of the scene's asperities
     approach [length] or load [force] : what is prescribed, exactly one. Under load control the
         loads are judged after scaling them to the prescribed total; the bounds include that.
+    influence : how to couple the asperities: "dense", "lattice", "scattered"; None for the cheapest
 
     Raises InputError for loads of the wrong length, negative or not finite.
     """
     values = checks.array("loads", loads, length=len(scene), sign="not negative")
-    return judge(NormalProblem.assemble(scene, approach=approach, load=load), values)
+    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
+    return judge(problem, values)
 
 
 def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
@@ -109,10 +118,11 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
     box = _find_box(problem, loads, fit.displacement)
     if box is None:
         return _unproved(problem, loads, fit)
+    problem = box.problem
 
     # || P - P* ||_H <= norm, and what that says of each load.
     h = box.stiffness
-    norm = _norm(fit.residual, h, box.convexity_number)
+    norm = _norm(fit, h, box.convexity_number)
     errors = norm / np.sqrt(h)
     if (loads + errors >= box.faces).any():  # the solution may lie outside the local box
         return _unproved(problem, loads, fit)
@@ -121,15 +131,16 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
     near = np.minimum(box.loads, loads + errors)
     if (theta := problem.convexity_number(near)) <= box.convexity_number:
         h = problem.stiffness(near)
-        norm = _norm(fit.residual, h, theta)
+        norm = _norm(fit, h, theta)
         errors = norm / np.sqrt(h)
 
     # What it says of A P and D0, and so of delta* = D - A P*.
-    spread = norm * problem.influence.spread(1.0 / h) * (1 + SAFETY)
+    A = problem.influence
+    moved = norm * spread(A, A.scale, 1.0 / h) * (1 + SAFETY)
     approach_error = 0.0
     if problem.load is not None:
-        approach_error = _approach_error(problem, loads, fit, errors, spread)
-    error = spread + fit.rounding + approach_error
+        approach_error = _approach_error(problem, loads, fit, errors, moved)
+    error = moved + fit.rounding + fit.single + approach_error
     touches = (loads > errors) | (fit.indentation > error)
 
     # delta* gives a second bound on each load, sharper where the load is small.
@@ -141,16 +152,19 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
     # Everyone, in the caller's order; the screened asperities carry nothing.
     indentation = problem.to_scene(fit.indentation)
     error = problem.to_scene(error)
-    for block, product, rounding, reach in _screened(problem, loads, fit.approach, 1.0 / h):
-        indentation[block] = product
-        error[block] = norm * reach * (1 + SAFETY) + rounding + approach_error
+    others, without = _screened(problem, loads, fit.approach)
+    if without is not None:
+        indentation[others] = without.indentation
+        moved = norm * spread(without.coupling, A.scale, 1.0 / h) * (1 + SAFETY)
+        error[others] = moved + without.rounding + approach_error
     load_errors = scene_loads.copy()
     load_errors[problem.candidates] = errors * problem.units.force
-    words = (problem.to_scene(touches) > 0, indentation < -error)
+    words = np.where(indentation < -error, 2, 0)
+    words[problem.candidates[touches]] = 1
     return Certificate(
         scope=box.scope,
         convexity_number=box.convexity_number,
-        status=frozen(np.select(words, ("contact", "open"), "undecided")),
+        status=frozen(WORDS[words]),
         load_errors=frozen(load_errors),
         gaps=frozen(np.maximum(-indentation, 0.0) * problem.units.length),
         gap_errors=frozen(error * problem.units.length),
@@ -168,8 +182,10 @@ class _Fit(NamedTuple):
     indentation: Array  # D - A P
     gap: Array  # k P^(2/3) + A P - D
     local: Array  # k P^(2/3)
-    rounding: Array  # bound on the error of each of the above
-    residual: Array  # bound on |e|: |gap| where loaded, its negative part where not
+    rounding: Array  # bound on the error of each of the above, less a remainder
+    remainder: float  # bound on the 2-norm of that
+    single: float  # bound on each component of it
+    residual: Array  # bound on |e|, less the remainder: |gap| where loaded, else its negative part
     approach: float  # D0
 
 
@@ -177,16 +193,18 @@ class _Box(NamedTuple):
     """A box of loads that holds the solution, and how convex the energy is on it."""
 
     scope: Scope
+    problem: NormalProblem  # with the shells that prove it
     loads: Array  # the upper corner
     stiffness: Array  # h there
     convexity_number: float  # 1 - mu
     faces: Array  # upper faces that the solution must be shown to stay below; else infinite
 
 
-def _norm(residual: Array, stiffness: Array, convexity_number: float) -> float:
+def _norm(fit: _Fit, stiffness: Array, convexity_number: float) -> float:
     """|| e ||_{H^-1} / (1 - theta)."""
-    squared = float(np.sum(residual**2 / stiffness))
-    return float(np.sqrt(squared)) / (1.0 - convexity_number) * (1 + SAFETY)
+    squared = float(np.sum(fit.residual**2 / stiffness))
+    remainder = fit.remainder / np.sqrt(float(stiffness.min(initial=np.inf)))
+    return float(np.sqrt(squared) + remainder) / (1.0 - convexity_number) * (1 + SAFETY)
 
 
 def _scaled_to(load: float, given: Array) -> Array:
@@ -206,10 +224,12 @@ def _fit(problem: NormalProblem, loads: Array) -> _Fit:
         approach = float(weights @ (local + displacement - problem.offsets) / weights.sum())
     indentation = approach + problem.offsets - displacement
     gap = local - indentation
-    rounding = problem.influence.product_error * displacement + problem.offset_errors
-    rounding += SUM_ROUNDOFFS * ROUNDOFF * (local + displacement + abs(approach))
+    off = problem.influence.rounding(loads)
+    # The relative part is of the true product, which the computed one may miss by the remainder.
+    rounding = off.relative * (np.maximum(displacement, 0.0) + off.single) + problem.offset_errors
+    rounding += SUM_ROUNDOFFS * ROUNDOFF * (local + np.abs(displacement) + abs(approach))
     residual = np.where(loads > 0, np.abs(gap) + rounding, np.maximum(rounding - gap, 0.0))
-    return _Fit(displacement, indentation, gap, local, rounding, residual, approach)
+    return _Fit(displacement, indentation, gap, local, rounding, off.norm, off.single, residual, approach)
 
 
 def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box | None:
@@ -221,26 +241,35 @@ def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box
     h = problem.stiffness(corner)
     nowhere = np.full(len(problem), np.inf)
     if (theta := problem.convexity_number(corner)) < 1:
-        return _Box("global", corner, h, theta, nowhere)
+        return _Box("global", problem, corner, h, theta, nowhere)
     if (margin := _convex_margin(problem.influence, h)) > 0:
-        return _Box("global", corner, h, 1.0 - margin, nowhere)
-    if (theta := problem.convexity_number(loads)) < 1:
+        return _Box("global", problem, corner, h, 1.0 - margin, nowhere)
+    theta = problem.convexity_number(loads)
+    if theta > FIT_FROM:
+        fitted = problem.fitted_to(loads)
+        if (number := fitted.convexity_number(loads)) < theta:
+            problem, theta = fitted, number
+    if theta < 1:
         theta = (1.0 + theta) / 2.0
         # The faces a_i = theta (pi/2) s_i, where h_i = shell_i / theta.
         faces = (2.0 / 3.0 * problem.coefficients * theta / problem.shells) ** 3
         local = np.minimum(corner, faces)
         beyond = np.where(faces < corner, faces, np.inf)
-        return _Box("local", local, problem.stiffness(local), theta, beyond)
+        return _Box("local", problem, local, problem.stiffness(local), theta, beyond)
     return None
 
 
-def _convex_margin(influence: DenseInfluence, stiffness: Array) -> float:
+def _convex_margin(influence: Influence, stiffness: Array) -> float:
     """A proved mu with  I + H^(-1/2) A H^(-1/2) >= mu I;  0 where none is found.
+
+    Only where there is a matrix: a factorisation costs as the cube of its size.
 
     A Cholesky factorisation that runs to its end on B proves that B's smallest eigenvalue is not
     below minus some (n + 2) roundoffs of its trace (Rump, BIT 46 (2006) 433). Any mu will do:
     the bounds are sharpened afterwards on a smaller box.
     """
+    if not isinstance(influence, DenseInfluence):
+        return 0.0
     from scipy.linalg.lapack import dpotrf  # 0.2 s to import: only if the shells do not settle it
 
     n = len(stiffness)
@@ -256,33 +285,44 @@ def _convex_margin(influence: DenseInfluence, stiffness: Array) -> float:
 
 
 def _approach_error(
-    problem: NormalProblem, loads: Array, fit: _Fit, errors: Array, spread: Array
+    problem: NormalProblem, loads: Array, fit: _Fit, errors: Array, moved: Array
 ) -> float:
     """|D0 - D0*|, as D0* = k_i P*_i^(2/3) + (A P*)_i - d_i at every asperity sure to touch."""
     least = hertz.indentation(np.maximum(loads - errors, 0.0), problem.coefficients)
-    each = np.abs(fit.gap) + fit.rounding + (fit.local - least) + spread
+    each = np.abs(fit.gap) + fit.rounding + fit.single + (fit.local - least) + moved
     return float(each.min(where=loads > errors, initial=np.inf))
 
 
+class _Screened(NamedTuple):
+    """Of the asperities that cannot touch."""
+
+    coupling: Coupling  # from the candidates
+    indentation: Array  # D - A P
+    rounding: Array  # bound on its error
+
+
 def _screened(
-    problem: NormalProblem, loads: Array, approach: float, variances: Array
-) -> Iterator[tuple[NDArray[np.intp], Array, Array, Array]]:
-    """Of the asperities that cannot touch: indices, delta = D - A P, its rounding, the spread."""
+    problem: NormalProblem, loads: Array, approach: float
+) -> tuple[Indices, _Screened | None]:
+    """Indices in the scene, and what is known of them; None if there are none."""
     scene, length = problem.scene, problem.units.length
-    others = np.setdiff1d(np.arange(len(scene)), problem.candidates, assume_unique=True)
-    for block, rows, error in problem.influence.elsewhere(scene.contact_points[others]):
-        index = others[block]
-        product, offsets = rows @ loads, scene.offsets[index] / length
-        rounding = error * product + scene.offset_errors[index] / length
-        rounding += SUM_ROUNDOFFS * ROUNDOFF * (product + np.abs(offsets) + abs(approach))
-        reach = np.sqrt(rows**2 @ variances) * (1.0 + error)
-        yield index, approach + offsets - product, rounding, reach
+    if len(problem) == len(scene):
+        return np.zeros(0, dtype=np.intp), None
+    untouched = np.ones(len(scene), dtype=bool)
+    untouched[problem.candidates] = False
+    others = np.flatnonzero(untouched)
+    coupling = problem.influence.onto(scene.contact_points[others])
+    product, offsets = coupling.apply(loads), scene.offsets[others] / length
+    rounding = coupling.rounding(loads).of(product) + scene.offset_errors[others] / length
+    rounding += SUM_ROUNDOFFS * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(approach))
+    return others, _Screened(coupling, approach + offsets - product, rounding)
 
 
 def _unproved(problem: NormalProblem, loads: Array, fit: _Fit) -> Certificate:
     indentation = problem.to_scene(fit.indentation)
-    for block, product, *_ in _screened(problem, loads, fit.approach, loads):
-        indentation[block] = product
+    others, without = _screened(problem, loads, fit.approach)
+    if without is not None:
+        indentation[others] = without.indentation
     unknown = np.full(len(problem.scene), np.inf)
     return Certificate(
         scope="none",

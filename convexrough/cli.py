@@ -66,6 +66,7 @@ fractions = [0.6, -0.2, 0.3, -0.6, 0.6]  # of f P
 
 # [solver]
 # name = "newton"            # or "conic", "conic_cvxpy", "bristles"
+# influence = "lattice"      # or "dense", "scattered"; default: the cheapest that is exact
 """
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -110,11 +111,23 @@ def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: b
     file = read_scene(scene)
     folder = out or Path(f"{scene.stem}-results")
     claim_folder(folder, force=force)
-    with _blamed_on(scene), _progress(f"pressing on {len(file.scene)} asperities"):
-        contact = press(file.scene, approach=file.approach, load=file.load, solver=file.solver)
-    with _blamed_on(scene), _progress("shearing"):
+    pressing = f"pressing {len(file.scene):,} asperities"
+    with _blamed_on(scene), _progress(pressing) as show:
+        contact = press(
+            file.scene,
+            approach=file.approach,
+            load=file.load,
+            solver=file.solver,
+            influence=file.influence,
+            announce=lambda news: show(f"{pressing}: {news}"),
+        )
+    with _blamed_on(scene), _progress("shearing") as show:
         outcome = compute(
-            contact, shear_at=file.shear, cycle_between=file.cycle, history_of=file.history
+            contact,
+            shear_at=file.shear,
+            cycle_between=file.cycle,
+            history_of=file.history,
+            announce=lambda news: show(f"shearing: {news}"),
         )
     return _finish(folder, outcome, file.units, not no_figures, as_json)
 
@@ -217,6 +230,35 @@ def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int
         files += results.write_results(folder, outcome, summary, figures=False)
     lines = ["", *example.table(comparison), *_written(folder, files)]
     return _say(summary, as_json, lines)
+
+
+@program.command()
+@_output
+@click.option("--quick", is_flag=True, help="Fewer and smaller sizes: less than a minute.")
+@click.option("--page", metavar="FILE", type=_PATH, help="A Markdown page to renew, too.")
+def bench(
+    out: Path | None, no_figures: bool, force: bool, as_json: bool, quick: bool, page: Path | None
+) -> int:
+    """Speed against error: every solver, many sizes, the true error of each answer.
+
+    Results go to the folder bench-results unless --out names another. With --page, the tables also
+    go between the markers of that page, and the figures into the folder figures beside it.
+    """
+    from convexrough import bench as benching
+    from convexrough.report import to_json
+    from convexrough.results import claim_folder
+
+    if page is not None:
+        benching.split_page(page)  # a page without markers is refused before anything is computed
+    folder = out or Path("bench-results")
+    claim_folder(folder, force=force)
+    plan = benching.quick_plan() if quick else benching.full_plan()
+    with _progress("measuring") as show:
+        found = benching.run(plan, announce=show)
+        files = benching.write_bench(folder, found, figures=not no_figures, page=page)
+    lines = [to_json(benching.summarise(found))] if as_json else benching.describe(found)
+    click.echo("\n".join(lines if as_json else [*lines, *_written(folder, files)]))
+    return DONE
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,12 +9,10 @@ package, or a mistake in its code.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
-from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -24,6 +22,7 @@ from convexrough.certificate import Certificate
 from convexrough.checks import Array
 from convexrough.contact import Contact, press
 from convexrough.errors import ConvexroughError, InputError, SolverError
+from convexrough.memory import MemoryRise
 from convexrough.scene import Asperities, Material, Scene
 
 #: How many asperities a message names before it says "and so many more".
@@ -131,7 +130,7 @@ def _enter(
     reference: Contact | None,
 ) -> Entry:
     _load_code_of(solver)
-    memory = _Memory()
+    memory = MemoryRise()
     try:
         contact = press(scene, approach=approach, load=load, solver=solver)
     except SolverError as error:
@@ -220,33 +219,3 @@ def listed(items: Iterator[str]) -> str:
     named = list(items)
     more = f"; and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
     return "; ".join(named[:MOST_NAMED]) + more
-
-
-class _Memory:
-    """How far the resident memory of this process has risen above its level at the start.
-
-    Linux keeps the highest level and forgets it on request, whatever language asked for the memory.
-    """
-
-    def __init__(self) -> None:
-        self._before: int | None = None
-        with suppress(AttributeError, OSError, TypeError):  # glibc: give back what is freed
-            ctypes.CDLL(None).malloc_trim(0)
-        with suppress(OSError):
-            Path("/proc/self/clear_refs").write_text("5")
-            self._before = self._level("VmRSS")
-
-    def risen(self) -> int | None:
-        """[bytes] None where the system does not say."""
-        peak = self._level("VmHWM")
-        if self._before is None or peak is None:
-            return None
-        return max(0, peak - self._before)
-
-    @staticmethod
-    def _level(name: str) -> int | None:
-        with suppress(OSError):
-            for line in Path("/proc/self/status").read_text().splitlines():
-                if line.startswith(f"{name}:"):
-                    return 1024 * int(line.split()[1])
-        return None

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks, hertz
 from convexrough.certificate import Certificate, judge
 from convexrough.checks import Array, frozen
-from convexrough.influence import inverse_distances
+from convexrough.influence import Influence, Kind
 from convexrough.normal import NormalProblem
 from convexrough.scene import Scene
 from convexrough.solvers import Newton, Solution, Solver
+from convexrough.solvers.solution import Announce
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,7 @@ class Contact:
         pressure as a point force, to leading order: max sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i
         over the loaded asperities
     crowding      : largest (a_i + a_j) / r_ij; above 1 contact discs overlap and the model fails
+    influence     : how the candidates were coupled: "dense", "lattice" or "scattered"
     """
 
     scene: Scene
@@ -40,6 +42,7 @@ class Contact:
     model_error: float
     crowding: float
     candidates: int
+    influence: Kind
     solver: str
     iterations: int
     seconds: float
@@ -62,18 +65,23 @@ def press(
     load: float | None = None,
     solver: Solver | None = None,
     start: ArrayLike | None = None,
+    influence: Kind | None = None,
+    announce: Announce | None = None,
 ) -> Contact:
     """Press the sphere on the asperities by an approach [length] or with a load [force].
 
     solver : default `solvers.Newton()`
     start  : (n,) [force] loads to start from; in the convex range the answer is the same for all
+    influence : how to couple the asperities: "dense" (a matrix), "lattice" (transforms, where they
+        lie on a lattice), "scattered" (transforms on a mesh); None for the cheapest that is exact
+    announce : told in a line how far long work has come
 
     Raises InputError for bad values and SolverError where the solver stops without an answer. An
     answer without a certificate is returned: look at `contact.certificate.scope`.
     """
     began = time.perf_counter()
     solver = Newton() if solver is None else solver
-    problem = NormalProblem.assemble(scene, approach=approach, load=load)
+    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
     force, length = problem.units.force, problem.units.length
     first = None
     if start is not None:
@@ -82,11 +90,13 @@ def press(
     if len(problem) == 0:  # too small an approach for anything to touch
         solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
     else:
-        solution = solver.solve(problem, first)
+        solution = solver.solve(problem, first, announce)
     loads = frozen(problem.to_scene(solution.loads * force))
     radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
+    if announce is not None:
+        announce("certifying")
     certificate = judge(problem, loads)
-    model_error, crowding = _model_limits(scene, loads, radii, solution.approach * length)
+    model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
     return Contact(
         scene=scene,
         loads=loads,
@@ -97,20 +107,25 @@ def press(
         model_error=model_error,
         crowding=crowding,
         candidates=len(problem),
+        influence=problem.influence.name,
         solver=solver.name,
         iterations=solution.iterations,
         seconds=time.perf_counter() - began,
     )
 
 
-def _model_limits(scene: Scene, loads: Array, radii: Array, approach: float) -> tuple[float, float]:
-    """How far the point-force model is stretched: `model_error` and `crowding` of Contact."""
-    touching = np.flatnonzero((loads > 0) & (approach + scene.offsets > 0))
+def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> tuple[float, float]:
+    """How far the point-force model is stretched: `model_error` and `crowding` of Contact.
+
+    radii : (n,) [length] of the candidates
+    """
+    prescribed = solution.approach + problem.offsets
+    touching = np.flatnonzero((solution.loads > 0) & (prescribed > 0))
     if len(touching) < 2:
         return 0.0, 0.0
-    points, a = scene.contact_points[touching], radii[touching]
-    inverse = inverse_distances(points, points)
-    crowding = float(((a[:, None] + a) * inverse).max())
-    source = loads[touching] * a**2 / (10 * np.pi * scene.material.contact_modulus)
-    prescribed = approach + scene.offsets[touching]
-    return float((inverse**3 @ source / prescribed).max()), crowding
+    A: Influence = problem.influence
+    if len(touching) < len(problem):
+        A = A.among(touching)
+    a = radii[touching]
+    moved = A.scale * A.falloff(solution.loads[touching] * a**2 / 10, 3)
+    return float((moved / prescribed[touching]).max()), A.crowding(a)

@@ -7,7 +7,10 @@ the loop. Only the range of the force matters.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +21,10 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.family import Family
 from convexrough.history import history
-from convexrough.shear_certificate import judge_states
+from convexrough.shear_certificate import Bounds
 from convexrough.smooth import smooth
+from convexrough.solvers.solution import Announce
+from convexrough.tangential import States
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +58,7 @@ class Cycle:
     balance_defect         : relative difference to the energy from the trapezoid error
     energy_normalised      : energy / W0, W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H)
     smooth_normalised      : the same for the smooth sphere, e((maximum - minimum) / (2 f P))
-    status                 : "sliding" in each half of the cycle, "partial", "open", "undecided"
+    sliding, partial       : proved to slide in each half of the cycle; proved never to
     """
 
     contact: Contact
@@ -65,15 +70,28 @@ class Cycle:
     balance_defect: float
     energy_normalised: float
     smooth_normalised: float
-    status: NDArray[np.str_]
+    sliding: NDArray[np.bool_]
+    partial: NDArray[np.bool_]
+
+    @cached_property
+    def status(self) -> NDArray[np.str_]:
+        """(n,) "sliding" in each half of the cycle, "partial", "open" or "undecided"."""
+        words = np.full(len(self.sliding), "undecided", dtype="<U9")
+        words[self.contact.status == "open"] = "open"
+        words[self.partial] = "partial"
+        words[self.sliding] = "sliding"
+        return frozen(words)
 
     @property
     def energies(self) -> Array:
         """(n,) [force length] lost at each asperity."""
         return frozen(self.partial_slip_energies + self.sliding_energies)
 
-    def loop(self, points: int = 200) -> Loop:
-        """The loop through about `points` points, as many down as up, denser at the ends."""
+    def loop(self, points: int = 200, announce: Announce | None = None) -> Loop:
+        """The loop through about `points` points, as many down as up, denser at the ends.
+
+        announce : told in a line how far long work has come
+        """
         if not isinstance(points, int) or points < 4:
             raise InputError("points", found=points, expected="a whole number, at least 4")
         middle, amplitude = (self.maximum + self.minimum) / 2, (self.maximum - self.minimum) / 2
@@ -83,7 +101,7 @@ class Cycle:
         if abs(self.minimum) > abs(self.maximum):
             there_and_back.insert(0, self.minimum)
         path = np.concatenate((there_and_back[:-1], down[1:], down[-2::-1]))
-        past = history(self.contact, forces=path)
+        past = history(self.contact, forces=path, announce=announce)
         body = slice(len(there_and_back) - 2, None)
         return Loop(
             forces=frozen(path[body]),
@@ -93,16 +111,31 @@ class Cycle:
         )
 
 
-def cycle(contact: Contact, *, maximum: float, minimum: float | None = None) -> Cycle:
+def cycle(
+    contact: Contact,
+    *,
+    maximum: float,
+    minimum: float | None = None,
+    announce: Announce | None = None,
+) -> Cycle:
     """The steady cycle between two shear forces [force]; `minimum` defaults to -maximum.
+
+    announce : told in a line how far long work has come
 
     Raises InputError where the scene has no friction, the minimum exceeds the maximum, or either
     exceeds f P in size.
     """
-    return cycles(contact, [maximum], None if minimum is None else [minimum])[0]
+    lower = None if minimum is None else [minimum]
+    return cycles(contact, [maximum], lower, announce=announce)[0]
 
 
-def cycles(contact: Contact, maximum: ArrayLike, minimum: ArrayLike | None = None) -> list[Cycle]:
+def cycles(
+    contact: Contact,
+    maximum: ArrayLike,
+    minimum: ArrayLike | None = None,
+    *,
+    announce: Announce | None = None,
+) -> list[Cycle]:
     """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives."""
     limit = checks.friction(contact.scene.friction) * contact.load
     upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
@@ -119,37 +152,57 @@ def cycles(contact: Contact, maximum: ArrayLike, minimum: ArrayLike | None = Non
 
     family = Family(contact)
     problem = family.problem
-    totals = problem.limited((upper - lower) / (2.0 * family.force_unit))
-    states = family.states(totals)
-    bounds = judge_states(problem, contact, states)
-    slip = family.spread(family.partial_slip(states), family.energy_unit)
-    slide = family.spread(family.sliding(states), family.energy_unit)
-    energies = (slip + slide).sum(axis=1)
-    others = family.energy_unit * family.trapezoid_error(states)
-    defects = np.abs(others - energies) / np.where(energies > 0, energies, 1.0)
+    states, back = family.states((upper - lower) / (2.0 * family.force_unit), announce)
+    losses = [loss for block in family.judged(states, announce) for loss in _losses(family, *block)]
     whole = smooth(contact.scene, load=contact.load).energy_scale  # W0
-    words = np.full(slip.shape, "undecided", dtype="<U9")
-    words[:, contact.status == "open"] = "open"
-    inside = words[:, problem.touching]
-    inside[bounds.partial], inside[bounds.sliding] = "partial", "sliding"
-    words[:, problem.touching] = inside
     return [
         Cycle(
             contact=contact,
             maximum=float(upper[i]),
             minimum=float(lower[i]),
-            energy=float(energies[i]),
-            partial_slip_energies=frozen(slip[i]),
-            sliding_energies=frozen(slide[i]),
-            balance_defect=float(defects[i]),
-            energy_normalised=float(energies[i] / whole),
-            smooth_normalised=float(hertz.loss(totals[i] / problem.loads.sum())),
-            status=frozen(words[i]),
+            energy=each.energy,
+            partial_slip_energies=each.partial_slip,
+            sliding_energies=each.sliding_slip,
+            balance_defect=each.defect,
+            energy_normalised=each.energy / whole,
+            smooth_normalised=float(hertz.loss(each.total / problem.limit)),
+            sliding=each.sliding,
+            partial=each.partial,
         )
-        for i in range(len(upper))
+        for i, each in enumerate(losses[place] for place in back)
     ]
 
 
+class _Loss(NamedTuple):
+    """What a cycle of one amplitude costs, and which asperities slide; as in Cycle."""
+
+    total: float  # T
+    energy: float
+    partial_slip: Array
+    sliding_slip: Array
+    defect: float
+    sliding: NDArray[np.bool_]
+    partial: NDArray[np.bool_]
+
+
+def _losses(family: Family, states: States, bounds: Bounds) -> Iterator[_Loss]:
+    slip = family.spread(family.partial_slip(states), family.energy_unit)
+    slide = family.spread(family.sliding(states), family.energy_unit)
+    energies = slip.sum(axis=1) + slide.sum(axis=1)
+    others = family.energy_unit * family.trapezoid_error(states)
+    defects = np.abs(others - energies) / np.where(energies > 0, energies, 1.0)
+    for i, total in enumerate(states.totals):
+        yield _Loss(
+            float(total),
+            float(energies[i]),
+            frozen(slip[i]),
+            frozen(slide[i]),
+            float(defects[i]),
+            frozen(family.everywhere(bounds.sliding[i])),
+            frozen(family.everywhere(bounds.partial[i])),
+        )
+
+
 def _empty(contact: Contact, maximum: float, minimum: float) -> Cycle:
-    zero = frozen(np.zeros(len(contact.scene)))
-    return Cycle(contact, maximum, minimum, 0.0, zero, zero, 0.0, 0.0, 0.0, contact.status)
+    zero, no = frozen(np.zeros(len(contact.scene))), frozen(np.zeros(len(contact.scene), bool))
+    return Cycle(contact, maximum, minimum, 0.0, zero, zero, 0.0, 0.0, 0.0, no, no)

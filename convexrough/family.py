@@ -7,12 +7,18 @@ trapezoid rule on the curve of rise against T. A cycle of amplitude T costs 8 c_
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Iterator
 
-from convexrough import checks, hertz
-from convexrough.checks import Array
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import annulus, checks, hertz
+from convexrough.checks import Array, Indices
 from convexrough.contact import Contact
+from convexrough.shear_certificate import Bounds, judge_in_turn
+from convexrough.solvers.solution import Announce
 from convexrough.tangential import States, TangentialProblem
+from convexrough.tangential_newton import by_matrices
 
 
 class Family:
@@ -27,10 +33,19 @@ class Family:
         self.length_unit = ratio * self.friction * self.problem.units.length
         self.energy_unit = 8.0 * self.force_unit * self.length_unit
 
-    def states(self, totals: Array) -> States:
-        """One state for each T, each distinct T solved once."""
-        distinct, back = np.unique(totals, return_inverse=True)
-        return States(*(field[back] for field in self.problem.solve(distinct)))
+    def states(self, totals: Array, announce: Announce | None = None) -> tuple[States, Indices]:
+        """One state for each distinct T, and which of them each of the totals is."""
+        distinct, back = np.unique(self.problem.limited(totals), return_inverse=True)
+        return self.problem.solve(distinct, announce=announce), back
+
+    def judged(
+        self, states: States, announce: Announce | None = None
+    ) -> Iterator[tuple[States, Bounds]]:
+        """The states in blocks, with what is proved of each."""
+        for block, bounds in judge_in_turn(self.problem, self.contact, states):
+            yield states.take(block), bounds
+            if announce is not None and not by_matrices(self.problem):
+                announce(f"certified {min(block.stop, len(states.totals))} states")
 
     def spread(self, values: Array, unit: float) -> Array:
         """(m, n) values of the loaded asperities, among zeros for all others of the scene."""
@@ -38,10 +53,16 @@ class Family:
         full[:, self.problem.touching] = values * unit
         return full
 
+    def everywhere(self, words: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(n,) what is so of the loaded asperities, and not of the others."""
+        full = np.zeros(len(self.contact.scene), dtype=bool)
+        full[self.problem.touching] = words
+        return full
+
     def partial_slip(self, states: States) -> Array:
         """(m, n) share of w(T) lost in partial slip: (3/5) P ceiling e(u / P)."""
         problem = self.problem
-        shares = hertz.loss(np.abs(states.increments) / problem.loads)
+        shares = annulus.loss(annulus.width_under(states.increments / problem.loads))
         return np.asarray(0.6 * problem.loads * problem.ceilings * shares)
 
     def sliding(self, states: States) -> Array:
@@ -59,11 +80,11 @@ class Family:
         """
         problem, q = self.problem, self.problem.elastic
         P, ceilings, u = problem.loads, problem.ceilings, states.increments
-        t = np.abs(u) / P
+        x = annulus.width_under(u / P)
         total = u.sum(axis=1)
-        excess = np.copysign(ceilings * hertz.excess_deflection(t), u) + states.slips
+        excess = np.copysign(ceilings * annulus.excess_deflection(x), u) + states.slips
         v = u - total[:, None] * q
         v -= v.sum(axis=1, keepdims=True) * q
-        bent = problem.couple(v) + 2.0 / 3.0 * ceilings / P * v
-        potential = hertz.excess_potential(t) @ (P * ceilings)
+        bent = problem.couple(v) + v / problem.stiffest
+        potential = annulus.excess_potential(x) @ (P * ceilings)
         return np.asarray(0.5 * total * (excess @ q) - potential - 0.5 * (v * bent).sum(axis=1))

@@ -22,7 +22,7 @@ from convexrough.friction_certificate import judge_vectors
 from convexrough.friction_cones import FrictionConic
 from convexrough.friction_newton import FrictionNewton
 from convexrough.friction_problem import VectorProblem, VectorState
-from convexrough.influence import ROUNDOFF
+from convexrough.roundoff import ROUNDOFF
 from convexrough.shear import ShearCertificate
 
 __all__ = ["FrictionConic", "FrictionNewton", "VectorShearState", "shear_vector"]

@@ -24,8 +24,7 @@ from convexrough.certificate import SUM_ROUNDOFFS
 from convexrough.checks import Array
 from convexrough.contact import Contact
 from convexrough.friction_problem import VectorProblem, VectorState, along
-from convexrough.influence import ROUNDOFF
-from convexrough.normal import SAFETY
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shear_certificate import Bounds, Known
 
 #: Margins of convexity tried, the best first.

@@ -24,7 +24,7 @@ import numpy as np
 from convexrough.checks import Array
 from convexrough.errors import SolverError
 from convexrough.friction_problem import VectorProblem, VectorState, along
-from convexrough.normal import SAFETY
+from convexrough.roundoff import SAFETY
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ from convexrough.certificate import SUM_ROUNDOFFS
 from convexrough.checks import Array
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
-from convexrough.influence import ROUNDOFF
+from convexrough.roundoff import ROUNDOFF
 from convexrough.tangential import TangentialProblem
 
 

@@ -21,8 +21,9 @@ from convexrough import checks
 from convexrough.checks import Array, frozen
 from convexrough.contact import Contact
 from convexrough.family import Family
-from convexrough.normal import SAFETY
-from convexrough.shear_certificate import judge_states
+from convexrough.roundoff import SAFETY
+from convexrough.solvers.solution import Announce
+from convexrough.tangential import States
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +58,11 @@ class _Step(NamedTuple):
     lost: list[tuple[float, float]]  # (factor, T): the step costs sum factor * w(T)
 
 
-def history(contact: Contact, *, forces: ArrayLike) -> History:
-    """Any sequence of shear forces (m,) [force], |Q| <= f P, from the freshly pressed contact."""
+def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = None) -> History:
+    """Any sequence of shear forces (m,) [force], |Q| <= f P, from the freshly pressed contact.
+
+    announce : told in a line how far long work has come
+    """
     limit = checks.friction(contact.scene.friction) * contact.load
     applied = checks.bearable("forces", checks.array("forces", forces), limit)
     if contact.load == 0.0 or len(applied) == 0:
@@ -69,38 +73,46 @@ def history(contact: Contact, *, forces: ArrayLike) -> History:
     steps = _remember(applied / family.force_unit)
     totals = [step.total for step in steps]
     costs = [total for step in steps for _, total in step.lost]
-    distinct, back = np.unique(
-        family.problem.limited(np.array(totals + costs)), return_inverse=True
-    )
-    states = family.problem.solve(distinct)
-    bounds = judge_states(family.problem, contact, states)
-    w = (family.partial_slip(states) + family.sliding(states)).sum(axis=1)
-    deflections = family.problem.deflections(states.increments) + states.slips
+    states, back = family.states(np.array(totals + costs), announce)
+    bounds, w = _judged(family, states, announce)
 
-    looked_up = (states.rises[:, None], states.increments, deflections, states.slips)
-    results = [np.empty((len(steps), field.shape[1])) for field in looked_up]
-    energy, spent = np.empty(len(steps)), iter(back[len(steps) :])
-    errors = np.empty(len(steps))
-    lost = 0.0
-    for m, step in enumerate(steps):
-        for result, field in zip(results, looked_up, strict=True):
-            base = result[step.base] if step.base >= 0 else 0.0
-            result[m] = base + step.scale * field[back[m]]
-        moved = abs(step.scale) * bounds.rises[back[m]] if step.scale else 0.0
-        errors[m] = (errors[step.base] if step.base >= 0 else 0.0) + moved
+    m, n = len(steps), len(contact.scene)
+    rises, errors, energy = np.empty(m), np.empty(m), np.empty(m)
+    looked_up = (states.increments, states.deflections, states.slips)
+    units = (family.force_unit, family.length_unit, family.length_unit)
+    results = [np.zeros((m, n)) for _ in looked_up]
+    touching, spent, lost = family.problem.touching, iter(back[m:]), 0.0
+    for i, step in enumerate(steps):
+        at, base, started = back[i], step.base, step.base >= 0
+        for result, field, unit in zip(results, looked_up, units, strict=True):
+            if started:
+                result[i] = result[base]
+            result[i, touching] += step.scale * unit * field[at]
+        rises[i] = (rises[base] if started else 0.0) + step.scale * states.rises[at]
+        moved = abs(step.scale) * bounds[at] if step.scale else 0.0
+        errors[i] = (errors[base] if started else 0.0) + moved
         lost += sum(factor * w[next(spent)] for factor, _ in step.lost)
-        energy[m] = lost
-    rises, increments, deflections, slips = results
+        energy[i] = lost
+    increments, deflections, slips = results
     return History(
         contact=contact,
         applied=applied,
-        displacements=frozen(rises[:, 0] * family.length_unit),
+        displacements=frozen(rises * family.length_unit),
         displacement_errors=frozen(errors * family.length_unit * (1 + SAFETY)),
-        forces=frozen(family.spread(increments, family.force_unit)),
-        asperity_displacements=frozen(family.spread(deflections, family.length_unit)),
-        slips=frozen(family.spread(slips, family.length_unit)),
+        forces=frozen(increments),
+        asperity_displacements=frozen(deflections),
+        slips=frozen(slips),
         energy=frozen(energy * family.energy_unit),
     )
+
+
+def _judged(family: Family, states: States, announce: Announce | None) -> tuple[Array, Array]:
+    """(m,) bounds on the rises of states, and w(T): what they cost."""
+    bounds, w = [], []
+    for part, proved in family.judged(states, announce):
+        bounds.append(proved.rises)
+        w.append((family.partial_slip(part) + family.sliding(part)).sum(axis=1))
+    return np.concatenate(bounds), np.concatenate(w)
 
 
 def _remember(applied: Array) -> list[_Step]:

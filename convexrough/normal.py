@@ -10,7 +10,7 @@ of that constraint (load control). Its first-order conditions are the contact la
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from convexrough import checks, hertz
 from convexrough.checks import Array, Indices
-from convexrough.errors import InputError
-from convexrough.influence import ROUNDOFF, DenseInfluence, shell_radii
+from convexrough.influence import Influence, Kind, couple, fitted_shells, shells
+from convexrough.load_control import approach_bound, highest_approach, shifted_to_load
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene import Scene
 
-#: Relative error allowed for a short chain of float64 operations wherever a bound is computed:
-#: far above what any such chain here can lose, far below what it could matter.
-SAFETY = 1e-12
+#: The part of the room between neighbours that fitted shells share out by size.
+FITTED = 0.9
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class NormalProblem:
     coefficients  : (n,) k of the local law
     offsets       : (n,) d_i = D_i - D0
     offset_errors : (n,) bound on the rounding error of D_i, without that of D0
-    shells        : (n,) 1 / (pi E* s_i): added to the diagonal of A they make it semidefinite
     influence     : A
+    shells        : (n,) 1 / (pi E* s_i): added to the diagonal of A they make it semidefinite
     approach      : D0, or None under load control
     load          : total load, or None under approach control
     ceiling       : upper bound on D0 at any solution
@@ -71,8 +71,8 @@ class NormalProblem:
     coefficients: Array
     offsets: Array
     offset_errors: Array
+    influence: Influence
     shells: Array
-    influence: DenseInfluence
     approach: float | None
     load: float | None
     ceiling: float
@@ -82,9 +82,17 @@ class NormalProblem:
 
     @classmethod
     def assemble(
-        cls, scene: Scene, *, approach: float | None = None, load: float | None = None
+        cls,
+        scene: Scene,
+        *,
+        approach: float | None = None,
+        load: float | None = None,
+        influence: Kind | None = None,
     ) -> NormalProblem:
-        """Screen, scale and couple. `approach` [length] or `load` [force], exactly one."""
+        """Screen, scale and couple. `approach` [length] or `load` [force], exactly one.
+
+        influence : how to couple; None for the cheapest exact way
+        """
         checks.exactly_one("approach", approach, "load", load)
         errors = scene.offset_errors
         modulus = scene.material.contact_modulus
@@ -94,18 +102,16 @@ class NormalProblem:
         else:
             assert load is not None  # exactly_one
             load = checks.positive("load", load)
-            ceiling = highest_approach(scene, load)
+            ceiling = highest_approach(scene, load, influence)
 
         # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
         prescribed = ceiling + scene.offsets + errors + 6 * ROUNDOFF * abs(ceiling)
         candidates = np.flatnonzero(prescribed > 0)
-        n = len(candidates)
-        fits_densely(n)
         top = float(prescribed[candidates].max(initial=0.0)) or 1.0
         units = Units.of(top, float(np.median(coefficients)))
 
-        points = scene.contact_points[candidates]
         scale = units.force / units.length / (np.pi * modulus)
+        coupling = couple(scene, candidates, scale, influence)
         return cls(
             scene=scene,
             units=units,
@@ -113,12 +119,31 @@ class NormalProblem:
             coefficients=coefficients[candidates] * units.local,
             offsets=scene.offsets[candidates] / units.length,
             offset_errors=errors[candidates] / units.length,
-            shells=_shells(points, scale, scene.point_error),
-            influence=DenseInfluence.assemble(points, scale, scene.point_error),
+            influence=coupling,
+            shells=shells(coupling),
             approach=None if approach is None else approach / units.length,
             load=None if load is None else load / units.force,
             ceiling=ceiling / units.length,
         )
+
+    def among(self, which: Indices) -> NormalProblem:
+        """The problem of some of the candidates: all others carry nothing."""
+        return replace(
+            self,
+            candidates=self.candidates[which],
+            coefficients=self.coefficients[which],
+            offsets=self.offsets[which],
+            offset_errors=self.offset_errors[which],
+            influence=self.influence.among(which),
+            shells=self.shells[which],
+        )
+
+    def fitted_to(self, loads: Array) -> NormalProblem:
+        """The same problem, with shells as large as neighbours of these loads allow."""
+        with np.errstate(divide="ignore"):
+            radii = (np.pi / 2.0) * self.influence.scale / self.stiffness(loads)
+        shells = fitted_shells(self.influence, radii, FITTED)
+        return replace(self, shells=shells)
 
     def energy(self, loads: Array, displacement: Array) -> float:
         """Phi(P), with D0 = 0 under load control; `displacement` is A P."""
@@ -131,9 +156,14 @@ class NormalProblem:
         local: Array = hertz.indentation(loads, self.coefficients)
         return local + displacement - self.offsets - approach
 
-    def residual(self, loads: Array, approach: float) -> float:
-        """How far the contact law is from holding: max |g_i| where loaded, else max(-g_i, 0)."""
-        gap = self.gap(loads, self.influence.apply(loads), approach)
+    def residual(self, loads: Array, approach: float, displacement: Array | None = None) -> float:
+        """How far the contact law is from holding: max |g_i| where loaded, else max(-g_i, 0).
+
+        displacement : A P, if known
+        """
+        if displacement is None:
+            displacement = self.influence.apply(loads)
+        gap = self.gap(loads, displacement, approach)
         return float(np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0)).max(initial=0.0))
 
     def bounds(self, ceiling: float) -> Array:
@@ -217,7 +247,7 @@ class NormalProblem:
         displacement : A times weights
         """
         assert self.load is not None
-        displacement = displacement * (1.0 + self.influence.product_error)
+        displacement = displacement + self.influence.rounding(weights).of(displacement)
         return approach_bound(weights, displacement, self.coefficients, self.offsets, self.load)
 
     def to_scene(self, values: NDArray[Any]) -> Array:
@@ -225,93 +255,3 @@ class NormalProblem:
         full = np.zeros(len(self.scene))
         full[self.candidates] = values
         return full
-
-
-def fits_densely(count: int) -> None:
-    """Refuse what the matrix of all pairs, and the copies that a solution needs, cannot hold."""
-    checks.fits_in_memory("asperities that could touch", count, 5 * 8 * count)
-
-
-def _shells(points: Array, scale: float, point_error: float) -> Array:
-    """(n,) scale / s_i, infinite where rounding leaves no shell."""
-    with np.errstate(divide="ignore"):
-        shells: Array = scale / shell_radii(points, point_error)
-    return shells
-
-
-def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Array:
-    """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
-
-    The sum grows and is convex in tau, so Newton's method from the right descends on the root. The
-    shift is counted from the highest, so that loads of any size come out to all digits.
-    """
-    indentation = indentation - indentation.max()
-    single = hertz.indentation(load, coefficients)  # one asperity alone would carry it all
-    shift = float((single - indentation).min())
-    for _ in range(200):
-        loads = hertz.load(indentation + shift, coefficients)
-        slope = float(np.sum(np.cbrt(loads) / coefficients)) * 1.5
-        step = (float(loads.sum()) - load) / slope
-        if not step > 4 * ROUNDOFF * shift:
-            break
-        shift -= step
-    return indentation + shift
-
-
-def approach_bound(
-    weights: Array, displacement: Array, coefficients: Array, offsets: Array, load: float
-) -> float:
-    """Upper bound on D0 at every solution of total `load` (derived in docs/theory/certificate.md).
-
-    With q = weights / sum(weights), alpha_i = q_i k_i and c = A q, for every lambda >= max c:
-
-        D0 <= lambda L + (4/27) sum alpha_i^3 / (lambda - c_i)^2 - d'q.
-    """
-    total = float(weights.sum())
-    q, c = weights / total, displacement / total
-    alpha = q * coefficients
-    active = alpha**3 > 0  # others count for nothing
-    cubes, c_active = alpha[active] ** 3, c[active]
-    # The best lambda solves (8/27) sum alpha^3 / (lambda - c)^3 = L; Newton from the left.
-    height = float((c_active + np.cbrt(8.0 * cubes / (27.0 * load))).max()) * (1 + SAFETY)
-    for _ in range(100):
-        excess = cubes / (height - c_active) ** 3
-        step = (float(excess.sum()) - 27.0 * load / 8.0) / float(
-            3.0 * (excess / (height - c_active)).sum()
-        )
-        height += max(step, 0.0)
-        if step <= 1e-3 * (height - float(c_active.max())):
-            break  # any height gives a bound; this one is close to the best
-    height = max(height, float(c.max()))
-    terms = (
-        height * load,
-        (4.0 / 27.0) * float((cubes / (height - c_active) ** 2).sum()),
-        -float(offsets @ q),
-    )
-    return sum(terms) + SAFETY * sum(map(abs, terms))
-
-
-def highest_approach(scene: Scene, load: float) -> float:
-    """An upper bound on the approach [length] at every solution of total `load` [force].
-
-    `approach_bound` with the loads that Hertz's smooth sphere suggests.
-    """
-    modulus, radius = scene.material.contact_modulus, scene.sphere_radius
-    coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-    a = float(hertz.contact_radius(load, modulus, radius))
-    sunk = hertz.surface_displacement(scene.asperities.distances, a, radius)
-    indentation = scene.offsets - sunk
-    weights = hertz.load(shifted_to_load(indentation, coefficients, load), coefficients)
-    touching = np.flatnonzero(weights)
-    fits_densely(len(touching))
-    points = scene.contact_points
-    sources = DenseInfluence(
-        points[touching], 1.0 / (np.pi * modulus), np.empty((0, 0)), scene.point_error, 0.0
-    )
-    displacement = np.empty(len(scene))
-    for block, rows, error in sources.elsewhere(points):
-        displacement[block] = rows @ weights[touching] * (1.0 + error)
-    bound = approach_bound(weights, displacement, coefficients, scene.offsets, load)
-    if not np.isfinite(bound):
-        raise InputError("load", found=load, expected="a load this scene's units can hold")
-    return bound

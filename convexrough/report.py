@@ -24,6 +24,11 @@ _SCOPES = {
     "local": "local: no other solution with contacts of such sizes",
     "none": "none: nothing is proved",
 }
+_INFLUENCES = {
+    "dense": "dense: a matrix",
+    "lattice": "lattice: Fourier transforms",
+    "scattered": "scattered: Fourier transforms on a mesh",
+}
 
 
 def summarise(outcome: Outcome) -> Summary:
@@ -74,6 +79,7 @@ def summarise(outcome: Outcome) -> Summary:
 def _contact_summary(contact: Contact) -> Summary:
     normal = _judged(contact.certificate, contact.loads) | {
         "candidates": contact.candidates,
+        "influence": contact.influence,
         "solver": contact.solver,
         "iterations": contact.iterations,
         "seconds": contact.seconds,
@@ -191,6 +197,7 @@ def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
             ("model error", f"{normal['model_error']:.2g}  (point forces for pressures)"),
             ("crowding", f"{normal['crowding']:.3g}  (contact discs overlap above 1)"),
             ("solver", f"{normal['solver']}, {steps}"),
+            ("influence", _INFLUENCES[normal["influence"]]),
         ]
     described = [f"{name:<18}{text}" for name, text in lines]
     return described + _describe_shear(summary, length_unit, force_unit)

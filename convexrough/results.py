@@ -203,8 +203,8 @@ def _loop_columns(outcome: Outcome) -> dict[str, NDArray[Any]]:
 
 def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
     """Write CSV whose numbers read back the same, or .npz where there are many rows."""
-    lists = [np.asarray(values).tolist() for values in columns.values()]
-    if len(lists[0]) > MOST_CSV_ROWS:
+    arrays = [np.asarray(values) for values in columns.values()]
+    if len(arrays[0]) > MOST_CSV_ROWS:
         path = path.with_suffix(".npz")
         with beside(path) as temporary, temporary.open("wb") as file:
             np.savez(file, **columns)
@@ -212,5 +212,5 @@ def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
     with beside(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows(zip(*lists, strict=True))  # repr of each float
+        writer.writerows(zip(*(array.tolist() for array in arrays), strict=True))  # repr of each float
     return path

@@ -13,12 +13,13 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.checks import Array, Indices, frozen
 from convexrough.errors import InputError
+from convexrough.lattice import Lattice
+from convexrough.patterns import CUT, checked_seed, cut_normal, hexagonal_sites, square_sites
 
 Geometry = Literal["summit", "closest"]
 
-#: Random heights and log radii are normal, cut at this many standard deviations (a chance of
-#: 2e-9 per asperity), so that "every asperity that could touch" is a finite set.
-CUT = 6.0
+#: Of more asperities than this, a lattice is looked for before the nearest neighbours of all.
+MANY = 5000
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,16 @@ class Asperities:
         radii = checks.array("tip_radii", tip_radii, length=n, sign="positive")
         object.__setattr__(self, "tip_radii", radii)
         object.__setattr__(self, "heights", checks.array("heights", heights, length=n))
-        refuse_coincident(points)
+        if n <= MANY or self.lattice is None:
+            refuse_coincident(points)
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    @cached_property
+    def lattice(self) -> Lattice | None:
+        """What the summits lie on, each on a site of its own, if that is a lattice."""
+        return Lattice.through(self.positions)
 
     @cached_property
     def distances(self) -> Array:
@@ -115,7 +122,7 @@ class Asperities:
         radii, as they were.
         """
         rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(_hexagonal_sites, 2 / np.sqrt(3), spacing, tip_radius, within, *rough)
+        return cls._lattice(hexagonal_sites, 2 / np.sqrt(3), spacing, tip_radius, within, *rough)
 
     @classmethod
     def square(
@@ -130,7 +137,7 @@ class Asperities:
     ) -> Asperities:
         """A square lattice, one asperity on the axis; arguments as for `hexagonal`."""
         rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(_square_sites, 1.0, spacing, tip_radius, within, *rough)
+        return cls._lattice(square_sites, 1.0, spacing, tip_radius, within, *rough)
 
     @classmethod
     def _lattice(
@@ -157,10 +164,10 @@ class Asperities:
         radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
         heights = np.zeros(n)
         if height_std > 0 or tip_radius_cv > 0:
-            seed = _seed(seed)
-            heights = height_std * _cut_normal(n, seed, stream=0)
+            seed = checked_seed(seed)
+            heights = height_std * cut_normal(n, seed, stream=0)
             width = np.sqrt(np.log1p(tip_radius_cv**2))
-            radii = radii * np.exp(width * _cut_normal(n, seed, stream=1) - width**2 / 2)
+            radii = radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
         return cls(spacing * unit, radii, heights)
 
 
@@ -193,7 +200,7 @@ class Scene:
             raise InputError(
                 "geometry", found=repr(self.geometry), expected='"summit" or "closest"'
             )
-        if self.geometry == "closest":
+        if self.geometry == "closest" and (len(self) <= MANY or self.lattice is None):
             refuse_coincident(self.contact_points)
 
     def __len__(self) -> int:
@@ -216,6 +223,13 @@ class Scene:
             return points
         shrink = self.sphere_radius / (self.sphere_radius + self.asperities.tip_radii)
         return frozen(points * shrink[:, None])
+
+    @cached_property
+    def lattice(self) -> Lattice | None:
+        """What the contact points lie on, if that is a lattice."""
+        if self.geometry == "summit":
+            return self.asperities.lattice
+        return Lattice.through(self.contact_points)
 
     @property
     def point_error(self) -> float:
@@ -312,39 +326,3 @@ def _points(positions: ArrayLike) -> Array:
         raise InputError(f"positions[{first}]", found=found, expected="finite numbers")
     points.flags.writeable = False
     return points
-
-
-def _hexagonal_sites(limit: float) -> tuple[Array, Indices]:
-    """Sites (i + j/2, sqrt(3)/2 j) with i^2 + i j + j^2 <= limit, and these squared distances."""
-    top = int(np.sqrt(4 * limit / 3)) + 1
-    i, j = _integers(top)
-    norms = i * i + i * j + j * j
-    keep = norms <= limit
-    i, j = i[keep], j[keep]
-    return np.column_stack((i + 0.5 * j, np.sqrt(0.75) * j)), norms[keep]
-
-
-def _square_sites(limit: float) -> tuple[Array, Indices]:
-    """Sites (i, j) with i^2 + j^2 <= limit, and these squared distances."""
-    i, j = _integers(int(np.sqrt(limit)) + 1)
-    norms = i * i + j * j
-    keep = norms <= limit
-    return np.column_stack((i[keep], j[keep])).astype(np.float64), norms[keep]
-
-
-def _integers(top: int) -> tuple[Indices, Indices]:
-    i, j = np.meshgrid(np.arange(-top, top + 1), np.arange(-top, top + 1))
-    return i.ravel(), j.ravel()
-
-
-def _seed(seed: int | None) -> int:
-    if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or seed < 0:
-        expected = "a whole number that is not negative, as heights or tip radii are random"
-        raise InputError("seed", found=seed, expected=expected)
-    return int(seed)
-
-
-def _cut_normal(count: int, seed: int, *, stream: int) -> Array:
-    """Standard normal numbers; heights and radii have a stream each, so one leaves the other."""
-    numbers = np.random.default_rng([seed, stream]).standard_normal(count)
-    return np.clip(numbers, -CUT, CUT)

@@ -8,13 +8,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from convexrough import hertz
 from convexrough.errors import FileError, InputError, SceneFileError
 from convexrough.io import read_summits, read_text
-from convexrough.normal import highest_approach
-from convexrough.scene import CUT, Asperities, Material, Scene, largest_tip_radius, reach
+from convexrough.influence import Kind
+from convexrough.load_control import highest_approach
+from convexrough.patterns import CUT
+from convexrough.scene import Asperities, Material, Scene, largest_tip_radius, reach
 from convexrough.solvers import Solver
 
 if TYPE_CHECKING:
@@ -38,6 +40,7 @@ class SceneFile:
     shear   : shear forces, as fractions of f P
     cycle   : maxima and minima of steady cycles, as fractions of f P
     history : shear forces one after the other, as fractions of f P
+    influence : how to couple the asperities; None for the cheapest exact way
     """
 
     path: Path
@@ -48,6 +51,7 @@ class SceneFile:
     cycle: tuple[Fractions, Fractions] | None
     history: Fractions | None
     solver: Solver
+    influence: Kind | None
     units: UnitNames
 
 
@@ -73,6 +77,7 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
         cycle=(tuple(cycle.maximum), tuple(cycle.lowest)) if cycle else None,
         history=tuple(history.fractions) if history else None,
         solver=SOLVERS[tables.solver.name](),
+        influence=cast("Kind | None", tables.solver.influence),
         units=UnitNames(units.length, units.force),
     )
 

@@ -22,6 +22,7 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from convexrough import solvers
+from convexrough.influence import KINDS
 from convexrough.checks import nearest
 
 #: What `[solver] name` may say.
@@ -75,6 +76,7 @@ Seed = Annotated[int, _expected("a whole number that is not negative", lambda va
 Text = Annotated[str, _expected("text in quotes", bool)]
 Pattern = Annotated[Literal["hexagonal", "square"], _expected('"hexagonal", "square" or "file"')]
 Geometry = Annotated[Literal["summit", "closest"], _expected('"summit" or "closest"')]
+InfluenceName = Annotated[str, _expected(f"one of: {', '.join(KINDS)}", KINDS.__contains__)]
 SolverName = Annotated[str, _expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)]
 
 
@@ -172,6 +174,7 @@ class History(Table):
 
 class Solver(Table):
     name: SolverName = "newton"
+    influence: InfluenceName | None = None
 
 
 class Units(Table):

@@ -12,15 +12,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks, hertz
 from convexrough.certificate import Scope
-from convexrough.checks import Array, frozen
+from convexrough.checks import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.shear_certificate import judge_states
-from convexrough.tangential import TangentialProblem
+from convexrough.solvers.solution import Announce
+from convexrough.tangential import States, TangentialProblem
+from convexrough.tangential_newton import by_matrices
+
+#: Of more loaded asperities than this, coupled by an operator, the onset of some only is found.
+MOST_ONSETS = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +77,10 @@ class ShearState:
         return self.certificate.status
 
 
-def shear(contact: Contact, *, force: float) -> ShearState:
+def shear(contact: Contact, *, force: float, announce: Announce | None = None) -> ShearState:
     """Apply a shear force Q [force] to a pressed contact, first loading, at constant normal load.
+
+    announce : told in a line how far long work has come
 
     Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding), and
     SolverError where Newton's method stops without an answer.
@@ -89,7 +96,7 @@ def shear(contact: Contact, *, force: float) -> ShearState:
         return _nothing_loaded(contact)
     problem = TangentialProblem.of(contact)
     total = abs(force) / friction / problem.units.force
-    states = problem.solve(problem.limited(np.array([total])))
+    states = problem.solve(problem.limited(np.array([total])), announce=announce)
     bounds = judge_states(problem, contact, states)
 
     touching, force_unit, length_unit = problem.touching, problem.units.force, problem.units.length
@@ -122,44 +129,68 @@ def shear(contact: Contact, *, force: float) -> ShearState:
         force=force,
         displacement=sign * float(states.rises[0]) * travel,
         forces=frozen(everywhere(sign * increments, friction * force_unit)),
-        displacements=frozen(everywhere(sign * (problem.deflections(increments) + slips), travel)),
+        displacements=frozen(everywhere(sign * states.deflections[0], travel)),
         slips=frozen(everywhere(sign * slips, travel)),
         stick_radii=frozen(everywhere(contact.contact_radii[touching] * np.cbrt(left), 1.0)),
         certificate=certificate,
     )
 
 
-def onset_of_sliding(contact: Contact) -> Array:
+def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
     The same as the amplitude (maximum - minimum) / 2 of a steady cycle below which its sliding has
     shaken down to partial slip. nan where the asperity carries no load.
+
+    which : indices of the asperities to look at, in this order; default all. Each takes about
+        ten friction states of the contact, so of many loaded asperities some must be named.
     """
     from scipy.optimize.elementwise import find_root  # 0.1 s to import: only when asked
 
     friction = checks.friction(contact.scene.friction)
-    onsets = np.full(len(contact.scene), np.nan)
-    if contact.load == 0.0:
+    asked = _asperities(contact, which)
+    onsets = np.full(len(asked), np.nan)
+    loaded = np.flatnonzero(contact.loads[asked])
+    if len(loaded) == 0:
         return frozen(onsets)
     problem = TangentialProblem.of(contact)
-    limit = float(problem.loads.sum())
+    if not by_matrices(problem) and len(loaded) > MOST_ONSETS:
+        raise InputError(
+            "which",
+            found=f"{len(loaded):,} loaded asperities",
+            expected=f"at most {MOST_ONSETS} of them, each of which takes some states of all",
+        )
+    places = np.searchsorted(problem.touching, asked[loaded])
+    near: States | None = None
 
     def beyond(totals: Array, index: Array) -> Array:
-        states = problem.solve(totals)
+        nonlocal near
+        states = near = problem.solve(totals, known=near)
         rows = np.arange(len(totals))
-        which = index.astype(int)
-        margin: Array = states.deflections[rows, which] - problem.ceilings[which]
+        margin: Array = states.deflections[rows, index] - problem.ceilings[index]
         return np.where(problem.at_limit(totals), np.maximum(margin, 0.0), margin)
 
-    n = len(problem.loads)
     found = find_root(
         beyond,
-        (np.zeros(n), np.full(n, limit)),
-        args=(np.arange(n),),
+        (np.zeros(len(loaded)), np.full(len(loaded), problem.limit)),
+        args=(places,),
         tolerances={"xrtol": 1e-15, "xatol": 0.0, "frtol": 0.0, "fatol": 0.0},
     )
-    onsets[problem.touching] = found.x * friction * problem.units.force
+    onsets[loaded] = found.x * friction * problem.units.force
     return frozen(onsets)
+
+
+def _asperities(contact: Contact, which: ArrayLike | None) -> Indices:
+    """Indices of asperities of the scene, checked."""
+    n = len(contact.scene)
+    if which is None:
+        return np.arange(n)
+    asked = np.atleast_1d(np.asarray(which))
+    whole = asked.ndim == 1 and (np.issubdtype(asked.dtype, np.integer) or asked.size == 0)
+    if not whole or (asked < 0).any() or (asked >= n).any():
+        expected = f"whole numbers from 0 to {n - 1}: indices of asperities of the scene"
+        raise InputError("which", found=repr(which)[:60], expected=expected)
+    return asked.astype(np.intp)
 
 
 def _nothing_loaded(contact: Contact) -> ShearState:

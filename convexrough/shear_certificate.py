@@ -9,22 +9,32 @@ H = diag(1 / (2 E* a_i)), so
     || u - u* ||_H  <=  || e ||_{H^-1} / (1 - theta),
 
 and an asperity slides if the slip that A u* leaves it is proved positive. All bounds shrink with
-the shear force. Arrays are (m, n): m states of n loaded asperities.
+the shear force. Arrays are (m, n): m states of n loaded asperities. What is known of the rounding
+of A u only in the 2-norm stays apart until it enters a norm, or a single component.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.certificate import SUM_ROUNDOFFS
-from convexrough.checks import Array
+from convexrough.checks import Array, Indices
 from convexrough.contact import Contact
-from convexrough.influence import ROUNDOFF
-from convexrough.normal import SAFETY
+from convexrough.known_loads import Known
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.tangential import States, TangentialProblem
+
+__all__ = ["Bounds", "Known", "judge_in_turn", "judge_states"]
+
+#: Where P* is within a tenth of P, |ceiling* - ceiling| <= LOCAL h |P* - P|: 1.1 / 0.9^(1/3).
+LOCAL = 1.15
+
+#: Numbers of an array that are judged at once.
+BLOCK = 2**20
 
 
 class Bounds(NamedTuple):
@@ -40,94 +50,122 @@ class Bounds(NamedTuple):
 
 def judge_states(problem: TangentialProblem, contact: Contact, states: States) -> Bounds:
     """Bounds on friction states of a contact, whose loads are known to its certificate."""
+    parts = [bounds for _, bounds in judge_in_turn(problem, contact, states)]
+    if len(parts) == 1:
+        return parts[0]
+    return Bounds(*(np.concatenate(field) for field in zip(*parts, strict=True)))
+
+
+def judge_in_turn(
+    problem: TangentialProblem, contact: Contact, states: States
+) -> Iterator[tuple[slice, Bounds]]:
+    """`judge_states` in blocks of states, so that many asperities need no more memory than few."""
+    size = max(1, BLOCK // len(problem))
+    for start in range(0, max(1, len(states.totals)), size):
+        block = slice(start, start + size)
+        yield block, _judge(problem, contact, states.take(block))
+
+
+def _judge(problem: TangentialProblem, contact: Contact, states: States) -> Bounds:
     if contact.certificate.scope == "none":
         return _nothing(states)
     known = Known.of(problem, contact)
-    near_elastic = _by_convexity(problem, known, states)
-    near_gross = _by_exhaustion(problem, known, states)
+    product = _product(problem, states)
+    bounds = _by_convexity(problem, known, states, product)
+    others = np.flatnonzero(~bounds.proved)
+    if len(others):
+        near_gross = _by_exhaustion(problem, known, states.take(others), product.take(others))
+        for field, values in zip(bounds, near_gross, strict=True):
+            field[others] = values
+    bounds.slips[:, ~known.sure] = np.inf
+    bounds.slips[bounds.partial & (states.slips == 0)] = 0.0
     # At Q = f P itself there is nothing to prove: |Q_i| <= f P_i leaves one state.
-    gross = problem.at_limit(states.totals)[:, None] & known.sure
-    use = near_elastic.proved[:, None]
-    rows = near_elastic.proved
-    return Bounds(
-        proved=rows | near_gross.proved,
-        increments=np.where(use, near_elastic.increments, near_gross.increments),
-        slips=np.where(known.sure, np.where(use, near_elastic.slips, near_gross.slips), np.inf),
-        rises=np.where(rows, near_elastic.rises, near_gross.rises),
-        sliding=np.where(use, near_elastic.sliding, near_gross.sliding) | gross,
-        partial=np.where(use, near_elastic.partial, near_gross.partial),
-    )
+    bounds.sliding[:] |= problem.at_limit(states.totals)[:, None] & known.sure
+    return bounds
 
 
-class Known(NamedTuple):
-    """What the normal certificate says of the loads P, in own units."""
+class _Product(NamedTuple):
+    """A u of m states, and its rounding."""
 
-    errors: Array  # (n,) b
-    sure: NDArray[np.bool_]  # (n,) proved to touch, and known to some digits
-    relative: Array  # (n,) b / P of those, 0 of the others
-    stray: float  # most that asperities with no load here, but not proved open, carry in all
-    stray_effect: Array  # (n,) most that this moves each of the others
+    displacement: Array  # (m, n) A u
+    magnitude: Array  # (m, n) upper bounds on A |u|
+    rounding: Array  # (m, n) bounds on the error of A u, less a remainder
+    remainder: Array  # (m,) bounds on the 2-norm of that
 
-    @classmethod
-    def of(cls, problem: TangentialProblem, contact: Contact) -> Known:
-        certificate, scene, force = contact.certificate, contact.scene, problem.units.force
-        errors = certificate.load_errors[problem.touching] / force
-        sure = certificate.status[problem.touching] == "contact"
-        sure &= errors < 0.1 * problem.loads
-        strays = np.flatnonzero((contact.loads == 0) & (certificate.status != "open"))
-        most = certificate.load_errors[strays] / force
-        effect = np.zeros(len(sure))
-        for block, rows, error in problem.influence.elsewhere(scene.contact_points[strays]):
-            effect += most[block] @ rows * (1.0 + error)
-        relative = np.where(sure, errors / problem.loads, 0.0)
-        return cls(errors, sure, relative, float(most.sum()), effect)
-
-    def moved(self, loads: Array, increments: Array) -> Array:
-        """How far each u can be from its image on the true loads; |u| <= P is all known of some."""
-        size = np.abs(increments)
-        return size * self.relative + np.where(self.sure, 0.0, loads + self.errors + size)
+    def take(self, rows: Indices) -> _Product:
+        return _Product(*(field[rows] for field in self))
 
 
-def _by_convexity(problem: TangentialProblem, known: Known, states: States) -> Bounds:
-    P, ceilings, A = problem.loads, problem.ceilings, problem.influence
+def _product(problem: TangentialProblem, states: States) -> _Product:
+    u, A = states.increments, problem.influence
+    displacement = problem.couple(u)
+    noise = [A.rounding(each) for each in u]
+    relative = np.array([each.relative for each in noise])[:, None]
+    remainder = np.array([each.norm for each in noise])
+    magnitude = displacement
+    back = np.flatnonzero((u < 0).any(axis=1))  # A |u| is not A u
+    if len(back):
+        magnitude = displacement.copy()
+        magnitude[back] = problem.couple(np.abs(u[back]))
+    # The relative part is of the true product, which the computed one may miss by all of it.
+    magnitude = (np.maximum(magnitude, 0.0) + remainder[:, None]) * (1.0 + 2.0 * relative)
+    return _Product(displacement, magnitude, relative * magnitude, remainder)
+
+
+def _couple_above(problem: TangentialProblem, values: Array) -> Array:
+    """(m, n) upper bounds on A times values that are not negative."""
+    product = np.maximum(problem.couple(values), 0.0)
+    for row, each in zip(product, values, strict=True):
+        row += problem.influence.rounding(each).of(row)
+    return product
+
+
+def _by_convexity(
+    problem: TangentialProblem, known: Known, states: States, product: _Product
+) -> Bounds:
+    P, ceilings, h, theta = problem.loads, problem.ceilings, known.stiffness, known.convexity_number
     u, rises = states.increments, states.rises
     size = np.abs(u)
-    h = np.where(known.sure, 2.0 / 3.0 * ceilings / (P + known.errors), np.inf)
-    theta = float((problem.shells / h).max()) * (1 + SAFETY)
     if not theta < 1 or not known.sure.any():
         return _nothing(states)
 
     # The image on the true loads misses the total; a shift of eta where it sticks mends that.
-    moved = known.moved(P, u)
-    missing = moved.sum(axis=1) + np.abs(u.sum(axis=1) - states.totals)
+    shares = np.where(known.sure, size / P, 0.0)
+    missing = known.distance * np.sqrt((shares**2 / h).sum(axis=1))
+    missing = np.minimum((size * known.relative).sum(axis=1), missing)
+    missing += np.where(known.sure, 0.0, P + known.errors + size).sum(axis=1)
+    missing += np.abs(u.sum(axis=1) - states.totals)
     missing += len(P) * ROUNDOFF * size.sum(axis=1) + known.stray
-    sticking = known.sure & (size < P)
-    slopes = np.where(sticking, problem.slopes(states.deflections), 0.0)
-    weights = slopes.sum(axis=1)
-    shares = slopes / np.where(weights > 0, weights, 1.0)[:, None]
-    mended = missing[:, None] * shares
-    proved = (weights > 0) & (~sticking | (mended < 0.5 * (P - size))).all(axis=1)
+    slopes = np.where(known.sure & (size < P), problem.slopes(states.deflections), 0.0)
+    slopes[missing[:, None] * _shares(slopes) >= 0.25 * (P - size)] = 0.0  # no room to mend
+    mended = missing[:, None] * _shares(slopes)
+    proved = slopes.any(axis=1) & ((slopes == 0) | (mended < 0.5 * (P - size))).all(axis=1)
     mended[~proved] = 0.0
+    pushed = _couple_above(problem, mended)
     local = problem.deflections(u)
     bent = 1.5 * (problem.deflections(size + mended) - np.abs(local))  # 1.5: for P* in place of P
 
-    # The residual of the mended image on the true loads, with rounding.
-    asked = rises[:, None] - problem.couple(u)  # the deflection left to each asperity
-    unsure = (SUM_ROUNDOFFS * ROUNDOFF + A.product_error) * (
-        np.abs(local) + problem.couple(size) + rises[:, None]
-    )
-    unsure += problem.couple(moved + mended) + np.abs(local) * known.relative
-    unsure += known.stray_effect
+    # The residual of the mended image on the true loads, with rounding. What the loads' errors make
+    # of the local law, and of A w with w the image less u, is said in the norms of H and H + A.
+    asked = rises[:, None] - product.displacement  # the deflection left to each asperity
+    unsure = SUM_ROUNDOFFS * ROUNDOFF * (np.abs(local) + product.magnitude + rises[:, None])
+    unsure += product.rounding + known.stray_effect + known.loose_effect
     surplus = asked * np.sign(u) - ceilings
     residual = np.where(
         size < P, np.abs(asked - local) + unsure + bent, np.maximum(unsure - surplus, 0.0)
     )
     residual = np.where(known.sure, residual, 0.0)
-    norm = np.sqrt((residual**2 / h).sum(axis=1)) / (1.0 - theta) * (1 + SAFETY)
+    norm = np.sqrt((residual**2 / h).sum(axis=1)) + product.remainder / np.sqrt(h.min())
+    scaled = np.array([known.scaled(each) for each in shares])
+    own = np.where(known.sure, h, 0.0) * mended**2
+    coupled = np.sqrt(1.0 + known.coupling) * scaled + np.sqrt((own + mended * pushed).sum(axis=1))
+    norm += (1.0 + LOCAL) * scaled + np.sqrt(own.sum(axis=1))
+    norm = (norm / np.sqrt(1.0 - theta) + coupled) / np.sqrt(1.0 - theta) * (1 + SAFETY)
     off = norm[:, None] / np.sqrt(h) + mended  # from the image
 
     # The rise, known at every asperity sure to stick; and from it the slips.
-    unsure += norm[:, None] * A.spread(1.0 / h) * (1 + SAFETY)
+    unsure += np.abs(local) * known.relative + pushed + product.remainder[:, None]
+    unsure += (norm + scaled)[:, None] * known.reach * (1 + SAFETY)
     held = known.sure & (off < 0.5 * (P - size))
     bent = 1.5 * (problem.deflections(np.minimum(size + off, P)) - np.abs(local))
     each = np.where(held, np.abs(asked - local) + unsure + bent, np.inf)
@@ -136,10 +174,19 @@ def _by_convexity(problem: TangentialProblem, known: Known, states: States) -> B
     sliding = known.sure & (np.abs(asked) - ceilings > slip_errors)
     partial = known.sure & (held | (ceilings - np.abs(asked) > slip_errors))
     proved &= np.isfinite(rise_errors)
-    return Bounds(proved, off + moved, slip_errors, rise_errors, sliding, partial)
+    increments = off + known.moved(P, u)
+    return Bounds(proved, increments, slip_errors, rise_errors, sliding, partial)
 
 
-def _by_exhaustion(problem: TangentialProblem, known: Known, states: States) -> Bounds:
+def _shares(weights: Array) -> Array:
+    """(m, n) parts of 1, as the weights of each state; 0 where all are 0."""
+    total = weights.sum(axis=1, keepdims=True)
+    return weights / np.where(total > 0, total, 1.0)
+
+
+def _by_exhaustion(
+    problem: TangentialProblem, known: Known, states: States, product: _Product
+) -> Bounds:
     """Near gross sliding: |u| <= P and sum u = T leave each asperity within sum P - T of P.
 
     The last asperity to slide, i, then fixes the rise: it is at most k_i P_i^(2/3) + (A P)_i, and
@@ -147,21 +194,20 @@ def _by_exhaustion(problem: TangentialProblem, known: Known, states: States) -> 
     """
     if known.stray > 0 or not known.sure.all():
         return _nothing(states)
-    P, ceilings, A = problem.loads, problem.ceilings, problem.influence
+    P, ceilings = problem.loads, problem.ceilings
     u, rises = states.increments, states.rises
     left = (P.sum() - states.totals + known.errors.sum())[:, None]
     left += 2 * len(P) * ROUNDOFF * P.sum()
     errors = left + known.errors + (P - u)
-    spread = problem.couple(errors) + (SUM_ROUNDOFFS * ROUNDOFF + A.product_error) * (
-        problem.couple(np.abs(u)) + ceilings + rises[:, None]
-    )
-    asked = rises[:, None] - problem.couple(u)
-    spread += ceilings * known.relative
+    asked = rises[:, None] - product.displacement
+    blur = _couple_above(problem, errors) + product.rounding + product.remainder[:, None]
+    blur += SUM_ROUNDOFFS * ROUNDOFF * (product.magnitude + ceilings + rises[:, None])
+    blur += ceilings * known.relative
     lowest = ceilings * np.minimum(1.5 * left / P, 1.0) ** (2 / 3)
     last = np.argmin(asked - ceilings, axis=1)
     every = np.arange(len(rises))
-    rise_errors = (np.abs(asked - ceilings) + lowest + spread)[every, last] + spread.max(axis=1)
-    slip_errors = spread + rise_errors[:, None]
+    rise_errors = (np.abs(asked - ceilings) + lowest + blur)[every, last] + blur.max(axis=1)
+    slip_errors = blur + rise_errors[:, None]
     sliding = asked - ceilings > slip_errors
     # Where all but one are sure to slide, and not all can, that one does not.
     short = P.sum() * (1 - 2 * len(P) * ROUNDOFF) - known.errors.sum() - states.totals > 0
@@ -171,6 +217,7 @@ def _by_exhaustion(problem: TangentialProblem, known: Known, states: States) -> 
 
 
 def _nothing(states: States) -> Bounds:
-    unknown = np.full(states.increments.shape, np.inf)
-    no = np.zeros(states.increments.shape, dtype=bool)
-    return Bounds(np.zeros(len(no), dtype=bool), unknown, unknown, np.full(len(no), np.inf), no, no)
+    m, n = states.increments.shape
+    unknown, no = np.full((m, n), np.inf), np.zeros((m, n), dtype=bool)
+    nowhere, unproved = np.full(m, np.inf), np.zeros(m, dtype=bool)
+    return Bounds(unproved, unknown, unknown.copy(), nowhere, no, no.copy())

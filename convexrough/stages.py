@@ -13,6 +13,7 @@ from convexrough.contact import Contact
 from convexrough.cycle import Cycle, cycles
 from convexrough.history import History, history
 from convexrough.shear import ShearState, shear
+from convexrough.solvers.solution import Announce
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,19 +37,28 @@ def compute(
     shear_at: Sequence[float] | None,
     cycle_between: tuple[Sequence[float], Sequence[float]] | None,
     history_of: Sequence[float] | None,
+    announce: Announce | None = None,
 ) -> Outcome:
-    """The stages asked for; None for those that are not."""
+    """The stages asked for; None for those that are not.
+
+    announce : told in a line how far long work has come
+    """
     if shear_at is None and cycle_between is None and history_of is None:
         return Outcome(contact)
     limit = checks.friction(contact.scene.friction) * contact.load
     maxima, minima = cycle_between or ((), ())
-    steady = cycles(contact, limit * np.array(maxima), limit * np.array(minima))
+    steady = cycles(contact, limit * np.array(maxima), limit * np.array(minima), announce=announce)
     past = None
     if history_of is not None:
-        past = (history_of, history(contact, forces=limit * np.array(history_of)))
+        past = (
+            history_of,
+            history(contact, forces=limit * np.array(history_of), announce=announce),
+        )
     return Outcome(
         contact,
-        shear=[(part, shear(contact, force=part * limit)) for part in shear_at or ()],
+        shear=[
+            (part, shear(contact, force=part * limit, announce=announce)) for part in shear_at or ()
+        ],
         cycles=list(zip(maxima, minima, steady, strict=True)),
         history=past,
     )

@@ -1,13 +1,19 @@
 """Scenes and scene generators that several tests share."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import multiprecision
 import numpy as np
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 import convexrough as cr
+from convexrough.influence import Kind, couple
+
+#: The ways of coupling that the tests of the dense path run through, where a scene allows them.
+OPERATORS: tuple[Kind, ...] = ("dense", "lattice")
 
 MATERIAL = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
 STEEL = cr.Material.from_youngs(210e9, 0.3)
@@ -51,6 +57,23 @@ NAMED = {
 
 
 @cache
+def operators(scene: cr.Scene) -> tuple[Kind, ...]:
+    """Those of OPERATORS that the package accepts for a scene: asked of it, not assumed."""
+    return tuple(kind for kind in OPERATORS if _accepted(scene, kind))
+
+
+def _accepted(scene: cr.Scene, kind: Kind) -> bool:
+    try:
+        return couple(scene, np.arange(len(scene)), 1.0, kind).name == kind
+    except cr.InputError:
+        return False
+
+
+#: (name, operator): each named scene with each operator that it allows.
+CASES = [(name, kind) for name, (scene, _) in NAMED.items() for kind in operators(scene)]
+
+
+@cache
 def reference(scene: cr.Scene, **control: float) -> multiprecision.Reference:
     """The proved 50-digit solution; kept, as several tests ask for the same one."""
     return solve_exactly(scene, **control)
@@ -82,6 +105,40 @@ def scattered(seed: int, count: int, crowding: float, roughness: float) -> tuple
         point = rng.uniform(-1, 1, 2)
         if min(float(np.hypot(*(point - other))) for other in points) > separation:
             points.append(point)
+    return _pressed(rng, np.array(points), separation, crowding, roughness)
+
+
+def on_lattice(seed: int, count: int, crowding: float, roughness: float) -> tuple[cr.Scene, float]:
+    """As `scattered`, on a random lattice: sheared, turned and shifted, with holes."""
+    rng = np.random.default_rng(seed)
+    ratio, skew, angle = rng.uniform(1, 2), rng.uniform(-0.5, 0.5), rng.uniform(0, 2 * np.pi)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    basis = np.array([[1.0, 0.0], [skew, np.sqrt(max(ratio**2 - skew**2, 0.75))]]) @ turn
+    steps = np.arange(-8, 9)
+    sites = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    points = sites @ basis
+    points = points[np.argsort((points**2).sum(axis=1))]
+    middle = min(count, 9)  # no holes here: this is where a lattice is looked for
+    others = middle + rng.permutation(count + count // 5 - middle)[: count - middle]
+    points = points[np.append(np.arange(middle), others)] + rng.uniform(-1, 1, 2)
+    separation = 0.6 / np.sqrt(count)
+    scene, approach = _pressed(rng, points * separation, separation, crowding, roughness)
+    if scene.geometry == "closest":  # contact points of unequal tip radii are not on a lattice
+        a = scene.asperities
+        equal = cr.Asperities(a.positions, float(np.median(a.tip_radii)), a.heights)
+        scene = replace(scene, asperities=equal)
+    return scene, approach
+
+
+def _pressed(
+    rng: np.random.Generator,
+    points: NDArray[np.float64],
+    separation: float,
+    crowding: float,
+    roughness: float,
+) -> tuple[cr.Scene, float]:
+    """A random sphere, material, geometry and size for asperities at these points."""
+    count = len(points)
     approach = 10.0 ** rng.uniform(-4, -1)
     tip_radii = (crowding * np.pi / 4 * separation) ** 2 / approach * rng.lognormal(0, 0.2, count)
     sphere = float(10.0 ** rng.uniform(0, 2)) / approach
@@ -89,7 +146,7 @@ def scattered(seed: int, count: int, crowding: float, roughness: float) -> tuple
     heights = rng.normal(0, roughness, count) * approach
     scene = cr.Scene(
         sphere * scale,
-        cr.Asperities(np.array(points) * scale, tip_radii * scale, heights * scale),
+        cr.Asperities(points * scale, tip_radii * scale, heights * scale),
         cr.Material(float(10.0 ** rng.uniform(-3, 12)), 0.3),
         geometry="closest" if rng.random() < 0.5 else "summit",
     )
@@ -105,3 +162,19 @@ def random_scenes(draw: st.DrawFn, crowding: float = 0.8, most: int = 24) -> tup
         draw(st.floats(0.05, crowding)),
         draw(st.sampled_from([0.0, 0.1, 0.5, 2.0])),
     )
+
+
+@st.composite
+def random_cases(
+    draw: st.DrawFn, crowding: float = 0.8, most: int = 24
+) -> tuple[cr.Scene, float, Kind]:
+    """Scattered asperities or some on a lattice, and one of the operators that they allow."""
+    make = draw(st.sampled_from([scattered, on_lattice]))
+    scene, approach = make(
+        draw(st.integers(0, 2**32 - 1)),
+        draw(st.integers(1, most)),
+        draw(st.floats(0.05, crowding)),
+        draw(st.sampled_from([0.0, 0.1, 0.5, 2.0])),
+    )
+    # The last one first: hypothesis begins with it, and where there is a choice it is not dense.
+    return scene, approach, draw(st.sampled_from(operators(scene)[::-1]))

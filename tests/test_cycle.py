@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, paper, random_scenes
-from test_shear import FRICTION, pressed, with_friction
+from test_shear import FRICTION, KINDS, pressed, with_friction
 
 import convexrough as cr
 from convexrough import hertz
@@ -94,9 +94,10 @@ def test_partial_reversal_depends_on_the_range_alone() -> None:
         assert_allclose(loop.displacements[0], loop.displacements[-1], rtol=1e-12)
 
 
-def test_sliding_shakes_down() -> None:
+@pytest.mark.parametrize("influence", KINDS)
+def test_sliding_shakes_down(influence: str) -> None:
     """An asperity that slides on first loading does not in a cycle of less range than its onset."""
-    contact = pressed("paper")
+    contact = pressed("paper", influence)
     limit = limit_of(contact)
     onsets = cr.onset_of_sliding(contact)
     first = cr.shear(contact, force=0.6 * limit)
@@ -175,7 +176,7 @@ def test_stopping_on_the_way_changes_nothing(fractions: list[float], where: int)
 @given(st.lists(st.floats(-0.5, 0.5), min_size=0, max_size=12))
 def test_return_point_memory_and_wiping_out(inner: list[float]) -> None:
     """Whatever happens inside +-0.5, coming back to a turning point beyond restores the state."""
-    contact = pressed("paper")
+    contact = pressed("paper", "lattice" if len(inner) % 2 else "dense")
     limit = limit_of(contact)
     before = cr.history(contact, forces=np.array([0.6, -0.6, 0.6]) * limit)
     path = np.array([0.6, -0.6, *inner, 0.6, 0.8]) * limit
@@ -212,9 +213,10 @@ def test_first_loading_costs_a_quarter_and_each_branch_a_half() -> None:
     assert_allclose(np.array(path.slips.sum(axis=1)) / path.slips[0].sum(), [1, -1, 1, -1])
 
 
-def test_each_state_of_a_history_is_certified() -> None:
+@pytest.mark.parametrize("influence", KINDS)
+def test_each_state_of_a_history_is_certified(influence: str) -> None:
     """Bounds on the displacement add up over the turning points that a state hangs on."""
-    contact = pressed("rough")
+    contact = pressed("rough", influence)
     limit = limit_of(contact)
     path = cr.history(contact, forces=np.array([0.6, -0.2, 0.3, 0.3, -0.6, 0.9]) * limit)
     assert (path.displacement_errors > 0).all()

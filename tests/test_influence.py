@@ -1,6 +1,7 @@
-"""The coupling, its rounding bound, and the shell lemma."""
+"""The coupling as a matrix, its rounding bound, and the shell lemma."""
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +11,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import paper, rough, scattered
 
-from convexrough.influence import DenseInfluence, inverse_distances, shell_radii
+from convexrough.influence import DenseInfluence, inverse_distances, shells, spread
 
 SCALE = 0.37
+
+
+def shell_radii(points: np.ndarray) -> np.ndarray:
+    """s_i, from the 1 / (pi E* s_i) that the package speaks of."""
+    return SCALE / shells(DenseInfluence.assemble(points, SCALE))
 
 
 def exact_product(points: np.ndarray, scale: float, loads: np.ndarray) -> list[arb]:
@@ -32,15 +38,28 @@ def exact_product(points: np.ndarray, scale: float, loads: np.ndarray) -> list[a
 
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 150))
-def test_product_error_is_a_bound(seed: int, count: int) -> None:
+def test_rounding_is_a_bound(seed: int, count: int) -> None:
     """Also where the sum is cut into blocks (beyond 64)."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(-1, 1, (count, 2))
-    loads = rng.random(count) ** 8
+    loads = rng.random(count) ** 8 * (rng.choice([-1, 1], count) if seed % 2 else 1)
     operator = DenseInfluence.assemble(points, SCALE)
     computed, exact = operator.apply(loads), exact_product(points, SCALE, loads)
-    for value, true in zip(computed, exact, strict=True):
-        assert abs(float((arb(float(value)) - true) / true)) <= operator.product_error
+    assert operator.rounding(loads).norm == 0
+    # It is asked for with A |P| as computed, which is off itself.
+    bounds = operator.rounding(loads).of(operator.apply(np.abs(loads))) * (1 + 1e-12)
+    off = np.array([abs(float(v - t)) for v, t in zip(map(arb, computed), exact, strict=True)])
+    assert (off <= bounds).all()
+    assert bounds.max() <= 1e-14 * operator.apply(np.abs(loads)).max()
+
+
+def test_the_sum_in_blocks_is_the_product() -> None:
+    rng = np.random.default_rng(5)
+    for count in (1, 2, 64, 65, 300):
+        points, loads = rng.uniform(-1, 1, (count, 2)), rng.random(count)
+        operator = DenseInfluence.assemble(points, SCALE)
+        assert len(operator) == count
+        assert_allclose(operator.apply(loads), SCALE * inverse_distances(points, points) @ loads)
 
 
 def test_point_error_is_counted() -> None:
@@ -62,25 +81,72 @@ def test_point_error_is_counted() -> None:
     assert relative <= operator.entry_error
 
 
-def test_matrix_spread_and_rows_elsewhere() -> None:
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+def test_elsewhere(geometry: Any) -> None:
+    """Displacements at other points; 0 from a point to itself."""
+    scene = rough(geometry)
+    points, error = scene.contact_points, scene.point_error
+    among, others = points[::3], np.concatenate((points[1::3], points[:1], [[0.3, 0.4]]))
+    operator = DenseInfluence.assemble(among, SCALE, error)
+    coupling = operator.onto(others)
+    loads = np.random.default_rng(1).random(len(among))
+    rows = SCALE * inverse_distances(others, among)
+    assert (rows == 0).sum() == 1  # of the first point onto itself
+    assert_allclose(coupling.apply(loads), rows @ loads, rtol=1e-14)
+    exact = exact_product(
+        np.concatenate((among, others)), SCALE, np.append(loads, 0 * others[:, 0])
+    )
+    bounds = coupling.rounding(loads).of(coupling.apply(loads))
+    for value, true, bound in zip(coupling.apply(loads), exact[len(among) :], bounds, strict=True):
+        if true.is_finite():  # a point at itself is infinitely close in these words
+            assert abs(float(arb(float(value)) - true)) <= bound
+    for power in (2, 3):
+        assert_allclose(coupling.falloff(loads, power), (rows / SCALE) ** power @ loads, rtol=1e-11)
+        assert (coupling.falloff(loads, power) >= (rows / SCALE) ** power @ loads).all()
+    assert len(operator.onto(others[:0]).apply(loads)) == 0
+
+
+def test_matrix_spread_and_falloff() -> None:
     points = paper().contact_points
     operator = DenseInfluence.assemble(points, SCALE)
-    rng = np.random.default_rng(1)
-    loads = rng.random(len(points))
+    loads = np.random.default_rng(1).random(len(points))
+    assert operator.name == "dense"
     assert_allclose(operator.matrix, operator.matrix.T)
     assert (np.diag(operator.matrix) == 0).all()
-    assert_allclose(operator.spread(loads), np.sqrt(operator.matrix**2 @ loads))
-    others = rng.uniform(-1, 1, (7, 2))
-    ((block, rows, error),) = operator.elsewhere(others)
-    assert block == slice(0, 7)
-    assert 0 < error < 1e-14
-    assert_allclose(rows, SCALE * inverse_distances(others, points))
+    assert_allclose(spread(operator, SCALE, loads), np.sqrt(operator.matrix**2 @ loads))
+    inverse = inverse_distances(points, points)
+    for power in (2, 3):
+        sums = inverse**power @ loads
+        assert_allclose(operator.falloff(loads, power), sums, rtol=1e-12)
+        assert (operator.falloff(loads, power) >= sums).all()
+
+
+def test_among_some() -> None:
+    points = rough().contact_points
+    operator = DenseInfluence.assemble(points, SCALE, 1e-12)
+    which = np.array([7, 3, 88])
+    part = operator.among(which)
+    assert (part.matrix == operator.matrix[np.ix_(which, which)]).all()
+    assert (part.points == points[which]).all()
+    assert part.point_error == operator.point_error
+    assert part.entry_error == operator.entry_error
+    assert_allclose(part.separations(), DenseInfluence.assemble(points[which], 1).separations())
+    assert (part.separations() < DenseInfluence.assemble(points[which], 1).separations()).all()
+
+
+def test_crowding() -> None:
+    points, radii = np.array([[0.0, 0.0], [3.0, 4.0], [0.0, 2.0]]), np.array([0.1, 1.0, 0.2])
+    operator = DenseInfluence.assemble(points, SCALE)
+    assert operator.crowding(radii) == pytest.approx(1.2 / np.sqrt(13))
+    assert DenseInfluence.assemble(points[:1], SCALE).crowding(radii[:1]) == 0
+    assert operator.smoother(radii) is None
 
 
 def test_shell_radii() -> None:
     points = np.array([[0, 0], [1, 0], [4, 0]], dtype=float)
     assert_allclose(shell_radii(points), [0.5, 0.5, 1.5])
-    assert shell_radii(points[:1]) == np.inf
+    assert list(shells(DenseInfluence.assemble(points[:1], SCALE))) == [0]
+    assert shells(DenseInfluence.assemble(points, SCALE, point_error=1.0))[0] == np.inf
 
 
 @settings(max_examples=100, deadline=None)
@@ -90,7 +156,7 @@ def test_shell_lemma(seed: int, count: int, shape: float) -> None:
     rng = np.random.default_rng(seed)
     points = rng.standard_normal((count, 2)) * np.abs(rng.standard_normal((count, 1))) ** shape
     matrix = inverse_distances(points, points)
-    shifted = matrix + np.diag(1 / shell_radii(points))
+    shifted = matrix + np.diag(shells(DenseInfluence.assemble(points, 1.0)))
     eigenvalues = np.linalg.eigvalsh(shifted)
     assert eigenvalues[0] >= -1e-13 * eigenvalues[-1]
     assert np.linalg.eigvalsh(matrix)[0] < 0  # so the shift is needed

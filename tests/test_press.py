@@ -1,5 +1,7 @@
 """The solved contact: reference values, closed forms, symmetries, and 50-digit solutions."""
 
+from typing import Any
+
 import multiprecision
 import numpy as np
 import pytest
@@ -7,19 +9,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import (
+    CASES,
     MATERIAL,
     NAMED,
     PAPER_APPROACH,
+    operators,
     paper,
-    random_scenes,
+    random_cases,
     reference,
     rough,
-    steel,
 )
 from scipy.optimize import brentq
 
 import convexrough as cr
 from convexrough import hertz
+from convexrough.influence import Kind
+
+Case = tuple[cr.Scene, float, Kind]
+
+#: What is proved of the loads, over their error. Rounding of transforms is bounded in the 2-norm of
+#: all loads together, and the bound of each pass is far above what it loses: 750 to 2600 on these
+#: scenes, and 250 to 700 for matrices.
+LOOSE = {"dense": 1e4, "lattice": 3e4}
 
 RINGS = {  # distance^2 / spacing^2 -> (name, asperities, load), computed independently
     0: ("F", 1, 1.935817e-8),
@@ -31,9 +42,10 @@ RINGS = {  # distance^2 / spacing^2 -> (name, asperities, load), computed indepe
 }
 
 
-def test_the_papers_example() -> None:
+@pytest.mark.parametrize("kind", operators(paper()))
+def test_the_papers_example(kind: Kind) -> None:
     scene = paper()
-    contact = cr.press(scene, approach=PAPER_APPROACH)
+    contact = cr.press(scene, approach=PAPER_APPROACH, influence=kind)
     ring = np.round((scene.asperities.distances / 0.0025) ** 2)
     assert (contact.status == "contact").sum() == 37
     assert contact.load == pytest.approx(3.60853389e-7, rel=2e-9)
@@ -46,40 +58,71 @@ def test_the_papers_example() -> None:
     assert contact.model_error == pytest.approx(0.002, abs=5e-4)
 
 
-@pytest.mark.parametrize("name", NAMED)
-def test_fifty_digits(name: str) -> None:
-    """Loads and gaps against a proved multiprecision solution, and the bounds against the truth."""
+@pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
+    """Loads and gaps against a proved multiprecision solution, and the bounds against the truth.
+
+    Measured, the largest over these scenes and both controls: of the largest load, loads are off by
+    8e-16 through the matrix and 3e-15 through transforms; each of itself, by 3e-15 and 2e-14.
+    """
     scene, approach = NAMED[name]
-    contact = cr.press(scene, approach=approach)
-    exact = reference(scene, approach=approach)
-    assert multiprecision.relative_errors(contact.loads, exact.loads).max() < 1e-13
-    gap_errors = multiprecision.errors(contact.gaps, exact.gaps)
+    prescribed = {control: {"approach": approach, "load": total(name)}[control]}
+    contact = cr.press(scene, **prescribed, influence=kind)
+    exact = reference(scene, **prescribed)
+    assert contact.influence == kind
+    assert np.abs(multiprecision.relative_errors(contact.loads, exact.loads)).max() < 1e-13
+    truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
+    assert truth.max() < 1e-14 * contact.loads.max()
+    gap_errors = np.abs(multiprecision.errors(contact.gaps, exact.gaps))
     assert gap_errors.max() < 1e-13 * contact.gaps.max()
-    truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
-    certificate = contact.certificate
-    assert certificate.holds
-    assert (truth <= certificate.load_errors).all()
-    assert (np.abs(gap_errors) <= certificate.gap_errors).all()
-    assert certificate.load_error <= 1e4 * truth.max()
-    assert certificate.load_error <= 1e-10 * contact.loads.max()
-
-
-@pytest.mark.parametrize("scene", [paper(), rough(), rough("closest"), steel()])
-def test_fifty_digits_under_load_control(scene: cr.Scene) -> None:
-    load = cr.press(scene, approach=5e-5 * scene.sphere_radius).load
-    contact = cr.press(scene, load=load)
-    exact = reference(scene, load=load)
-    assert multiprecision.relative_errors(contact.loads, exact.loads).max() < 1e-13
-    truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
     certificate = contact.certificate
     assert certificate.scope == "global"
     assert certificate.holds
     assert (truth <= certificate.load_errors).all()
-    assert certificate.load_error <= 1e4 * truth.max()
+    assert (gap_errors <= certificate.gap_errors).all()
+    assert certificate.load_error <= LOOSE[kind] * truth.max()
+    assert certificate.load_error <= 1e-11 * contact.loads.max()
     drift = abs(float(multiprecision.errors([contact.approach], [exact.approach])[0]))
     assert drift <= min(certificate.approach_error, 1e-14 * contact.approach)
-    gap_errors = np.abs(multiprecision.errors(contact.gaps, exact.gaps))
-    assert (gap_errors <= certificate.gap_errors).all()
+
+
+def total(name: str) -> float:
+    """A load to prescribe."""
+    scene, approach = NAMED[name]
+    return cr.press(scene, approach=approach, influence="dense").load
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_words_do_not_depend_on_the_operator(name: str) -> None:
+    """Nor do loads, to within what is proved of each."""
+    scene, approach = NAMED[name]
+    first, *others = (
+        cr.press(scene, approach=approach, influence=kind) for kind in operators(scene)
+    )
+    for other in others:
+        assert (other.status == first.status).all()
+        apart = np.abs(other.loads - first.loads)
+        assert (apart <= first.certificate.load_errors + other.certificate.load_errors).all()
+        assert apart.max() <= 1e-14 * first.loads.max()
+        assert other.crowding == pytest.approx(first.crowding, rel=1e-12)
+        assert other.model_error == pytest.approx(first.model_error, rel=0.01)
+        for solved, kind in ((first, other.influence), (other, first.influence)):
+            judged = cr.certify(scene, solved.loads, approach=approach, influence=kind)
+            assert judged.scope == "global"
+            assert (judged.status == first.status).all()
+
+
+def test_which_operator() -> None:
+    """A matrix for few; one may be asked for by name, where the scene allows it."""
+    assert cr.press(paper(), approach=PAPER_APPROACH).influence == "dense"
+    with pytest.raises(cr.InputError, match="influence: found lattice, expected asperities on a"):
+        cr.press(rough("closest"), approach=PAPER_APPROACH, influence="lattice")
+    wrong: Any = "fft"
+    with pytest.raises(cr.InputError, match="influence: found 'fft', expected one of dense"):
+        cr.press(paper(), approach=PAPER_APPROACH, influence=wrong)
+    many = cr.Asperities.hexagonal(spacing=0.0008, tip_radius=0.005, within=0.0102)
+    assert cr.press(cr.Scene(1.0, many, MATERIAL), approach=PAPER_APPROACH).influence == "lattice"
 
 
 @pytest.mark.parametrize("control", ["approach", "load"])
@@ -145,10 +188,10 @@ def test_two_asperities_one_of_them_just_open() -> None:
 
 
 @settings(max_examples=25, deadline=None)
-@given(random_scenes(), st.floats(-3, 3), st.floats(-3, 3))
-def test_units_do_not_matter(drawn: tuple[cr.Scene, float], length: float, force: float) -> None:
+@given(random_cases(), st.floats(-3, 3), st.floats(-3, 3))
+def test_units_do_not_matter(drawn: Case, length: float, force: float) -> None:
     """Lengths times lambda and moduli times mu: loads times lambda^2 mu, the same words."""
-    scene, approach = drawn
+    scene, approach, kind = drawn
     lam, mu = 10**length, 10**force
     a = scene.asperities
     scaled = cr.Scene(
@@ -157,7 +200,8 @@ def test_units_do_not_matter(drawn: tuple[cr.Scene, float], length: float, force
         cr.Material(scene.material.contact_modulus * mu, 0.3),
         geometry=scene.geometry,
     )
-    first, second = cr.press(scene, approach=approach), cr.press(scaled, approach=approach * lam)
+    first = cr.press(scene, approach=approach)
+    second = cr.press(scaled, approach=approach * lam, influence=kind)
     top = first.loads.max()
     assert_allclose(second.loads / (lam**2 * mu), first.loads, rtol=1e-11, atol=1e-12 * top)
     sure = (first.status != "undecided") & (second.status != "undecided")
@@ -165,11 +209,9 @@ def test_units_do_not_matter(drawn: tuple[cr.Scene, float], length: float, force
 
 
 @settings(max_examples=25, deadline=None)
-@given(random_scenes(), st.randoms(use_true_random=False), st.floats(0, 6.28))
-def test_order_and_orientation_do_not_matter(
-    drawn: tuple[cr.Scene, float], random: object, angle: float
-) -> None:
-    scene, approach = drawn
+@given(random_cases(), st.randoms(use_true_random=False), st.floats(0, 6.28))
+def test_order_and_orientation_do_not_matter(drawn: Case, random: object, angle: float) -> None:
+    scene, approach, kind = drawn
     a = scene.asperities
     order = list(range(len(a)))
     random.shuffle(order)  # type: ignore[attr-defined]
@@ -180,29 +222,31 @@ def test_order_and_orientation_do_not_matter(
         scene.material,
         geometry=scene.geometry,
     )
-    first, second = cr.press(scene, approach=approach), cr.press(turned, approach=approach)
+    first = cr.press(scene, approach=approach)
+    second = cr.press(turned, approach=approach, influence=kind)
     top = first.loads.max()
     assert_allclose(second.loads, first.loads[order], rtol=1e-10, atol=1e-12 * top)
 
 
 @settings(max_examples=25, deadline=None)
-@given(random_scenes())
-def test_load_control_inverts_approach_control(drawn: tuple[cr.Scene, float]) -> None:
-    scene, approach = drawn
+@given(random_cases())
+def test_load_control_inverts_approach_control(drawn: Case) -> None:
+    scene, approach, kind = drawn
     first = cr.press(scene, approach=approach)
     if first.load == 0:
         return
-    second = cr.press(scene, load=first.load)
+    second = cr.press(scene, load=first.load, influence=kind)
     assert second.load == pytest.approx(first.load, rel=1e-14)
     assert second.approach == pytest.approx(approach, rel=1e-11)
     assert_allclose(second.loads, first.loads, rtol=1e-9, atol=1e-12 * first.loads.max())
 
 
 @settings(max_examples=25, deadline=None)
-@given(random_scenes(), st.floats(0.1, 0.99))
-def test_total_load_grows_with_the_approach(drawn: tuple[cr.Scene, float], part: float) -> None:
-    scene, approach = drawn
-    lower, upper = cr.press(scene, approach=part * approach), cr.press(scene, approach=approach)
+@given(random_cases(), st.floats(0.1, 0.99))
+def test_total_load_grows_with_the_approach(drawn: Case, part: float) -> None:
+    scene, approach, kind = drawn
+    lower = cr.press(scene, approach=part * approach, influence=kind)
+    upper = cr.press(scene, approach=approach, influence=kind)
     assert lower.load <= upper.load
 
 
@@ -215,9 +259,18 @@ def test_nothing_touches() -> None:
     assert_allclose(contact.gaps, [5e-7 - 1e-7, 2e-6 - 1e-7], rtol=1e-9)
 
 
+@pytest.mark.parametrize("kind", operators(paper()))
+def test_nothing_touches_through_any_operator(kind: Kind) -> None:
+    contact = cr.press(paper(), approach=-1e-6, influence=kind)
+    assert contact.load == 0
+    assert (contact.status == "open").all()
+    assert_allclose(contact.gaps, 1e-6 + paper().drops, rtol=1e-14)
+
+
+@pytest.mark.parametrize("kind", operators(rough()))
 @pytest.mark.parametrize("start", ["zero", "huge", "one", "swapped"])
 @pytest.mark.parametrize("control", ["approach", "load"])
-def test_the_start_does_not_matter(start: str, control: str) -> None:
+def test_the_start_does_not_matter(start: str, control: str, kind: Kind) -> None:
     scene = rough()
     contact = cr.press(scene, approach=PAPER_APPROACH)
     first = {
@@ -229,15 +282,17 @@ def test_the_start_does_not_matter(start: str, control: str) -> None:
     again = cr.press(
         scene,
         start=first,
+        influence=kind,
         **{control: {"approach": PAPER_APPROACH, "load": contact.load}[control]},
     )
     assert_allclose(again.loads, contact.loads, rtol=1e-12, atol=1e-13 * contact.loads.max())
 
 
+@pytest.mark.parametrize("kind", operators(rough()))
 @pytest.mark.parametrize("load", [1e-59, 1e-35, 1e-20, 1e-10])
-def test_loads_of_any_size(load: float) -> None:
+def test_loads_of_any_size(load: float, kind: Kind) -> None:
     """Also where the indentation of the only asperity that touches is lost in the approach."""
-    contact = cr.press(rough(), load=load)
+    contact = cr.press(rough(), load=load, influence=kind)
     assert contact.load == pytest.approx(load, rel=1e-14)
     assert (contact.loads > 0).sum() >= 1
 
@@ -262,6 +317,8 @@ def test_contact_fields() -> None:
     assert (contact.gaps[contact.status == "contact"] == 0).all()
 
 
-def test_newton_says_so_where_it_does_not_converge() -> None:
+@pytest.mark.parametrize("kind", operators(paper()))
+def test_newton_says_so_where_it_does_not_converge(kind: Kind) -> None:
+    hasty = cr.solvers.Newton(max_iterations=2)
     with pytest.raises(cr.SolverError, match=r"newton: residual .* after 2 steps"):
-        cr.press(paper(), approach=PAPER_APPROACH, solver=cr.solvers.Newton(max_iterations=2))
+        cr.press(paper(), approach=PAPER_APPROACH, solver=hasty, influence=kind)

@@ -104,7 +104,9 @@ def test_answers_to_different_problems(contact: cr.Contact) -> None:
     message = failure(assert_agree, contact, other)
     assert "loads of asperities " in message
     assert "approach 5.0000000000000002e-05 +- 0 and 5.05" in message
-    worst = int(np.argmax(np.abs(contact.loads - other.loads)))
+    apart = np.abs(contact.loads - other.loads)
+    worst = int(re.search(r"asperities (\d+): ", message)[1])  # type: ignore[index]
+    assert apart[worst] >= apart.max() * (1 - 1e-12)  # of a ring alike, any
     assert f"asperities {worst}: {contact.loads[worst]:.6g} +- " in message
 
 

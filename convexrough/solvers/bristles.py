@@ -45,7 +45,7 @@ from convexrough.normal import NormalProblem
 from convexrough.solvers.libraries import load_library
 from convexrough.solvers.lifted import TooDenseError
 from convexrough.solvers.newton import newton_step
-from convexrough.solvers.solution import Solution
+from convexrough.solvers.solution import Announce, Solution
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -87,7 +87,12 @@ class BristleQP:
     def name(self) -> str:
         return "bristles + Newton step" if self.newton_step else "bristles"
 
-    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
+    def solve(
+        self,
+        problem: NormalProblem,
+        start: Array | None = None,
+        announce: Announce | None = None,
+    ) -> Solution:
         """Loads of the candidates (own units). OSQP starts where it likes: `start` is not used."""
         program = _assemble(problem, self.bristles)
         x, multipliers, iterations = _run_osqp(program, self)

@@ -21,7 +21,7 @@ from convexrough.errors import SolverError
 from convexrough.normal import NormalProblem
 from convexrough.solvers.libraries import load_library
 from convexrough.solvers.lifted import Answer, Boxes, solve_in_boxes
-from convexrough.solvers.solution import Solution
+from convexrough.solvers.solution import Announce, Solution
 
 #: From this many asperities on Clarabel's supernodal factorisation is the faster one.
 SUPERNODAL = 300
@@ -57,7 +57,12 @@ class Conic:
     def name(self) -> str:
         return "conic + Newton step" if self.newton_step else "conic"
 
-    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
+    def solve(
+        self,
+        problem: NormalProblem,
+        start: Array | None = None,
+        announce: Announce | None = None,
+    ) -> Solution:
         """Loads of the candidates. `start` is not used: interior points begin in the middle."""
         return solve_in_boxes(self, problem)
 

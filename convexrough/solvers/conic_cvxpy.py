@@ -18,7 +18,7 @@ from convexrough.errors import InputError, SolverError
 from convexrough.normal import NormalProblem
 from convexrough.solvers.libraries import load_library
 from convexrough.solvers.lifted import Answer, Boxes, accept, solve_in_boxes
-from convexrough.solvers.solution import Solution
+from convexrough.solvers.solution import Announce, Solution
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,12 @@ class ConicCVXPY:
     def name(self) -> str:
         return "conic in CVXPY + Newton step" if self.newton_step else "conic in CVXPY"
 
-    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
+    def solve(
+        self,
+        problem: NormalProblem,
+        start: Array | None = None,
+        announce: Announce | None = None,
+    ) -> Solution:
         """Loads of the candidates. `start` is not used: interior points begin in the middle."""
         return solve_in_boxes(self, problem)
 

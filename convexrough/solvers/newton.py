@@ -5,14 +5,11 @@ P_i = (max(delta_i, 0) / k_i)^(3/2) the whole contact law is the square system
 
     F(delta) = delta + A P(delta) - D = 0,
 
-once differentiable, and no active set is guessed: it is the sign of the answer. With
-c = dP/ddelta (0 where open) and W = diag(c)^(1/2) a step solves
+once differentiable, and no active set is guessed: it is the sign of the answer. A step is that of
+`convexrough.newton_system`; in the convex range it descends the energy Phi(P(delta)).
 
-    (I + W A W) y = -W F  on the touching set,     d(delta) = -F - A W y.
-
-The matrix is the Hessian of the energy scaled by its local part: positive definite in the convex
-range, and then the step descends the energy Phi(P(delta)). Where it is not positive definite the
-shells are added to its diagonal, which makes it so for any layout.
+Of many asperities only those near the contact take part in the iteration. What the others feel is
+looked at once it has ended; where one of them would touch, it goes on with more.
 """
 
 from __future__ import annotations
@@ -23,10 +20,26 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough import hertz
-from convexrough.checks import Array, Indices
+from convexrough.checks import Array
 from convexrough.errors import SolverError
-from convexrough.normal import SAFETY, NormalProblem, shifted_to_load
-from convexrough.solvers.solution import Solution
+from convexrough.load_control import shifted_to_load
+from convexrough.newton_system import correct
+from convexrough.normal import NormalProblem
+from convexrough.roundoff import SAFETY
+from convexrough.solvers.mean_field import mean_field_indentation
+from convexrough.solvers.solution import Announce, Solution
+
+#: Of more candidates than this, only those near the contact are iterated on.
+FEW = 1000
+
+#: Near the contact: with a gap of at most this part of the largest prescribed approach.
+MARGIN = 0.1
+
+#: Most of the residual that the linear solver may leave in a step.
+MOST_LEFT = 0.1
+
+#: A residual is negligible at this part of the rounding that the certificate allows for.
+NEGLIGIBLE = 0.1
 
 
 class _State(NamedTuple):
@@ -41,29 +54,80 @@ class _State(NamedTuple):
 
 @dataclass(frozen=True)
 class Newton:
-    """Settings of Newton's method on the normal map, with dense Cholesky factors.
+    """Settings of Newton's method on the normal map.
 
-    Stops when  max_i |delta_i + (A P)_i - D_i| <= tolerance (|D0| + max_i |d_i|)  and a further
-    step no longer halves that residual, so that the answer is as good as float64 allows. Raises
-    SolverError if `max_iterations` steps do not get there.
+    Stops when  max_i |delta_i + (A P)_i - D_i| <= tolerance (|D0| + max_i |d_i|)  and that residual
+    is small beside what rounding can make of A P, which the certificate has to allow for anyway, or
+    a further step no longer halves it. Raises SolverError if `max_iterations` steps do not get
+    there.
     """
 
     tolerance: float = 1e-12
     max_iterations: int = 100
     name: str = field(default="newton", init=False)
 
-    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
+    def solve(
+        self,
+        problem: NormalProblem,
+        start: Array | None = None,
+        announce: Announce | None = None,
+    ) -> Solution:
         """Loads of the candidates, from any start that is not negative (own units)."""
-        state = _evaluate(problem, _start(problem, start))
-        farthest = float(np.abs(problem.offsets).max())
+        indentation = _start(problem, start)
+        highest = float(np.maximum(problem.ceiling + problem.offsets, 0.0).max())
+        near = np.arange(len(problem))
+        if len(problem) > FEW and start is None:
+            near = np.flatnonzero(indentation > -MARGIN * highest)
+        iterations = 0
+        while True:
+            part = problem if len(near) == len(problem) else problem.among(near)
+            state, steps = self._iterate(problem, part, indentation[near], announce)
+            iterations += steps
+            # What do the others feel?
+            loads = np.zeros(len(problem))
+            loads[near] = state.loads
+            displacement = problem.influence.apply(loads)
+            gap = displacement - problem.offsets - state.approach
+            touched = gap < 0
+            touched[near] = False
+            if not touched.any():
+                residual = problem.residual(loads, state.approach, displacement)
+                return Solution(loads, state.approach, iterations, residual)
+            indentation = -gap
+            indentation[near] = state.indentation
+            near = np.flatnonzero(indentation > -MARGIN * highest)
+
+    def _iterate(
+        self,
+        whole: NormalProblem,
+        problem: NormalProblem,
+        indentation: Array,
+        announce: Announce | None,
+    ) -> tuple[_State, int]:
+        """Steps on (part of) a problem until the solution is as good as it gets."""
+        state = _evaluate(problem, _on_constraint(problem, indentation))
+        farthest = float(np.abs(whole.offsets).max())
+        before = np.inf
         for iteration in range(1, self.max_iterations + 1):
-            following = _step(problem, state)
-            best = min(state, following, key=lambda s: s.residual)
+            if announce is not None:
+                touching = int(np.count_nonzero(state.loads))
+                announce(
+                    f"step {iteration}, residual {state.residual / whole.ceiling:.1e}, "
+                    f"{touching:,} touching"
+                )
             accurate = state.residual <= self.tolerance * (abs(state.approach) + farthest)
+            noise = problem.influence.rounding(state.loads)
+            size = float(np.linalg.norm(state.defect))
+            target = NEGLIGIBLE * (
+                noise.relative * float(np.linalg.norm(state.displacement)) + noise.norm
+            )
+            if accurate and size <= target:
+                return state, iteration - 1
+            forcing = min(MOST_LEFT, (size / before) ** 2) if before < np.inf else MOST_LEFT
+            following = _step(problem, state, max(forcing, 0.3 * target / size))
             if accurate and following.residual >= 0.5 * state.residual:
-                residual = problem.residual(best.loads, best.approach)
-                return Solution(best.loads, best.approach, iteration, residual)
-            state = following
+                return min(state, following, key=lambda s: s.residual), iteration
+            state, before = following, size
         raise SolverError(
             f"newton: residual {state.residual:.3g} in units of the approach after "
             f"{self.max_iterations} steps, tolerance {self.tolerance:g}"
@@ -75,15 +139,16 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
     From an error e it leaves about e^2, and it tells open asperities from lightly loaded ones.
     """
-    state = _step(problem, _evaluate(problem, _start(problem, loads)))
-    residual = problem.residual(state.loads, state.approach)
+    state = _step(problem, _evaluate(problem, _start(problem, loads)), 0.0)
+    residual = problem.residual(state.loads, state.approach, state.displacement)
     return Solution(state.loads, state.approach, 1, residual)
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
     """An indentation to start from: of the given loads, or of heights riding on a smooth sphere."""
     if loads is None:
-        indentation = problem.smooth_indentation()
+        few = len(problem) <= FEW
+        indentation = problem.smooth_indentation() if few else mean_field_indentation(problem)
     else:
         indentation = np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
     return _on_constraint(problem, indentation)
@@ -114,51 +179,25 @@ def _evaluate(problem: NormalProblem, indentation: Array) -> _State:
     return _State(indentation, loads, displacement, defect, approach, energy, residual)
 
 
-def _step(problem: NormalProblem, state: _State) -> _State:
+def _step(problem: NormalProblem, state: _State, forcing: float) -> _State:
     """One Newton step, halved until the energy falls (Armijo's rule along the arc P(delta))."""
-    direction = _direction(problem, state)
+    root = np.sqrt(1.0 / problem.stiffness(state.loads))  # W
+    correction = correct(
+        problem.influence,
+        problem.shells,
+        root,
+        state.defect,
+        balanced=problem.load is not None,
+        tolerance=forcing,
+    )
     gap = problem.gap(state.loads, state.displacement, state.approach)
     rounding = SAFETY * float(state.loads @ (np.abs(problem.offsets) + abs(state.approach)))
     length = 1.0
     while length > 1e-12:
-        trial = _evaluate(problem, _on_constraint(problem, state.indentation + length * direction))
+        moved = state.indentation + length * correction.change
+        trial = _evaluate(problem, _on_constraint(problem, moved))
         slope = float(gap @ (trial.loads - state.loads))
         if trial.energy - state.energy <= 1e-4 * min(slope, 0.0) + rounding:
             return trial
         length /= 2.0
     raise SolverError("newton: no step along its direction lowers the energy")
-
-
-def _direction(problem: NormalProblem, state: _State) -> Array:
-    """-F - A W y + beta: beta, the change of D0, is 0 unless the total load is prescribed."""
-    touching = np.flatnonzero(state.loads)
-    if len(touching) == 0:
-        return -state.defect
-    loads = state.loads[touching]
-    root = np.sqrt(1.0 / problem.stiffness(loads, touching))  # W
-    right = np.column_stack((-root * state.defect[touching], root))
-    y, border = _solve_scaled(problem, touching, root, right).T
-    beta = 0.0
-    if problem.load is not None:
-        beta = -float(root @ y) / float(root @ border)  # so that the total does not change
-        y = y + beta * border
-    spread = np.zeros(len(problem))
-    spread[touching] = root * y
-    return beta - state.defect - problem.influence.apply(spread)
-
-
-def _solve_scaled(problem: NormalProblem, touching: Indices, root: Array, right: Array) -> Array:
-    """Solve (I + W A W) y = right on the touching set; with the shells added if indefinite."""
-    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
-
-    for shells in (0.0, problem.shells[touching]):
-        matrix = problem.influence.matrix[np.ix_(touching, touching)]
-        matrix *= root
-        matrix *= root[:, None]
-        np.fill_diagonal(matrix, 1.0 + root * shells * root)
-        # The transpose of a symmetric matrix is itself, and in LAPACK's order: no copy.
-        factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
-        if info == 0:
-            solution: Array = dpotrs(factor, right, lower=1)[0]
-            return solution
-    raise SolverError("newton: the shell-shifted matrix is not positive definite")

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 from convexrough.checks import Array
 from convexrough.normal import NormalProblem
+
+#: Told in a line how far long work has come.
+Announce = Callable[[str], object]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,4 +32,9 @@ class Solver(Protocol):
     @property
     def name(self) -> str: ...
 
-    def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution: ...
+    def solve(
+        self,
+        problem: NormalProblem,
+        start: Array | None = None,
+        announce: Announce | None = None,
+    ) -> Solution: ...

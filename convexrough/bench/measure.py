@@ -1,0 +1,257 @@
+"""Time, products, memory and true error of one solver on one problem."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+
+from convexrough.bench.reference import Reference
+from convexrough.bench.scenes import APPROACH
+from convexrough.certificate import judge
+from convexrough.checks import Array
+from convexrough.contact import press
+from convexrough.errors import InputError, SolverError
+from convexrough.influence import Influence, Kind
+from convexrough.memory import MemoryRise
+from convexrough.normal import NormalProblem
+from convexrough.scene import Scene
+from convexrough.solvers import Newton, Solver
+
+MOST_REPEATS = 25
+
+Outcome = Literal["answered", "refused", "failed", "left out"]
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One point of the diagram.
+
+    solver    : which method, in words;  setting : how it is set, in words
+    settings  : the solver itself;  influence : the coupling that is asked for
+    growth    : time grows about with this power of the number of asperities; what would take too
+        long is not tried. None: it always is
+    """
+
+    solver: str
+    setting: str
+    settings: Solver
+    influence: Kind | None = None
+    growth: float | None = 2.0
+
+    @property
+    def default(self) -> bool:
+        return self.influence is None and self.settings == Newton()
+
+
+@dataclass(frozen=True)
+class Row:
+    """What came of it.
+
+    outcome : "answered"; "refused": the scene is not one for this solver; "failed"; or "left out"
+    message : why, where it did not answer;  expected : [s] why it was left out
+    influence : the coupling that was used
+    error   : max |P - P_ref| / max P_ref
+    assembling, solving, certifying : [s] the least of several
+    products, single : applications of A in double and in single precision
+    memory  : [bytes] by which that of the process rose at most, None where unknown
+    certified : every asperity has a proved word
+    frontier : no other point is both faster and more accurate
+
+    The time that counts is `seconds`, of assembling and solving: what one method computes when it
+    starts another does when it is made.
+    """
+
+    solver: str
+    setting: str
+    default: bool
+    outcome: Outcome
+    message: str = ""
+    expected: float = np.nan
+    influence: str = ""
+    error: float = np.nan
+    assembling: float = np.nan
+    solving: float = np.nan
+    certifying: float = np.nan
+    iterations: int = 0
+    products: int = 0
+    single: int = 0
+    memory: int | None = None
+    certified: bool = False
+    frontier: bool = False
+
+    @property
+    def seconds(self) -> float:
+        return self.assembling + self.solving
+
+
+@dataclass
+class Tally:
+    """Applications of A, in double and in single precision."""
+
+    double: int = 0
+    single: int = 0
+
+
+def counted(influence: Influence, tally: Tally) -> Influence:
+    """The same operator, of the same class, which counts its applications."""
+    base: Any = type(influence)
+
+    def apply(self: Any, loads: Array) -> Array:
+        if loads.dtype == np.float32:
+            tally.single += 1
+        else:
+            tally.double += 1
+        product: Array = base.apply(self, loads)
+        return product
+
+    def among(self: Any, which: Any) -> Influence:
+        plain = copy.copy(self)
+        object.__setattr__(plain, "__class__", base)  # a part is made by the class of the whole
+        return counted(plain.among(which), tally)
+
+    twin: Any = copy.copy(influence)
+    kind = type(base.__name__, (base,), {"apply": apply, "among": among})
+    object.__setattr__(twin, "__class__", kind)  # frozen dataclasses
+    result: Influence = twin
+    return result
+
+
+def measure(scene: Scene, attempt: Attempt, reference: Reference | None, *, patience: float) -> Row:
+    """One run that is counted and judged, then more for the time, as long as that is short.
+
+    patience : [s] to repeat for
+    """
+    blank = Row(attempt.solver, attempt.setting, attempt.default, "answered")
+    try:
+        return _measure(scene, attempt, reference, patience, blank)
+    except InputError as error:
+        return replace(blank, outcome="refused", message=_reason(error, attempt))
+    except SolverError as error:
+        return replace(blank, outcome="failed", message=_reason(error, attempt))
+
+
+def _reason(error: Exception, attempt: Attempt) -> str:
+    return str(error).removeprefix(f"{attempt.settings.name}: ")
+
+
+def _measure(
+    scene: Scene, attempt: Attempt, reference: Reference | None, patience: float, blank: Row
+) -> Row:
+    tally, memory = Tally(), MemoryRise()
+    problem = NormalProblem.assemble(scene, approach=APPROACH, influence=attempt.influence)
+    if attempt.influence not in (None, (used := problem.influence.name)):
+        message = f"no {attempt.influence} coupling in this version; it would take the {used} one"
+        return replace(blank, outcome="left out", message=message)
+    solution = attempt.settings.solve(replace(problem, influence=counted(problem.influence, tally)))
+    certificate = judge(problem, problem.to_scene(solution.loads * problem.units.force))
+    risen = memory.risen()
+
+    times: list[tuple[float, float, float]] = []
+    began = time.perf_counter()
+    assemble = partial(
+        NormalProblem.assemble, scene, approach=APPROACH, influence=attempt.influence
+    )
+    while not times or (time.perf_counter() - began < patience and len(times) < MOST_REPEATS):
+        # A problem of its own each time: an operator keeps what it has computed once.
+        fresh, assembling = timed(assemble)
+        solution, solving = timed(partial(attempt.settings.solve, fresh))
+        loads = fresh.to_scene(solution.loads * fresh.units.force)
+        _, certifying = timed(partial(judge, fresh, loads))
+        times.append((assembling, solving, certifying))
+    assembling, solving, certifying = (min(each) for each in zip(*times, strict=True))
+    return replace(
+        blank,
+        influence=problem.influence.name,
+        error=np.nan if reference is None else reference.error(solution.loads),
+        assembling=assembling,
+        solving=solving,
+        certifying=certifying,
+        iterations=solution.iterations,
+        products=tally.double,
+        single=tally.single,
+        memory=risen,
+        certified=certificate.holds,
+    )
+
+
+@dataclass(frozen=True)
+class CostRow:
+    """A press of the default solver.
+
+    outcome, message : as those of `Row`
+    seconds  : [s] the whole of it, the least of several
+    assembling, solving, certifying : [s] its parts
+    load_error : proved bound on the error of a load, over the largest load
+    """
+
+    family: str
+    asperities: int
+    outcome: Outcome
+    message: str = ""
+    touching: int = 0
+    influence: str = ""
+    seconds: float = np.nan
+    assembling: float = np.nan
+    solving: float = np.nan
+    certifying: float = np.nan
+    iterations: int = 0
+    products: int = 0
+    single: int = 0
+    memory: int | None = None
+    certified: bool = False
+    scope: str = "none"
+    load_error: float = np.inf
+
+
+def measure_cost(family: str, scene: Scene, *, patience: float) -> CostRow:
+    """Time and memory of `press`; then its parts, and products counted."""
+    try:
+        return _measure_cost(family, scene, patience)
+    except InputError as error:
+        return CostRow(family, len(scene), "refused", str(error))
+    except SolverError as error:
+        return CostRow(family, len(scene), "failed", str(error))
+
+
+def _measure_cost(family: str, scene: Scene, patience: float) -> CostRow:
+    memory = MemoryRise()
+    contact, seconds = timed(lambda: press(scene, approach=APPROACH))
+    risen = memory.risen()
+    spent = seconds
+    repeats = 1
+    while spent < patience and repeats < MOST_REPEATS:
+        _, again = timed(lambda: press(scene, approach=APPROACH))
+        seconds, spent, repeats = min(seconds, again), spent + again, repeats + 1
+    row = measure(scene, Attempt("newton", "", Newton(), growth=None), None, patience=0.0)
+    return CostRow(
+        family=family,
+        asperities=len(scene),
+        outcome="answered",
+        touching=int(np.count_nonzero(contact.loads)),
+        influence=contact.influence,
+        seconds=seconds,
+        assembling=row.assembling,
+        solving=row.solving,
+        certifying=row.certifying,
+        iterations=contact.iterations,
+        products=row.products,
+        single=row.single,
+        memory=risen,
+        certified=contact.certificate.holds,
+        scope=contact.certificate.scope,
+        load_error=contact.certificate.load_error / float(contact.loads.max()),
+    )
+
+
+def timed(work: Callable[[], Result]) -> tuple[Result, float]:
+    """What it returns, and the seconds it took."""
+    began = time.perf_counter()
+    result = work()
+    return result, time.perf_counter() - began

@@ -1,0 +1,45 @@
+"""Which operator a scene needs: the cheapest exact one, unless one is asked for by name."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from convexrough.checks import Indices
+from convexrough.errors import InputError
+from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.interface import Influence, Kind
+from convexrough.influence.lattice import LatticeInfluence
+from convexrough.influence.scattered import ScatteredInfluence
+from convexrough.scene import Scene
+
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+#: Up to so many asperities the matrix costs less than anything else.
+FEW = 512
+
+#: Up to so many off a lattice the matrix costs less than meshes.
+SCATTERED_FEW = 3000
+
+
+def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None) -> Influence:
+    """The coupling among some of a scene's asperities; scale = 1 / (pi E*) in their units.
+
+    kind : None for the cheapest: a matrix for few asperities, else transforms on a lattice where
+        they lie on one, else on a mesh
+
+    Raises InputError for an unknown kind, a lattice where there is none, and too many asperities
+    for the memory.
+    """
+    if kind is not None and kind not in KINDS:
+        raise InputError("influence", found=repr(kind), expected=f"one of {', '.join(KINDS)}")
+    points, error = scene.contact_points[which], scene.point_error
+    n = len(which)
+    if kind == "dense" or (kind is None and n <= FEW):
+        return DenseInfluence.assemble(points, scale, error)
+    if kind != "scattered" and scene.lattice is not None:
+        return LatticeInfluence.assemble(points, scene.lattice, scale, error)
+    if kind == "lattice":
+        raise InputError("influence", found="lattice", expected="asperities on a lattice")
+    if kind is None and n <= SCATTERED_FEW:
+        return DenseInfluence.assemble(points, scale, error)
+    return ScatteredInfluence.assemble(points, scale, error)

@@ -1,0 +1,173 @@
+"""The coupling as a stored matrix: exact, for some thousands of asperities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from convexrough import checks
+from convexrough.checks import Array, Indices
+from convexrough.influence.interface import (
+    ENTRY_ROUNDOFFS,
+    Kind,
+    Rounding,
+    Smoother,
+    inverse_distances,
+)
+from convexrough.roundoff import ROUNDOFF
+
+
+def fits_densely(count: int) -> None:
+    """Refuse what the matrix of all pairs, and the copies that a solution needs, cannot hold."""
+    checks.fits_in_memory("asperities that could touch", count, 5 * 8 * count)
+
+
+def dense_matrix(points: Array, scale: float) -> Array:
+    """(n, n) A_ij = scale / r_ij, zero on the diagonal."""
+    fits_densely(len(points))
+    matrix = inverse_distances(points, points)
+    matrix *= scale
+    return matrix
+
+
+def entry_error(point_error: float, nearest: float) -> float:
+    """Relative error of a computed scale / r, for r at least `nearest`.
+
+    Each end may be off by sqrt(2) point_error, the distance by x r: 1/r by up to x / (1 - x).
+    """
+    x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
+    moved = x / (1.0 - x) if x < 1 else np.inf
+    return 1.01 * (ENTRY_ROUNDOFFS * ROUNDOFF + moved)
+
+
+@dataclass(frozen=True, eq=False)
+class DenseInfluence:
+    """The coupling A as a stored matrix.
+
+    points      : (n, 2) [length]
+    scale       : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
+    point_error : [length] bound on the error of each coordinate of the points
+    entry_error : bound on the relative error of each A_ij
+    """
+
+    points: Array
+    scale: float
+    matrix: Array
+    point_error: float
+    entry_error: float
+
+    name: ClassVar[Kind] = "dense"
+    single: ClassVar[bool] = False
+
+    @classmethod
+    def assemble(cls, points: Array, scale: float, point_error: float = 0.0) -> DenseInfluence:
+        matrix = dense_matrix(points, scale)
+        largest = float(matrix.max(initial=0.0))
+        nearest = scale / largest if largest > 0 else np.inf
+        return cls(points, scale, matrix, point_error, entry_error(point_error, nearest))
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def apply(self, loads: Array) -> Array:
+        """A P, summed in blocks of about sqrt(n) so that rounding grows as sqrt(n), not n."""
+        size = self._block
+        total: Array = self.matrix[:, :size] @ loads[:size]
+        for start in range(size, len(self), size):
+            total += self.matrix[:, start : start + size] @ loads[start : start + size]
+        return total
+
+    def rounding(self, loads: Array) -> Rounding:
+        """A sum of m terms in any order is off by at most m roundoffs of the sum of magnitudes.
+
+        (Higham, Accuracy and Stability of Numerical Algorithms, section 4.2.)
+        """
+        terms = self._block + -(-len(self) // self._block) + 1
+        return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0)
+
+    def falloff(self, strengths: Array, power: int) -> Array:
+        raised = self.matrix * self.matrix
+        for _ in range(power - 2):
+            raised *= self.matrix
+        total: Array = raised @ strengths
+        return total * ((1.0 + self._loss(power)) / self.scale**power)
+
+    def among(self, which: Indices) -> DenseInfluence:
+        matrix = self.matrix[np.ix_(which, which)]
+        return DenseInfluence(
+            self.points[which], self.scale, matrix, self.point_error, self.entry_error
+        )
+
+    def onto(self, points: Array) -> DenseCoupling:
+        return DenseCoupling(self.points, points, self.scale, self.point_error)
+
+    def separations(self) -> Array:
+        if len(self) < 2:
+            return np.full(len(self), np.inf)
+        nearest: Array = self.scale / self.matrix.max(axis=1) * (1.0 - ENTRY_ROUNDOFFS * ROUNDOFF)
+        return np.asarray(np.maximum(nearest - 3.0 * self.point_error, 0.0))
+
+    def crowding(self, radii: Array) -> float:
+        if len(radii) < 2:
+            return 0.0
+        return float((np.add.outer(radii, radii) * self.matrix).max()) / self.scale
+
+    def smoother(self, root: Array) -> Smoother | None:
+        return None
+
+    @cached_property
+    def _block(self) -> int:
+        return max(64, int(np.ceil(np.sqrt(len(self)))))
+
+    def _loss(self, power: int) -> float:
+        """Relative error of a sum of powers."""
+        return 1.01 * ((len(self) + 3) * ROUNDOFF + power * self.entry_error)
+
+
+@dataclass(frozen=True, eq=False)
+class DenseCoupling:
+    """Displacements elsewhere, row by row; nothing is stored.
+
+    points  : (n, 2) [length] the asperities
+    targets : (m, 2) [length] where the displacements are asked for
+    """
+
+    points: Array
+    targets: Array
+    scale: float
+    point_error: float
+
+    def apply(self, loads: Array) -> Array:
+        total = np.empty(len(self.targets))
+        for block, inverse in self._rows():
+            total[block] = inverse @ loads
+        return self.scale * total
+
+    def rounding(self, loads: Array) -> Rounding:
+        terms = len(self.points) + 1
+        return Rounding(1.01 * (terms * ROUNDOFF + self._entry_error), 0.0)
+
+    def falloff(self, strengths: Array, power: int) -> Array:
+        total = np.empty(len(self.targets))
+        for block, inverse in self._rows():
+            total[block] = inverse**power @ strengths
+        loss = (len(self.points) + 3) * ROUNDOFF + power * self._entry_error
+        return total * (1.0 + 1.01 * loss)
+
+    def _rows(self) -> Iterator[tuple[slice, Array]]:
+        """1 / r in blocks of rows."""
+        rows = max(1, 2**22 // max(1, len(self.points)))
+        for start in range(0, len(self.targets), rows):
+            block = slice(start, min(start + rows, len(self.targets)))
+            yield block, inverse_distances(self.targets[block], self.points)
+
+    @cached_property
+    def _entry_error(self) -> float:
+        if self.point_error == 0:
+            return entry_error(0.0, np.inf)
+        closest = max((float(inverse.max(initial=0.0)) for _, inverse in self._rows()), default=0.0)
+        return entry_error(self.point_error, 1.0 / closest if closest > 0 else np.inf)

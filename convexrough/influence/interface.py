@@ -1,0 +1,170 @@
+"""What every way of coupling asperities elastically can do, and how accurate it says it is.
+
+A point force at one asperity moves another, at a distance r, by 1 / (pi E* r) (Boussinesq;
+equation (3) of the source). The coupling has a zero diagonal: an asperity's own displacement is
+Hertz's business.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.checks import Array, Indices
+from convexrough.roundoff import SAFETY
+from convexrough.scene import nearest_distances
+
+#: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points: differences 1,
+#: squares 3, their sum 4, its root 3, then a product with pi and a division.
+ENTRY_ROUNDOFFS = 8
+
+#: The ways to couple.
+Kind = Literal["dense", "lattice", "scattered"]
+
+#: For given W: from r to about (I + W A W)^-1 r, and about the 2-norm of A W r.
+Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
+
+
+class Rounding(NamedTuple):
+    """How far a computed product A P can be from the true one, for loads of either sign.
+
+    Component i is off by at most  relative * (A |P|)_i + r_i,  |r_i| <= each,  ||r||_2 <= norm.
+    """
+
+    relative: float
+    norm: float
+    each: float = np.inf
+
+    def of(self, displacement: Array) -> Array:
+        """A bound for each component; `displacement` is A |P| as computed."""
+        return self.relative * np.maximum(displacement, 0.0) + self.single
+
+    @property
+    def single(self) -> float:
+        """Bound on each |r_i|, and on what it adds to the relative part."""
+        return 1.01 * min(self.each, self.norm)
+
+
+class Coupling(Protocol):
+    """From loads at the asperities to displacements at some points."""
+
+    def apply(self, loads: Array) -> Array:
+        """(m,) A P for loads (n,); in float32 where the loads are, if that is faster."""
+        ...
+
+    def rounding(self, loads: Array) -> Rounding:
+        """How far `apply` of these float64 loads can be off."""
+        ...
+
+    def falloff(self, strengths: Array, power: int) -> Array:
+        """(m,) upper bounds, a few per cent high at most, on sum_j strengths_j / r_ij^power.
+
+        strengths : (n,) not negative;  power : 2 or 3
+        """
+        ...
+
+
+class Influence(Coupling, Protocol):
+    """The coupling A among asperities.
+
+    name   : "dense", "lattice" or "scattered"
+    points : (n, 2) [length];  scale : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
+    single : whether products of float32 loads are cheaper than those of float64 loads
+    """
+
+    @property
+    def name(self) -> Kind: ...
+    @property
+    def points(self) -> Array: ...
+    @property
+    def scale(self) -> float: ...
+    @property
+    def single(self) -> bool: ...
+
+    @property
+    def matrix(self) -> Array:
+        """(n, n) A itself; computed when asked for, if it fits in memory."""
+        ...
+
+    @property
+    def entry_error(self) -> float:
+        """Bound on the relative error of each entry of `matrix`."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def among(self, which: Indices) -> Influence:
+        """The coupling among some of the asperities."""
+        ...
+
+    def onto(self, points: Array) -> Coupling:
+        """The displacements that these asperities cause elsewhere; 0 from a point to itself."""
+        ...
+
+    def separations(self) -> Array:
+        """(n,) [length] lower bounds on the distance of each asperity to its nearest neighbour."""
+        ...
+
+    def crowding(self, radii: Array) -> float:
+        """The largest (a_i + a_j) / r_ij over all pairs, for contact radii a (n,), 0 where open."""
+        ...
+
+    def smoother(self, root: Array) -> Smoother | None:
+        """An approximate inverse of I + W A W, W = diag(root), symmetric and positive definite.
+
+        It also says how large A W r is, about: what an error r of a linear system in Newton's
+        method leaves of the normal map. None where there is nothing better than the identity.
+        """
+        ...
+
+
+def spread(coupling: Coupling, scale: float, variances: Array) -> Array:
+    """(m,) bounds on sqrt(sum_j A_ij^2 v_j): how far an error of the loads moves each point."""
+    return scale * np.sqrt(coupling.falloff(variances, 2))
+
+
+def inverse_distances(points: Array, others: Array) -> Array:
+    """(n, m) [1/length]  1 / r_ij, and 0 where the two points are one."""
+    squares = np.subtract.outer(points[:, 0], others[:, 0]) ** 2
+    squares += np.subtract.outer(points[:, 1], others[:, 1]) ** 2
+    with np.errstate(divide="ignore"):
+        inverse: Array = 1.0 / np.sqrt(squares)
+    inverse[squares == 0] = 0.0
+    return inverse
+
+
+def shells(influence: Influence) -> Array:
+    """(n,) 1 / (pi E* s_i) of radii s_i with s_i + s_j <= r_ij: half the nearest distances.
+
+    With them A + diag(shells) is positive semidefinite (docs/theory/convexity.md). A single
+    asperity has no neighbour; infinite where rounding leaves no shell.
+    """
+    with np.errstate(divide="ignore"):
+        values: Array = 2.0 * influence.scale / influence.separations()
+    return values
+
+
+def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
+    """`shells` that fit contact radii a (n,) [length] where neighbours differ in size.
+
+    s_i = share a_i / c + (1 - share) d_i / 2  with c the crowding, the largest (a_i + a_j) / r_ij,
+    and d_i the distance to the nearest neighbour: each part keeps s_i + s_j <= r_ij, so their
+    mean does. Then every a_i / s_i is at most c / share.
+    """
+    crowding = influence.crowding(radii) * (1.0 + SAFETY + 2.0 * influence.entry_error)
+    s = (1.0 - share) * influence.separations() / 2.0
+    if 0 < crowding < np.inf:
+        s = s + share * (radii / crowding)
+    with np.errstate(divide="ignore"):
+        values: Array = influence.scale / s
+    return values
+
+
+def separations(points: Array, point_error: float = 0.0) -> Array:
+    """(n,) [length] distances to the nearest neighbour, less what errors of the points can hide."""
+    if len(points) < 2:
+        return np.full(len(points), np.inf)
+    return np.maximum(nearest_distances(points) - 3.0 * point_error, 0.0)

@@ -1,0 +1,349 @@
+"""The coupling among points of a lattice: a convolution, by fast Fourier transforms.
+
+Free space: the smallest box of sites that holds the asperities is padded with zeros to twice its
+size, so that no asperity feels a periodic image of another. Heights and radii of the asperities
+play no part in it. The rounding of the transforms is bounded (docs/theory/operators.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.checks import Array, Indices
+from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
+from convexrough.influence.interface import Coupling, Kind, Rounding, Smoother
+from convexrough.influence.smoother import block_smoother
+from convexrough.lattice import Lattice, Sites
+from convexrough.roundoff import ROUNDOFF
+
+#: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
+ENTRY_ROUNDOFFS = 24
+
+#: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.2 for the
+#: twiddle factors and the products with them, and sqrt(p) ((p - 1) / 2 + 4) for the sums of p terms
+#: (1 for p = 2). Radices 4 and 8 cost less than two and three passes of radix 2.
+PASS_ROUNDOFFS = {2: 6, 3: 13, 5: 18, 7: 23, 11: 35}
+
+#: Transforms of more numbers than this use every core.
+PARALLEL = 2**18
+
+#: Columns transformed at a time: what a cache holds.
+COLUMNS = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A box of sites, and convolutions on it.
+
+    shape : (rows, columns) of sites;  basis : (2, 2) [length]
+    """
+
+    shape: tuple[int, int]
+    basis: Array
+
+    @cached_property
+    def padded(self) -> tuple[int, int]:
+        """The size of the transforms."""
+        from scipy.fft import next_fast_len  # 0.1 s to import: only where there is a lattice
+
+        rows, columns = self.shape
+        return next_fast_len(2 * rows - 1), next_fast_len(2 * columns - 1, real=True)
+
+    @property
+    def workers(self) -> int:
+        """Threads: all cores (-1) where that pays."""
+        return -1 if self.padded[0] * self.padded[1] > PARALLEL else 1
+
+    @cached_property
+    def loss(self) -> float:
+        """Roundoffs of one two-dimensional transform, relative in the 2-norm."""
+        return float(sum(_pass_roundoffs(length) for length in self.padded))
+
+    def kernel(self, power: int, dtype: Any) -> Kernel:
+        """1 / |i b1 + j b2|^power for every difference of two sites of the box, 0 for none."""
+        from scipy import fft
+
+        rows, columns = self.padded
+        i, j = _differences(rows), _differences(columns)
+        j_used = np.abs(j) < self.shape[1]
+        half = np.zeros((rows, columns // 2 + 1), dtype=np.result_type(dtype, np.complex64))
+        total = square = 0.0
+        block = max(1, 2**20 // columns)
+        for start in range(0, self.shape[0], block):
+            taken = slice(start, min(start + block, self.shape[0]))
+            x = np.add.outer(i[taken] * self.basis[0, 0], j * self.basis[1, 0])
+            y = np.add.outer(i[taken] * self.basis[0, 1], j * self.basis[1, 1])
+            x *= x
+            y *= y
+            x += y
+            np.sqrt(x, out=x)
+            if start == 0:
+                x[0, 0] = np.inf
+            values = j_used / x
+            if power > 1:
+                values **= power
+            weights = np.where(i[taken] > 0, 2.0, 1.0)  # i and -i
+            total += float(weights @ values.sum(axis=1))
+            square += float(weights @ (values * values).sum(axis=1))
+            half[taken] = fft.rfft(values.astype(dtype), axis=1, workers=self.workers)
+        # The kernel is even: row -i is row i read backwards.
+        last = self.shape[0] - 1
+        if last:
+            half[-last:] = np.conj(half[last:0:-1])
+        spectrum = np.empty(half.shape, dtype=dtype)
+        for each in _blocks(half.shape[1]):
+            spectrum[:, each] = fft.fft(half[:, each], axis=0, workers=self.workers).real
+        return Kernel(spectrum, total, float(np.sqrt(square)))
+
+    def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
+        """The convolution of a field (rows, columns) with a kernel, on the box."""
+        from scipy import fft
+
+        rows, columns = self.padded
+        half = fft.rfft(field, columns, axis=1, workers=self.workers)
+        for each in _blocks(half.shape[1]):
+            full = fft.fft(half[:, each], rows, axis=0, workers=self.workers)
+            full *= spectrum[:, each]
+            full = fft.ifft(full, axis=0, overwrite_x=True, workers=self.workers)
+            half[:, each] = full[: self.shape[0]]
+        result: NDArray[Any] = fft.irfft(half, columns, axis=1, workers=self.workers)
+        return result[:, : self.shape[1]]
+
+    def bound(self, kernel: Kernel, roundoff: float) -> float:
+        """Bound on the 2-norm of the error of `convolve`, relative to that of the field."""
+        size = float(np.sqrt(float(self.padded[0]) * self.padded[1]))
+        spectral = self.loss * size * kernel.norm
+        return 1.01 * roundoff * ((2 * self.loss + 4) * kernel.total + spectral)
+
+    def bound_each(self, kernel: Kernel, roundoff: float) -> float:
+        """Bound on each component of that error, relative to the 2-norm of the field.
+
+        What the two forward transforms lose reaches a component through the other's 2-norm, and
+        the inverse transform loses at most so much of the mean modulus of what it adds up, which
+        is at most the product of both.
+        """
+        inverse = float(np.sqrt(2.0)) * self.loss
+        return 1.01 * roundoff * (2 * self.loss + inverse + 4) * kernel.norm
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """spectrum : of its transform, real as the kernel is even; total, norm : its sum and 2-norm."""
+
+    spectrum: NDArray[Any]
+    total: float
+    norm: float
+
+
+@dataclass(frozen=True, eq=False)
+class LatticeCoupling:
+    """From loads on some sites of a box to displacements on others.
+
+    sources : (n,) places in the box, row by row;  targets : (m,)
+    blur    : [length] bound on how far the difference of two points is from that of their sites
+    """
+
+    box: Box
+    sources: Indices
+    targets: Indices
+    scale: float
+    blur: float
+
+    def apply(self, loads: Array) -> Array:
+        dtype = np.float32 if loads.dtype == np.float32 else np.float64
+        product = self._convolve(loads.astype(dtype, copy=False), self._spectrum(dtype))
+        product *= dtype(self.scale)
+        return product
+
+    def rounding(self, loads: Array) -> Rounding:
+        # Points off their sites change 1/r by blur / r^2 at most; the sum of that over a row
+        # bounds the effect on the 2-norm and on the largest.
+        kernel, off = self._kernel, self._moved * self._kernel.norm**2
+        size, largest = float(np.linalg.norm(loads)), float(np.abs(loads).max(initial=0.0))
+        norm = self.box.bound(kernel, ROUNDOFF) * size + off * size
+        each = self.box.bound_each(kernel, ROUNDOFF) * size + off * largest
+        relative = 1.01 * ENTRY_ROUNDOFFS * ROUNDOFF
+        return Rounding(relative, self.scale * norm, self.scale * each)
+
+    def falloff(self, strengths: Array, power: int) -> Array:
+        """In single precision, with a bound on its rounding added."""
+        kernel = self.box.kernel(power, np.float32)
+        largest = float(strengths.max(initial=0.0)) or 1.0
+        shares = (strengths / largest).astype(np.float32)
+        total = self._convolve(shares, kernel.spectrum).astype(np.float64)
+        total += self.box.bound_each(kernel, 2.0**-24) * float(np.linalg.norm(shares))
+        stretched = 1.0 / (1.0 - min(self.blur / self._nearest, 0.5)) ** power
+        return np.maximum(total, 0.0) * (largest * stretched * (1.0 + 1e-6))
+
+    @cached_property
+    def _nearest(self) -> float:
+        return float(np.hypot(*self.box.basis[0]))
+
+    @property
+    def _moved(self) -> float:
+        return self.blur / (1.0 - min(self.blur / self._nearest, 0.5))
+
+    @cached_property
+    def _kernel(self) -> Kernel:
+        return self.box.kernel(1, np.float64)
+
+    @cached_property
+    def _single(self) -> NDArray[Any]:
+        return self._kernel.spectrum.astype(np.float32)
+
+    def _spectrum(self, dtype: Any) -> NDArray[Any]:
+        return self._single if dtype == np.float32 else self._kernel.spectrum
+
+    def _convolve(self, values: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
+        field = np.zeros(self.box.shape[0] * self.box.shape[1], dtype=values.dtype)
+        field[self.sources] = values
+        return self.box.convolve(field.reshape(self.box.shape), spectrum).ravel()[self.targets]
+
+
+@dataclass(frozen=True, eq=False)
+class LatticeInfluence(LatticeCoupling):
+    """The coupling among asperities on a lattice.
+
+    points : (n, 2) [length];  places : (n, 2) i and j of each
+    """
+
+    points: Array
+    lattice: Lattice
+    places: Sites
+    point_error: float
+
+    name: ClassVar[Kind] = "lattice"
+    single: ClassVar[bool] = True
+
+    @classmethod
+    def assemble(
+        cls, points: Array, lattice: Lattice, scale: float, point_error: float = 0.0
+    ) -> LatticeInfluence:
+        """Raises ValueError where the points are not on the lattice."""
+        places = lattice.sites(points)
+        if places is None:
+            raise ValueError("points off the lattice")
+        return cls._of(points, lattice, places, scale, point_error)
+
+    @classmethod
+    def _of(
+        cls, points: Array, lattice: Lattice, places: Sites, scale: float, point_error: float
+    ) -> LatticeInfluence:
+        box, index = _boxed(lattice, places)
+        blur = _blur(lattice, point_error)
+        return cls(box, index, index, scale, blur, points, lattice, places, point_error)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def matrix(self) -> Array:
+        return dense_matrix(self.points, self.scale)
+
+    @property
+    def entry_error(self) -> float:
+        return entry_error(self.point_error, self.lattice.spacing - self.blur)
+
+    def among(self, which: Indices) -> LatticeInfluence:
+        return self._of(
+            self.points[which], self.lattice, self.places[which], self.scale, self.point_error
+        )
+
+    def onto(self, points: Array) -> Coupling:
+        places = self.lattice.sites(points)
+        if places is None:
+            return DenseCoupling(self.points, points, self.scale, self.point_error)
+        box, index = _boxed(self.lattice, np.concatenate((self.places, places)))
+        n = len(self)
+        return LatticeCoupling(box, index[:n], index[n:], self.scale, self.blur)
+
+    def separations(self) -> Array:
+        nearest = self.lattice.spacing - self.blur if len(self) > 1 else np.inf
+        return np.full(len(self), max(nearest, 0.0))
+
+    def crowding(self, radii: Array) -> float:
+        """Pairs in the order of their distance, until none further apart can be more crowded."""
+        if len(self) < 2:
+            return 0.0
+        field = np.full(self.box.shape, -np.inf)
+        field.ravel()[self.sources] = radii
+        most, worst = 2.0 * float(radii.max()), 0.0
+        for on_sites, i, j in _neighbours(self.box):
+            distance = on_sites - self.blur  # at least that of the points
+            if most <= worst * distance:
+                break
+            here, there = field[i:], field[: len(field) - i]
+            if j >= 0:
+                pairs = here[:, j:] + there[:, : there.shape[1] - j]
+            else:
+                pairs = here[:, :j] + there[:, -j:]
+            worst = max(worst, float(pairs.max(initial=0.0)) / distance)
+        return worst
+
+    def smoother(self, root: Array) -> Smoother:
+        box = self.box
+        return block_smoother(box.shape, box.basis, self.sources, self.scale, root, box.workers)
+
+
+def _boxed(lattice: Lattice, places: Sites) -> tuple[Box, Indices]:
+    """The smallest box, and where in it each place is."""
+    if len(places) == 0:
+        return Box((1, 1), lattice.basis), np.zeros(0, dtype=np.intp)
+    low = places.min(axis=0)
+    rows, columns = (places.max(axis=0) - low + 1).tolist()
+    index = (places[:, 0] - low[0]) * columns + (places[:, 1] - low[1])
+    return Box((rows, columns), lattice.basis), index
+
+
+def _blur(lattice: Lattice, point_error: float) -> float:
+    return 2.0 * float(np.sqrt(2.0)) * (lattice.blur + point_error)
+
+
+def _differences(length: int) -> NDArray[np.int64]:
+    """0, 1, ..., -2, -1: whole numbers modulo the length, nearest to 0."""
+    i = np.arange(length)
+    return np.where(i <= (length - 1) // 2, i, i - length)
+
+
+def _blocks(width: int) -> Iterator[slice]:
+    for start in range(0, width, COLUMNS):
+        yield slice(start, min(start + COLUMNS, width))
+
+
+def _pass_roundoffs(length: int) -> int:
+    total = 0
+    for radix, cost in PASS_ROUNDOFFS.items():
+        while length % radix == 0:
+            length //= radix
+            total += cost
+    assert length == 1  # what next_fast_len gives
+    return total
+
+
+def _neighbours(box: Box) -> Iterator[tuple[float, int, int]]:
+    """Differences of two sites, one of each pair +-, by increasing distance."""
+    rows, columns = box.shape
+    reach = 1
+    done = 0.0
+    while True:
+        i = np.arange(0, min(reach, rows - 1) + 1)
+        j = np.arange(-min(reach, columns - 1), min(reach, columns - 1) + 1)
+        i, j = (each.ravel() for each in np.meshgrid(i, j, indexing="ij"))
+        half = (i > 0) | (j > 0)
+        i, j = i[half], j[half]
+        distances = np.hypot(*(box.basis.T @ np.stack((i, j))))
+        # On a reduced basis every difference beyond the square is longer than this.
+        whole = reach >= max(rows, columns) - 1
+        sure = np.inf if whole else 0.8 * (reach + 1) * float(np.hypot(*box.basis[0]))
+        order = np.argsort(distances)
+        for k in order[(distances[order] > done) & (distances[order] <= sure)]:
+            yield float(distances[k]), int(i[k]), int(j[k])
+        if whole:
+            return
+        done, reach = sure, 2 * reach

@@ -1,0 +1,212 @@
+"""1 / r^q made smooth within a reach: what a mesh can interpolate, and how well it does.
+
+Beyond the reach a it is 1 / r^q itself. Within, the series of 1 / r^q in t = 1 - (r/a)^2 is cut
+after t^p: a polynomial in r^2 with p continuous derivatives across the reach. (For q = 1 it is the
+potential of a charge spread over a ball of radius a as (1 - (r/a)^2)^(p-1), so that Newton's
+theorem holds.) All terms of the series are positive, so nothing cancels. Derived in
+docs/theory/operators.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+
+from convexrough.checks import Array
+
+#: Near pairs whose part would be less than so much of the error of interpolation are left out.
+CUT = 0.1
+
+
+@dataclass(frozen=True)
+class Softened:
+    """power : q;  order : p, an even number;  reach : a [length], infinite for no smooth part."""
+
+    power: int
+    order: int
+    reach: float
+
+    def smooth(self, squares: Array) -> Array:
+        """L, for squared distances; exactly the power from the reach on."""
+        ratio = squares / self.reach**2
+        within = ratio < 1.0
+        values: Array = 1.0 / np.sqrt(np.maximum(ratio, 1.0))
+        if self.power > 1:
+            values **= self.power
+        values[within] = self._series(1.0 - ratio[within])
+        values /= self.reach**self.power
+        return values
+
+    def local(self, squares: Array) -> Array:
+        """1 / r^q - L within the reach; -L(0) between two points that are one."""
+        with np.errstate(divide="ignore"):
+            values: Array = 1.0 / np.sqrt(squares)
+        values[squares == 0.0] = 0.0
+        if self.power > 1:
+            values **= self.power
+        if np.isfinite(self.reach):
+            ratio = squares / -(self.reach**2)
+            ratio += 1.0
+            values -= self._series(ratio) / self.reach**self.power
+        return values
+
+    @cached_property
+    def centre(self) -> float:
+        """L(0)."""
+        if not np.isfinite(self.reach):
+            return 0.0
+        return float(_series(self.order, self.power).sum()) / self.reach**self.power
+
+    @property
+    def roundoffs(self) -> float:
+        """Roundoffs of one computed L, relative.
+
+        4 p + 4 for Horner's rule and its coefficients; t is off by 7 roundoffs at most, and L by as
+        many times its slope; a few for the power of the reach.
+        """
+        return 4.0 * self.order + 8.0 + 7.0 * self._slope
+
+    @property
+    def beyond_roundoffs(self) -> float:
+        """Roundoffs of one computed 1 / r^q, relative."""
+        return 8.0 * self.power + 2.0
+
+    def moved(self, shift: float) -> float:
+        """How far L is off, relative to 1 / r^q, where a distance is off by `shift` [length].
+
+        Its slope is at most q / r^(q + 1), that of 1 / r^q, of which it has some of the terms, and
+        at most 2 D r / a^(q + 2), D = sum k c_k. Times r^q, the lesser is largest where they meet.
+        """
+        if not np.isfinite(self.reach):
+            return 0.0
+        q = self.power
+        return shift * q * float((2.0 * self._slope / q) ** (1.0 / (q + 2))) / self.reach
+
+    def pair_error(self, spacing: float) -> float:
+        """Bound on the error between any two points: of interpolating L, and of what is cut."""
+        return (1.0 + CUT) * self._interpolation_error(spacing)
+
+    def cut(self, spacing: float) -> float:
+        """[length] where 1 / r^q - L has fallen to a small part of the error of interpolating L.
+
+        With t <= 1/2 and coefficients that grow by less than a tenth from one to the next, the rest
+        of the series is at most 2.3 times its first term.
+        """
+        if not np.isfinite(self.reach):
+            return np.inf
+        first = 2.3 * float(_series(self.order + 1, self.power)[-1])
+        error = CUT * self._interpolation_error(spacing) * self.reach**self.power
+        t = min(0.5, (error / first) ** (1.0 / (self.order + 1)))
+        return self.reach * math.sqrt(1.0 - t)
+
+    def _interpolation_error(self, spacing: float) -> float:
+        if not np.isfinite(self.reach):
+            return 0.0
+        worst = _steepest(self.order, self.power)
+        ratio = (spacing / self.reach) ** self.order
+        return _interpolated(self.order) * worst * ratio / self.reach**self.power
+
+    def far_error(self, spacing: float) -> float:
+        """The same, relative to 1 / r^q, for points further apart than the reach and their sway."""
+        if not np.isfinite(self.reach):
+            return 0.0
+        worst = float(math.comb(self.order + self.power - 1, self.order))
+        nearer = (self.reach + self.sway(spacing)) / self.reach
+        ratio = (spacing / self.reach) ** self.order
+        return float(_interpolated(self.order) * worst * ratio * nearer**self.power)
+
+    def sway(self, spacing: float) -> float:
+        """[length] by how much stencils can change a distance: half of them at each end."""
+        return math.sqrt(2.0) * self.order * spacing if np.isfinite(self.reach) else 0.0
+
+    @property
+    def _slope(self) -> float:
+        terms = _series(self.order, self.power)
+        return float(np.arange(len(terms)) @ terms)
+
+    def _series(self, t: Array) -> Array:
+        terms = _series(self.order, self.power)
+        values = np.full_like(t, terms[-1])
+        for term in terms[-2::-1]:
+            values *= t
+            values += term
+        return values
+
+
+def lebesgue(order: int) -> float:
+    """The largest sum of the sizes of Lagrange's polynomials in the middle of even nodes.
+
+    In the middle interval the sum is a polynomial with signs that alternate from node to node
+    elsewhere: even, and with all its roots outside. So it is largest in the middle.
+    """
+    return float(np.abs(lagrange(np.array([0.5]), order)).sum())
+
+
+def lagrange(places: Array, order: int) -> Array:
+    """(n, p) Lagrange's polynomials of the nodes 1 - p/2, ..., p/2 at places from 0 to 1.
+
+    In long double, where that is longer than double, to leave little more than its own rounding.
+    """
+    nodes = np.arange(order) - (order // 2 - 1)
+    away = places[:, None].astype(np.longdouble) - nodes
+    left, right = np.ones_like(away), np.ones_like(away)
+    np.cumprod(away[:, :-1], axis=1, out=left[:, 1:])
+    np.cumprod(away[:, :0:-1], axis=1, out=right[:, -2::-1])
+    left *= right
+    for k in range(order):
+        size = math.factorial(k) * math.factorial(order - 1 - k)
+        left[:, k] /= np.longdouble((-1) ** (order - 1 - k) * size)
+    return left.astype(np.float64)
+
+
+def weight_roundoffs(order: int) -> float:
+    """Bound on the relative error of each of them, in roundoffs of float64.
+
+    p - 1 differences, p - 2 products, a quotient and its constant; and the rounding to float64.
+    """
+    return 1.0 + 2.0 * order * float(np.finfo(np.longdouble).eps) / 2.0**-52
+
+
+@cache
+def _series(order: int, power: int) -> Array:
+    """c_k of (1 - t)^(-q/2) = sum c_k t^k, up to k = p."""
+    k = np.arange(1, order + 1)
+    return np.concatenate(([1.0], np.cumprod((k - 1 + power / 2) / k)))
+
+
+@cache
+def _interpolated(order: int) -> float:
+    """c with |error| <= c h^p max |d^p L| / p!: interpolation in four variables, one by one.
+
+    Lagrange's remainder, and its growth by the interpolations that follow.
+    """
+    growth = lebesgue(order)
+    remainder = math.prod(range(1, order, 2)) ** 2 / 2.0**order
+    return 1.01 * remainder * (1.0 + growth + growth**2 + growth**3)
+
+
+@cache
+def _steepest(order: int, power: int) -> float:
+    """Bound on |d^p L / dx^p| / p! anywhere in the plane, for a reach of 1.
+
+    Beyond the reach binom(p + q - 1, p), the largest value of Gegenbauer's polynomial. Within, the
+    derivative is a polynomial in r times one in the cosine of the direction; it exceeds its largest
+    value on a grid by 1 / cos(pi d / 2N) at most, for degree d and N nodes (Ehlich and Zeller).
+    """
+    terms = _series(order, power)
+    # Of degree p in r, 2 p less p derivatives, and p in the angle; N = 6 p nodes in each.
+    radii = np.cos((np.arange(3 * order) + 0.5) * np.pi / (6 * order))
+    cosines = np.cos(np.arange(3 * order + 1) * np.pi / (6 * order))
+    total = np.zeros((len(radii), len(cosines)))
+    # d^p f(s) / p! = sum_j (2 x)^(p - 2 j) f^(p - j)(s) / (j! (p - 2 j)!),  s = x^2 + y^2
+    for j in range(order // 2 + 1):
+        q = order - j
+        rising = [terms[k] * math.perm(k, q) for k in range(q, order + 1)]
+        slope = (-1.0) ** q * np.polynomial.polynomial.polyval(1.0 - radii**2, rising)
+        weight = 2.0 ** (order - 2 * j) / (math.factorial(j) * math.factorial(order - 2 * j))
+        total += weight * np.outer(slope * radii ** (order - 2 * j), cosines ** (order - 2 * j))
+    within = float(np.abs(total).max()) / math.cos(math.pi / 12) ** 2
+    return 1.01 * max(within, float(math.comb(order + power - 1, order)))

@@ -1,0 +1,112 @@
+"""Points on a lattice: found from the points alone, whatever made them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.checks import Array
+
+Sites = NDArray[np.int64]
+
+#: Points may be off a lattice by this many roundoffs of the largest coordinate: a few more than
+#: computing them in float64 loses.
+BLUR = 32 * 2.0**-53
+
+#: ... and of the shortest distance between sites by this part, so that sites are told apart.
+CLOSEST = 1e-3
+
+#: A lattice is of use where its sites are at most so many times the points.
+SPARSEST = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """The points origin + i b1 + j b2, i and j whole numbers.
+
+    basis   : (2, 2) [length] rows b1 and b2, reduced: b1 is a shortest vector of the lattice
+    blur    : [length] bound on how far each coordinate of the points it was found from is off
+    """
+
+    origin: Array
+    basis: Array
+    blur: float
+
+    @property
+    def spacing(self) -> float:
+        """[length] the shortest distance between two sites."""
+        return float(np.hypot(*self.basis[0]))
+
+    @classmethod
+    def through(cls, points: Array) -> Lattice | None:
+        """The lattice that these points (n, 2) lie on to rounding, each on a site of its own."""
+        anchor = points[np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1))]
+        basis = _shortest(points - anchor)
+        if basis is None:
+            return None
+        sites = _nearest_sites(points - anchor, basis)
+        # Fit origin and basis to all points; around the middle, where they do not disturb another.
+        middle = np.rint(sites.mean(axis=0))
+        away = np.column_stack((np.ones(len(points)), sites - middle))
+        fitted = np.zeros((3, 2))
+        try:
+            for _ in range(2):  # the second time for what rounding left
+                missing = points - anchor - away @ fitted
+                fitted += np.linalg.solve(away.T @ away, away.T @ missing)
+        except np.linalg.LinAlgError:
+            return None
+        reach = float(np.abs(points).max())
+        off = float(np.abs(points - anchor - away @ fitted).max()) + 8 * 2.0**-53 * reach
+        spacing = float(np.hypot(*fitted[1]))
+        if not (off <= BLUR * reach and off <= CLOSEST * spacing) or _crowded(sites):
+            return None
+        origin = anchor + fitted[0] - middle @ fitted[1:]
+        return cls(origin, fitted[1:], off + 4 * 2.0**-53 * reach)
+
+    def sites(self, points: Array) -> Sites | None:
+        """(n, 2) i and j of points on the lattice; None if one is not."""
+        sites = _nearest_sites(points - self.origin, self.basis)
+        off = np.abs(points - self.origin - sites @ self.basis).max(initial=0.0)
+        reach = np.abs(points).max(initial=0.0)
+        return sites if off <= self.blur + 4 * 2.0**-53 * reach else None
+
+
+def _nearest_sites(points: Array, basis: Array) -> Sites:
+    return np.rint(points @ np.linalg.inv(basis)).astype(np.int64)
+
+
+def _shortest(points: Array) -> Array | None:
+    """Two short vectors (2, 2) among the points, reduced (Lagrange and Gauss); None if on a line.
+
+    Where the points are on a lattice and two neighbours of the origin are not missing, its basis.
+    """
+    squares = (points**2).sum(axis=1)
+    near = np.argsort(squares) if len(points) < 64 else np.argpartition(squares, 63)[:64]
+    near = near[np.argsort(squares[near])]
+    near = near[squares[near] > 0]
+    if len(near) < 2:
+        return None
+    a = points[near[0]]
+    across = np.abs(points[near] @ np.array([-a[1], a[0]]))
+    beside = np.flatnonzero(across > 1e-3 * np.sqrt(squares[near] * squares[near[0]]))
+    if len(beside) == 0:
+        return None
+    b = points[near[beside[0]]]
+    while True:
+        b = b - np.rint((a @ b) / (a @ a)) * a
+        if b @ b >= (a @ a) * (1 - 1e-9):
+            return np.array([a, b])
+        a, b = b, a
+
+
+def _crowded(sites: Sites) -> bool:
+    """Two points on one site, or far too many sites for the points."""
+    low = sites.min(axis=0)
+    rows, columns = (sites.max(axis=0) - low + 1).tolist()
+    if rows * columns > SPARSEST * len(sites) + 1000:
+        return True
+    taken = np.zeros(rows * columns, dtype=bool)
+    taken[(sites[:, 0] - low[0]) * columns + sites[:, 1] - low[1]] = True
+    return int(taken.sum()) < len(sites)

@@ -1,0 +1,175 @@
+"""The linear system of a Newton step on a normal map, solved directly or by conjugate gradients.
+
+The normal maps of pressing and of shear have the Jacobian I + A diag(c), c >= 0. With
+W = diag(c)^(1/2) a step from the defect F is
+
+    d = beta - F - A W y,     (I + W A W) y = W (beta - F),
+
+where beta is 0, or such that the loads keep their sum: sum W y = 0. The matrix is the Hessian of
+the energy, scaled by its local part: positive definite in the convex range, and 1 where c is 0, so
+asperities without load cost nothing and no load has to be kept away from zero. A W y is at hand
+when conjugate gradients end, and with it what happens to every asperity, touching or not.
+
+Where the matrix is not positive definite the shells are added, which makes it so for any layout.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.checks import Array, Indices
+from convexrough.errors import SolverError
+from convexrough.influence import DenseInfluence, Influence, Smoother
+
+#: Up to so many touching asperities, with a matrix at hand, a Cholesky factor is cheapest.
+FACTORISED = 1500
+
+#: What conjugate gradients in single precision can still reduce the residual to.
+SINGLE_LIMIT = 2e-6
+
+MOST_ITERATIONS = 500
+
+Values = NDArray[Any]  # of single or double precision
+
+
+class Correction(NamedTuple):
+    """change : (n,) d;  shift : beta;  products : with A, that it took"""
+
+    change: Array
+    shift: float
+    products: int
+
+
+def correct(
+    influence: Influence,
+    shells: Array,
+    root: Array,
+    defect: Array,
+    *,
+    balanced: bool,
+    tolerance: float,
+) -> Correction:
+    """One Newton step.
+
+    root      : (n,) W, 0 where open;  defect : (n,) F
+    balanced  : keep the sum of the loads
+    tolerance : what conjugate gradients may leave of the residual; a factorisation leaves nothing
+
+    Raises SolverError where even the shells leave the matrix indefinite, that is by rounding.
+    """
+    touching = np.flatnonzero(root)
+    if len(touching) == 0:
+        return Correction(-defect, 0.0, 0)
+    direct = isinstance(influence, DenseInfluence) and len(touching) <= FACTORISED
+    for extra in (None, shells):
+        try:
+            if direct:
+                return _factorise(influence, extra, touching, root, defect, balanced)
+            return _iterate(influence, extra, root, defect, balanced, tolerance)
+        except _IndefiniteError:
+            continue
+    raise SolverError("newton: the shell-shifted matrix is not positive definite")
+
+
+class _IndefiniteError(Exception):
+    pass
+
+
+def _factorise(
+    influence: Influence,
+    shells: Array | None,
+    touching: Indices,
+    root: Array,
+    defect: Array,
+    balanced: bool,
+) -> Correction:
+    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
+
+    w = root[touching]
+    matrix = influence.matrix[touching[:, None], touching]
+    matrix *= w
+    matrix *= w[:, None]
+    matrix.ravel()[:: len(w) + 1] = 1.0 if shells is None else 1.0 + w * shells[touching] * w
+    # The transpose of a symmetric matrix is itself, and in LAPACK's order: no copy.
+    factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    if info != 0:
+        raise _IndefiniteError
+    right = np.empty((2, len(w)))
+    np.multiply(w, defect[touching], out=right[0])
+    right[1] = w
+    y, border = dpotrs(factor, right.T, lower=1, overwrite_b=1)[0].T
+    shift = 0.0
+    if balanced:
+        shift = float(w @ y) / float(w @ border)
+        y = y - shift * border
+    spread = np.zeros(len(root))
+    spread[touching] = w * y
+    return Correction(shift - defect + influence.apply(spread), shift, 1)
+
+
+def _iterate(
+    influence: Influence,
+    shells: Array | None,
+    root: Array,
+    defect: Array,
+    balanced: bool,
+    tolerance: float,
+) -> Correction:
+    """Preconditioned conjugate gradients; on the plane sum W y = 0 where balanced.
+
+    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376.) The residual is kept on the
+    plane, too, so that single precision does not lose it beside the shift.
+    """
+    single = influence.single
+    dtype: Any = np.float32 if single else np.float64
+    tolerance = max(tolerance, SINGLE_LIMIT if single else 1e-13)
+    size = float(np.abs(defect).max()) or 1.0
+    w: Values = root.astype(dtype)
+    diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
+    smooth = influence.smoother(root) or _unsmoothed(influence, w)
+    residual: Values = -w * (defect / size).astype(dtype)
+    shift = 0.0
+    if balanced:
+        border, _ = smooth(w)
+        weight = float(w @ border)
+
+    def smoothed() -> tuple[Values, float]:
+        """M r and the 2-norm of A W r, after r has been put back on the plane."""
+        nonlocal residual, shift
+        z, left = smooth(residual)
+        if balanced:
+            off = -float(w @ z) / weight
+            shift += off
+            residual += dtype(off) * w
+            z += dtype(off) * border
+        return z, left
+
+    y_displacement = np.zeros_like(w)  # A W y
+    z, left = smoothed()
+    p = z.copy()
+    size_of = float(residual @ z)
+    enough = tolerance * float(np.linalg.norm(defect)) / size
+    products = 0
+    while left > enough and products < MOST_ITERATIONS:
+        q = influence.apply(w * p)
+        products += 1
+        bent = diagonal * p + w * q
+        curvature = float(p @ bent)
+        if curvature <= 0:
+            raise _IndefiniteError
+        length = dtype(size_of / curvature)
+        y_displacement += length * q
+        residual -= length * bent
+        z, left = smoothed()
+        before, size_of = size_of, float(residual @ z)
+        p *= dtype(size_of / before)
+        p += z
+    change = size * (shift - y_displacement.astype(np.float64)) - defect
+    return Correction(change, size * shift, products)
+
+
+def _unsmoothed(influence: Influence, w: Values) -> Smoother:
+    return lambda values: (values.copy(), float(np.linalg.norm(influence.apply(w * values))))

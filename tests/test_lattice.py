@@ -1,0 +1,482 @@
+"""Lattices found from points, and the coupling on them against exact sums over all pairs."""
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+from scenes import paper, rough, steel
+
+import convexrough as cr
+from convexrough.influence import (
+    DenseInfluence,
+    LatticeInfluence,
+    fitted_shells,
+    inverse_distances,
+    shells,
+)
+from convexrough.influence.lattice import Box, _neighbours, _pass_roundoffs
+from convexrough.lattice import BLUR, Lattice
+from convexrough.newton_system import correct
+from convexrough.roundoff import ROUNDOFF
+
+Array = NDArray[np.float64]
+
+SCALE = 0.37
+BASES = {
+    "hexagonal": [[1.0, 0.0], [0.5, np.sqrt(0.75)]],
+    "square": [[1.0, 0.0], [0.0, 1.0]],
+    "rectangular": [[1.0, 0.0], [0.0, 2.6]],
+    "sheared": [[1.0, 0.0], [7.3, 1.4]],
+}
+
+
+def turned(basis: Any, angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array(basis) @ np.array([[c, s], [-s, c]])
+
+
+def patch(basis: Array, count: int) -> Array:
+    """The sites nearest to the origin, of a lattice given by any basis."""
+    steps = np.arange(-120, 121) if count > 300 else np.arange(-40, 41)
+    points = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) @ basis
+    order = np.argsort((points**2).sum(axis=1), kind="stable")
+    return points[order[:count]]
+
+
+def operator(points: Array, scale: float = SCALE) -> LatticeInfluence:
+    lattice = Lattice.through(points)
+    assert lattice is not None
+    return LatticeInfluence.assemble(points, lattice, scale)
+
+
+def long_product(points: Array, targets: Array, loads: Array) -> Any:
+    """sum_j P_j / r_ij in extended precision, 0 from a point to itself."""
+    x, total = points.astype(np.longdouble), [np.zeros((0, *loads.shape[1:]), np.longdouble)]
+    for start in range(0, len(targets), 256):
+        block = targets[start : start + 256].astype(np.longdouble)
+        square = (block[:, None, 0] - x[:, 0]) ** 2 + (block[:, None, 1] - x[:, 1]) ** 2
+        square[square == 0] = np.inf
+        total.append((1 / np.sqrt(square)) @ loads.astype(np.longdouble))
+    return SCALE * np.concatenate(total)
+
+
+def assert_spans(lattice: Lattice, basis: Array) -> None:
+    """Two bases of one lattice differ by a whole matrix of determinant +-1."""
+    change = basis @ np.linalg.inv(lattice.basis)
+    assert_allclose(change, np.rint(change), atol=1e-9)
+    assert abs(np.linalg.det(change)) == pytest.approx(1.0)
+
+
+# Finding a lattice.
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.sampled_from(sorted(BASES)),
+    st.integers(3, 200),
+    st.floats(0, 6.3),
+    st.floats(-3, 3),
+    st.floats(-9, 9),
+)
+def test_a_lattice_is_found(name: str, count: int, angle: float, shift: float, size: float) -> None:
+    """Turned, shifted by up to 1000 spacings, of any size; in a reduced basis."""
+    basis = 10**size * turned(BASES[name], angle)
+    points = patch(basis, max(count, 30 if name == "rectangular" else 9))
+    points = points + 10**size * np.array([10**shift, -(10**shift)])
+    lattice = Lattice.through(points)
+    assert lattice is not None
+    assert_spans(lattice, basis)
+    a, b = lattice.basis
+    assert lattice.spacing == pytest.approx(np.hypot(*a))
+    assert a @ a <= (b @ b) * (1 + 1e-8)
+    assert abs(a @ b) <= 0.5 * (a @ a) * (1 + 1e-8)
+    apart = inverse_distances(points, points).max()
+    assert lattice.spacing == pytest.approx(1 / apart, rel=1e-9)
+    assert lattice.blur <= 2 * BLUR * np.abs(points).max()
+    sites = lattice.sites(points)
+    assert sites is not None
+    assert len(np.unique(sites, axis=0)) == len(points)
+
+
+@pytest.mark.parametrize("scene", [paper(), rough(), steel(), paper("closest")])
+def test_named_scenes_are_on_lattices(scene: cr.Scene) -> None:
+    assert scene.lattice is not None
+    shrunk = 1.0 if scene.geometry == "summit" else 1 / 1.02
+    spacing = 25e-6 if scene.sphere_radius < 1 else 0.0025
+    assert scene.lattice.spacing == pytest.approx(spacing * shrunk, rel=1e-13)
+
+
+def test_unequal_tip_radii_move_contact_points_off_a_lattice() -> None:
+    assert rough("closest").lattice is None
+    assert rough("closest").asperities.lattice is not None
+
+
+@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("shift", [0.0, 1e3, 1e6])
+def test_blur_is_a_bound(name: str, shift: float) -> None:
+    """On the distance of each coordinate from its site, in exact arithmetic."""
+    points = patch(turned(BASES[name], 0.3), 150) + shift
+    lattice = Lattice.through(points)
+    assert lattice is not None
+    sites = lattice.sites(points)
+    assert sites is not None
+    origin, basis = lattice.origin, lattice.basis
+    for point, (i, j) in zip(points, sites.tolist(), strict=True):
+        for c in range(2):
+            site = sum(
+                (Fraction(float(x)) * k for x, k in ((basis[0, c], i), (basis[1, c], j))),
+                Fraction(float(origin[c])),
+            )
+            assert abs(Fraction(float(point[c])) - site) <= Fraction(lattice.blur)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.sampled_from(sorted(BASES)), st.integers(0, 2**32 - 1), st.floats(0.3, 1.0))
+def test_holes_do_not_hide_a_lattice(name: str, seed: int, coverage: float) -> None:
+    """Also where most sites are empty, except around the middle, where it is looked for."""
+    rng = np.random.default_rng(seed)
+    basis = turned(BASES[name], 0.7)
+    points = patch(basis, 500)
+    kept = rng.random(500) < coverage
+    kept[:30] = True
+    lattice = Lattice.through(points[kept] - points[kept].mean(axis=0))
+    assert lattice is not None
+    assert_spans(lattice, basis)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(5, 200))
+def test_scattered_points_are_refused(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    assert Lattice.through(rng.uniform(-1, 1, (count, 2))) is None
+
+
+@pytest.mark.parametrize("name", BASES)
+def test_what_is_nearly_a_lattice_is_refused(name: str) -> None:
+    points = patch(np.array(BASES[name]), 500)
+    rng = np.random.default_rng(2)
+    assert Lattice.through(points) is not None
+    assert Lattice.through(points + 1e-9 * rng.standard_normal(points.shape)) is None
+    for moved in (0, 100, 499):
+        jittered = points.copy()
+        jittered[moved, 1] += 1e-9
+        assert Lattice.through(jittered) is None
+    doubled = np.concatenate((points, points[77:78]))
+    assert Lattice.through(doubled) is None
+
+
+def test_what_is_no_lattice_is_refused() -> None:
+    points = patch(np.array(BASES["square"]), 40)
+    assert Lattice.through(points[:1]) is None
+    assert Lattice.through(points[:2]) is None
+    assert Lattice.through(np.repeat(points[:1], 5, axis=0)) is None
+    for line in ([1.0, 0.0], [0.3, 0.7]):
+        assert Lattice.through(np.outer(np.arange(9), line)) is None
+    far = np.concatenate((points, [[1e5, 2e5]]))  # far too many sites for the points
+    assert Lattice.through(far) is None
+
+
+def test_sites() -> None:
+    points = patch(np.array(BASES["hexagonal"]), 60) + np.array([3.0, 4.0])
+    lattice = Lattice.through(points)
+    assert lattice is not None
+    more = patch(np.array(BASES["hexagonal"]), 200) + np.array([3.0, 4.0])
+    sites = lattice.sites(more)
+    assert sites is not None
+    assert_allclose(lattice.origin + sites @ lattice.basis, more, atol=1e-13)
+    more[150, 0] += 1e-9
+    assert lattice.sites(more) is None
+    empty = lattice.sites(more[:0])
+    assert empty is not None
+    assert len(empty) == 0
+
+
+# Products.
+
+
+def loadings(count: int, seed: int = 0) -> dict[str, Array]:
+    rng = np.random.default_rng(seed)
+    return {
+        "even": np.ones(count),
+        "many decades": 10 ** rng.uniform(-30, 0, count),
+        "one": np.eye(count)[count // 3],
+        "signs": rng.choice([-1.0, 1.0], count),
+        "mostly none": rng.random(count) * (rng.random(count) < 0.05),
+    }
+
+
+@pytest.mark.parametrize("shift", [0.0, 300.0, 1e6])
+@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("count", [40, 500, 2000])
+def test_products(name: str, count: int, shift: float) -> None:
+    """To 1e-13 of the largest displacement, and within the bounds, which are not absurd.
+
+    Measured against extended precision: 8e-15 of the largest at most about the axis. Off it, points
+    in float64 are themselves off a lattice: 6e-14 at 300 spacings. The bound on the 2-norm is 200
+    to 8000 times what is lost, on a component 100 to 3000 times.
+    """
+    points = patch(turned(BASES[name], 0.3), count) + shift
+    A, dense = operator(points), DenseInfluence.assemble(points, SCALE)
+    cases = loadings(count)
+    products = long_product(points, points, np.column_stack(list(cases.values())))
+    for (kind, loads), exact in zip(cases.items(), products.T, strict=True):
+        product, top = A.apply(loads), float(np.abs(exact).max())
+        error = np.abs(product - exact).astype(float)
+        assert error.max() <= max(1e-14, 3e-16 * shift) * top, kind
+        assert_allclose(product, dense.apply(loads), rtol=0, atol=max(1e-13, 3e-16 * shift) * top)
+        rounding, magnitude = A.rounding(loads), A.apply(np.abs(loads))
+        assert (error <= rounding.of(magnitude)).all()
+        rest = np.maximum(error - rounding.relative * np.maximum(magnitude, 0), 0)
+        assert np.linalg.norm(rest) <= rounding.norm
+        assert rest.max() <= rounding.each
+        assert rounding.norm <= 1e5 * np.linalg.norm(error)
+        assert rounding.of(magnitude).max() <= 1e5 * error.max()
+        single = A.apply(loads.astype(np.float32))
+        assert single.dtype == np.float32
+        assert_allclose(single, exact.astype(float), rtol=0, atol=1e-6 * top)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.sampled_from(sorted(BASES)), st.integers(0, 2**32 - 1), st.integers(1, 60))
+def test_random_sublattices(name: str, seed: int, count: int) -> None:
+    """`among` some, in any order, and `onto` others on the lattice and off it."""
+    rng = np.random.default_rng(seed)
+    points = patch(turned(BASES[name], 1.1), 300)
+    A = operator(points)
+    which = rng.permutation(300)[:count]
+    others = np.setdiff1d(np.arange(300), which)
+    part, loads = A.among(which), rng.random(count) ** 9
+    assert len(part) == count
+    assert (part.points == points[which]).all()
+    exact = long_product(points[which], points[which], loads)
+    assert (np.abs(part.apply(loads) - exact) <= part.rounding(loads).of(part.apply(loads))).all()
+    assert_allclose(part.apply(loads), exact.astype(float), atol=1e-13 * loads.max(), rtol=0)
+    mixed = points[np.concatenate((others, which[:1]))]
+    for targets in (mixed, mixed + 1e-3, np.concatenate((mixed, [[0.3, 0.4]])), mixed[:0]):
+        coupling = part.onto(targets)
+        exact = long_product(points[which], targets, loads).astype(float)[: len(targets)]
+        product = coupling.apply(loads)
+        assert (np.abs(product - exact) <= coupling.rounding(loads).of(product)).all()
+        assert_allclose(product, exact, atol=1e-12 * loads.max(), rtol=1e-13)
+        inverse = inverse_distances(targets, points[which])
+        for power in (2, 3):
+            assert (coupling.falloff(loads, power) >= inverse**power @ loads).all()
+
+
+@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("count", [30, 300, 3000])
+def test_falloff(name: str, count: int) -> None:
+    """An upper bound, high by at most a few per cent of the largest."""
+    points = patch(turned(BASES[name], 0.3), count)
+    A, inverse = operator(points), inverse_distances(points, points)
+    for strengths in map(np.abs, loadings(count).values()):
+        for power in (2, 3):
+            exact, bound = inverse**power @ strengths, A.falloff(strengths, power)
+            assert (bound >= exact).all()
+            assert bound.max() <= 1.01 * exact.max()
+            assert (bound - exact).max() <= 0.01 * exact.max()
+    assert (A.falloff(np.zeros(count), 3) == 0).all()
+
+
+def test_the_matrix_is_the_dense_one() -> None:
+    points = patch(np.array(BASES["hexagonal"]), 90)
+    A, dense = operator(points), DenseInfluence.assemble(points, SCALE)
+    assert (A.matrix == dense.matrix).all()
+    assert A.entry_error >= dense.entry_error * (1 - 1e-12)
+    assert A.name == "lattice"
+    assert (A.separations() <= dense.separations()).all()
+    assert_allclose(A.separations(), dense.separations(), rtol=1e-12)
+    assert_allclose(shells(A), shells(dense), rtol=1e-12)
+    assert A.among(np.array([5])).separations() == np.inf
+    with pytest.raises(ValueError, match="off the lattice"):
+        LatticeInfluence.assemble(points + 0.1, A.lattice, SCALE)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.sampled_from(sorted(BASES)),
+    st.integers(0, 2**32 - 1),
+    st.floats(0.01, 1),
+    st.sampled_from([0.0, 0.3, 3.0]),
+)
+def test_crowding(name: str, seed: int, coverage: float, width: float) -> None:
+    """Of all pairs as in a matrix: also of few that touch, and of very different sizes."""
+    rng = np.random.default_rng(seed)
+    points = patch(turned(BASES[name], 0.2), 120)
+    radii = rng.lognormal(0, width, 120) * (rng.random(120) < coverage)
+    A, dense = operator(points), DenseInfluence.assemble(points, SCALE)
+    assert A.crowding(radii) == pytest.approx(dense.crowding(radii), rel=1e-12)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.sampled_from(sorted(BASES)),
+    st.integers(0, 2**32 - 1),
+    st.floats(0.01, 1),
+    st.sampled_from([0.0, 0.3, 3.0]),
+    st.floats(0, 1),
+)
+def test_fitted_shells_do_not_overlap(
+    name: str, seed: int, coverage: float, width: float, share: float
+) -> None:
+    """The premise of the shell lemma: s_i + s_j <= r_ij for all pairs, touching or not."""
+    rng = np.random.default_rng(seed)
+    points = patch(turned(BASES[name], 0.2), 120) + rng.choice([0.0, 1e6])
+    radii = rng.lognormal(0, width, 120) * (rng.random(120) < coverage)
+    inverse = inverse_distances(points, points)
+    for A in (operator(points), DenseInfluence.assemble(points, SCALE)):
+        with np.errstate(divide="ignore"):
+            s = SCALE / fitted_shells(A, radii, share)
+        assert ((s[:, None] + s) * inverse).max() <= 1 + 4 * ROUNDOFF, A.name
+
+
+@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (7, 1), (9, 13)])
+def test_neighbours_come_by_distance(name: str, shape: tuple[int, int]) -> None:
+    """Each difference of two sites of a box once, up to its sign."""
+    lattice = Lattice.through(patch(turned(BASES[name], 0.2), 60))
+    assert lattice is not None
+    found = list(_neighbours(Box(shape, lattice.basis)))
+    rows, columns = shape
+    assert len({(i, j) for _, i, j in found}) == len(found)
+    assert len(found) == ((2 * rows - 1) * (2 * columns - 1) - 1) // 2
+    distances = [distance for distance, _, _ in found]
+    assert distances == sorted(distances)
+    for distance, i, j in found:
+        assert distance == pytest.approx(np.hypot(*(np.array([i, j]) @ lattice.basis)), rel=1e-14)
+        assert (i, j) > (0, 0)
+
+
+# Rounding of the transforms.
+
+
+def test_passes_of_the_transforms() -> None:
+    """Each length's bound covers what is lost, in the 2-norm; a sixth of it at most, measured."""
+    from scipy import fft
+
+    rng = np.random.default_rng(0)
+    worst = 0.0
+    for length in [n for n in range(2, 3000) if fft.next_fast_len(n) == n]:
+        bound = _pass_roundoffs(length) * ROUNDOFF
+        noise = rng.standard_normal(length) + 1j * rng.standard_normal(length)
+        smooth = np.exp(-(np.linspace(-3, 3, length) ** 2))
+        for x in (noise, smooth + 0j):
+            for transform in (fft.fft, fft.ifft):
+                exact = transform(x.astype(np.clongdouble))
+                lost = np.linalg.norm(transform(x) - exact) / np.linalg.norm(exact)
+                worst = max(worst, float(lost) / bound)
+        for y in (noise.real, smooth):
+            exact = fft.rfft(y.astype(np.longdouble))
+            lost = np.linalg.norm(fft.rfft(y) - exact) / np.linalg.norm(exact)
+            worst = max(worst, float(lost) / bound)
+    assert 0.05 < worst < 0.25
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (8, 1), (2, 3), (33, 47), (50, 31)])
+@pytest.mark.parametrize("power", [1, 2, 3])
+def test_convolutions(shape: tuple[int, int], power: int) -> None:
+    """Also on a box of one row, or one site; and what they lose stays below the bounds."""
+    basis = turned(BASES["hexagonal"], 0.4)
+    box = Box(shape, basis)
+    assert all(p >= 2 * n - 1 for p, n in zip(box.padded, shape, strict=True))
+    sites = np.stack(np.unravel_index(np.arange(shape[0] * shape[1]), shape), axis=1) @ basis
+    inverse = inverse_distances(sites, sites) ** power
+    rng = np.random.default_rng(1)
+    for dtype, roundoff in ((np.float64, ROUNDOFF), (np.float32, 2.0**-24)):
+        kernel = box.kernel(power, dtype)
+        assert kernel.total >= inverse.sum(axis=1).max() * (1 - 1e-12)
+        assert kernel.norm >= np.sqrt((inverse**2).sum(axis=1).max()) * (1 - 1e-12)
+        for field in (rng.standard_normal(shape), np.ones(shape), rng.random(shape) ** 20):
+            given = field.astype(dtype)
+            found = box.convolve(given, kernel.spectrum)
+            assert found.dtype == dtype
+            exact = (inverse @ given.ravel().astype(np.longdouble)).reshape(shape)
+            # The kernel itself is rounded before it is transformed; that is counted elsewhere.
+            slack = 24 * ROUNDOFF * power * (inverse @ np.abs(given).ravel()).reshape(shape)
+            lost = np.maximum(np.abs(found - exact).astype(float) - slack, 0)
+            size = float(np.linalg.norm(given))
+            assert np.linalg.norm(lost) <= box.bound(kernel, roundoff) * size
+            assert lost.max() <= box.bound_each(kernel, roundoff) * size
+
+
+# The smoother.
+
+
+def roots(points: Array, kind: str) -> Array:
+    """W of contacts in the convex range, smooth or not, touching everywhere or not."""
+    rng = np.random.default_rng(3)
+    squares = (points**2).sum(axis=1)
+    smooth = np.sqrt(np.maximum(1.0 - squares / (0.8 * squares.max()), 0.0))
+    if kind != "smooth":
+        smooth = smooth * (rng.random(len(points)) < float(kind))
+    return np.sqrt(smooth)
+
+
+@pytest.mark.parametrize("kind", ["smooth", "0.01", "0.05", "0.2", "0.5"])
+@pytest.mark.parametrize("scale", [0.4, 4.0])
+@pytest.mark.parametrize("name", BASES)
+def test_smoother(name: str, scale: float, kind: str) -> None:
+    """Symmetric and positive definite on the support of W, and zero elsewhere.
+
+    Also, for the greater scale, where I + W A W itself is not positive definite.
+    """
+    points = patch(np.array(BASES[name]), 400)
+    A, root = operator(points, scale), roots(points, kind)
+    root[5] = 0.7  # never without any contact
+    smooth = A.smoother(root)
+    support = np.flatnonzero(root)
+    columns = []
+    for i in support:
+        column, left = smooth(np.eye(400, dtype=np.float32)[i])
+        assert column.dtype == np.float32
+        assert left >= 0
+        assert (column[root == 0] == 0).all()
+        columns.append(column[support].astype(float))
+    anywhere = np.random.default_rng(0).random(400).astype(np.float32)
+    assert (smooth(anywhere)[0][root == 0] == 0).all()
+    matrix = np.array(columns)
+    assert_allclose(matrix, matrix.T, atol=1e-5)
+    assert np.linalg.eigvalsh((matrix + matrix.T) / 2).min() > 1e-3
+
+
+class _Counted:
+    """An operator that counts its products, with its smoother or without."""
+
+    def __init__(self, influence: LatticeInfluence, *, smoothed: bool) -> None:
+        self.influence, self.smoothed, self.products = influence, smoothed, 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.influence, name)
+
+    def apply(self, loads: Any) -> Any:
+        self.products += 1
+        return self.influence.apply(loads)
+
+    def smoother(self, root: Array) -> Any:
+        return self.influence.smoother(root) if self.smoothed else None
+
+
+@pytest.mark.parametrize("balanced", [False, True])
+@pytest.mark.parametrize("kind", ["smooth", "0.2", "0.5"])
+def test_the_smoother_saves_products(kind: str, balanced: bool) -> None:
+    """And the answer is that of a matrix, to what was asked for."""
+    points = patch(np.array(BASES["hexagonal"]), 3000)
+    lattice, dense = operator(points, scale=0.4), DenseInfluence.assemble(points, 0.4)
+    root = roots(points, kind)
+    defect = np.random.default_rng(4).random(3000) * (1.0 + points[:, 0])
+    plain, smoothed = _Counted(lattice, smoothed=False), _Counted(lattice, smoothed=True)
+    options: Any = dict(balanced=balanced, tolerance=1e-4)
+    exact = correct(dense, shells(dense), root, defect, **options)
+    found = correct(smoothed, shells(lattice), root, defect, **options)  # type: ignore[arg-type]
+    correct(plain, shells(lattice), root, defect, **options)  # type: ignore[arg-type]
+    assert found.products == smoothed.products
+    assert smoothed.products <= 0.5 * plain.products
+    assert_allclose(found.change, exact.change, atol=3e-3 * np.abs(exact.change).max())
+    size = np.linalg.norm(exact.change)
+    assert np.linalg.norm(found.change - exact.change) <= 1e-3 * size
+    assert found.shift == pytest.approx(exact.shift, abs=1e-3 * np.abs(defect).max())

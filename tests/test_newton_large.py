@@ -1,0 +1,379 @@
+"""Thousands of asperities on a lattice: the same answers as through the matrix, in few products."""
+
+from dataclasses import replace
+from typing import Any
+
+import multiprecision
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+from scenes import MATERIAL, PAPER_APPROACH, STEEL
+
+import convexrough as cr
+from convexrough import hertz
+from convexrough.normal import NormalProblem
+from convexrough.solvers import Newton
+from convexrough.solvers.newton import FEW
+
+Array = NDArray[np.float64]
+
+
+def scene(
+    k: float, *, pattern: str = "hexagonal", within: float = 0.01, **options: Any
+) -> cr.Scene:
+    """The paper's sphere on a lattice k times finer, of tips k times smaller."""
+    make = {"hexagonal": cr.Asperities.hexagonal, "square": cr.Asperities.square}[pattern]
+    geometry = options.pop("geometry", "summit")
+    tips = {"tip_radius": 0.02 / k, **options}
+    asperities = make(spacing=0.0025 / k, within=within, **tips)
+    return cr.Scene(1.0, asperities, MATERIAL, geometry=geometry)
+
+
+def edited(
+    whole: cr.Scene, *, kept: Any = slice(None), shift: Any = 0.0, raised: Any = 0.0
+) -> cr.Scene:
+    """Some of the asperities, moved sideways and up."""
+    a = whole.asperities
+    heights = a.heights + raised
+    some = cr.Asperities(a.positions[kept] + shift, a.tip_radii[kept], heights[kept])
+    return replace(whole, asperities=some)
+
+
+def middle_free(whole: cr.Scene) -> cr.Scene:
+    return edited(whole, kept=np.hypot(*(whole.asperities.positions - [0.003, 0.001]).T) > 0.002)
+
+
+def sparse(whole: cr.Scene) -> cr.Scene:
+    rng = np.random.default_rng(5)
+    near = whole.asperities.distances < 3e-3  # where a lattice is looked for
+    return edited(whole, kept=near | (rng.random(len(whole)) < 0.6))
+
+
+#: name -> (scene, approach) of 1500 to 4500 candidates, each in the convex range.
+SCENES: dict[str, tuple[cr.Scene, float]] = {
+    "smooth": (scene(7), PAPER_APPROACH),
+    "heights": (scene(7, height_std=1e-7, seed=1), PAPER_APPROACH),
+    "rough": (scene(7, height_std=1e-6, tip_radius_cv=0.1, seed=2), PAPER_APPROACH),
+    "closest": (scene(7, geometry="closest", height_std=1e-6, seed=3), PAPER_APPROACH),
+    "square": (scene(7, pattern="square", height_std=1e-7, seed=4), PAPER_APPROACH),
+    "cut by its edge": (scene(11, within=0.005, height_std=1e-7, seed=4), PAPER_APPROACH),
+    "screened": (scene(7, within=0.02, height_std=1e-7, seed=4), PAPER_APPROACH),
+    "off axis": (edited(scene(7), shift=np.array([0.004, 0.001])), PAPER_APPROACH),
+    "hole": (middle_free(scene(8)), PAPER_APPROACH),
+    "sparse": (sparse(scene(8, height_std=1e-7, seed=4)), PAPER_APPROACH),
+    "steel": (
+        cr.Scene(
+            0.01,
+            cr.Asperities.hexagonal(spacing=4e-6, tip_radius=3e-5, within=1e-4),
+            STEEL,
+        ),
+        0.5e-6,
+    ),
+}
+
+
+class Counted:
+    """An operator that counts its products, those of parts included."""
+
+    def __init__(self, influence: Any, counts: dict[str, int]) -> None:
+        self.influence, self.counts = influence, counts
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.influence, name)
+
+    def __len__(self) -> int:
+        return len(self.influence)
+
+    def among(self, which: Any) -> "Counted":
+        return Counted(self.influence.among(which), self.counts)
+
+    def apply(self, loads: Any) -> Any:
+        kind = str(loads.dtype)
+        self.counts[kind] = self.counts.get(kind, 0) + 1
+        return self.influence.apply(loads)
+
+
+def assert_solved(contact: cr.Contact, *, steps: int = 12) -> None:
+    """Proved, by one who knows no solver, and to many digits."""
+    certificate = contact.certificate
+    assert contact.influence == "lattice"
+    assert certificate.scope in ("global", "local")
+    assert certificate.holds
+    assert certificate.load_error <= 1e-8 * contact.loads.max()
+    assert contact.iterations <= steps
+
+
+def residual(problem: NormalProblem, contact: cr.Contact) -> float:
+    """Of the contact law, over the approach."""
+    loads = contact.loads[problem.candidates] / problem.units.force
+    approach = contact.approach / problem.units.length
+    return problem.residual(loads, approach) / approach
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize("name", SCENES)
+def test_as_through_the_matrix(name: str, control: str) -> None:
+    """Loads agree within what is proved of each, and to 1e-12; words are the same."""
+    pressed, approach = SCENES[name]
+    dense = dense_answer(name)
+    prescribed: Any = {control: {"approach": approach, "load": dense.load}[control]}
+    contact = cr.press(pressed, **prescribed, influence="lattice")
+    assert 1500 < contact.candidates < 5000
+    assert_solved(contact)
+    assert dense.certificate.holds
+    apart = np.abs(contact.loads - dense.loads)
+    assert apart.max() <= 1e-12 * dense.loads.max()
+    assert (apart <= contact.certificate.load_errors + dense.certificate.load_errors).all()
+    between = np.abs(contact.gaps - dense.gaps)
+    assert (between <= contact.certificate.gap_errors + dense.certificate.gap_errors).all()
+    assert (contact.status == dense.status).all()
+    assert contact.approach == pytest.approx(approach, rel=1e-12)
+    assert contact.crowding == pytest.approx(dense.crowding, rel=1e-9)
+    assert contact.model_error == pytest.approx(dense.model_error, rel=0.01)
+    problem = NormalProblem.assemble(pressed, approach=approach, influence="dense")
+    assert residual(problem, contact) <= 1e-12
+
+
+_DENSE: dict[str, cr.Contact] = {}
+
+
+def dense_answer(name: str) -> cr.Contact:
+    if name not in _DENSE:
+        pressed, approach = SCENES[name]
+        _DENSE[name] = cr.press(pressed, approach=approach, influence="dense")
+    return _DENSE[name]
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize(
+    ("options", "steps", "products"),
+    [
+        (dict(), 5, 40),
+        (dict(pattern="square"), 5, 40),
+        (dict(height_std=1e-7, seed=1), 5, 40),
+        (dict(height_std=1e-6, tip_radius_cv=0.1, seed=1), 7, 80),
+        (dict(geometry="closest"), 5, 40),
+    ],
+)
+def test_few_products(options: Any, steps: int, products: int, control: str) -> None:
+    """At some 36,000 asperities, and no more of them than at 2,300."""
+    spent = []
+    for k in (6, 25):
+        pressed = scene(k, **options)
+        contact = cr.press(pressed, approach=PAPER_APPROACH)
+        assert_solved(contact, steps=steps)
+        assert (contact.loads > 0).sum() > 0.4 * len(pressed)
+        prescribed: Any = {control: getattr(contact, control)}
+        problem = NormalProblem.assemble(pressed, **prescribed, influence="lattice")
+        assert residual(problem, contact) <= 1e-12
+        counts: dict[str, int] = {}
+        counted: Any = Counted(problem.influence, counts)
+        solution = Newton().solve(replace(problem, influence=counted))
+        assert solution.iterations <= steps
+        found = problem.to_scene(solution.loads) * problem.units.force
+        assert_allclose(found, contact.loads, rtol=0, atol=1e-12 * contact.loads.max())
+        assert counts["float64"] <= steps + 3
+        assert counts["float32"] > 0
+        spent.append(sum(counts.values()))
+    assert max(spent) <= products
+    assert spent[1] <= 1.5 * spent[0] + 4
+
+
+@pytest.mark.parametrize("k", [6, 12, 25])
+def test_loads_tend_to_those_of_a_smooth_sphere(k: int) -> None:
+    """Within 2 % of Hertz where asperities are as fine and stiff as here; nearer for finer."""
+    contact = cr.press(scene(k), approach=PAPER_APPROACH)
+    smooth = 4 / 3 * PAPER_APPROACH**1.5
+    assert 0 < 1 - contact.load / smooth < 0.5 / np.sqrt(k)
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.floats(0.02, 1.0),
+    st.floats(0.05, 0.6),
+    st.sampled_from(["hexagonal", "square"]),
+    st.booleans(),
+)
+def test_manufactured_contacts(
+    seed: int, share: float, size: float, pattern: str, balanced: bool
+) -> None:
+    """Draw loads and gaps of thousands, and the heights that make them exact."""
+    rng = np.random.default_rng(seed)
+    flat = scene(9, pattern=pattern)
+    n, approach = len(flat), PAPER_APPROACH
+    problem = NormalProblem.assemble(flat, approach=10 * approach, influence="lattice")
+    assert len(problem) == n > 4000
+    touching = rng.random(n) < share
+    # In the convex range: contact radii up to `size` times half the spacing.
+    radii = size * 0.5 * 0.0025 / 9 * np.sqrt(rng.random(n))
+    k = hertz.local_coefficient(1.0, flat.relative_radii)
+    loads = np.where(touching, hertz.load(radii**2 / flat.relative_radii, k), 0.0)
+    gaps = np.where(touching, 0.0, 0.1 * approach * rng.random(n))
+    sunk = problem.influence.apply(loads / problem.units.force) * problem.units.length
+    prescribed = hertz.indentation(loads, k) + sunk - gaps
+    made = edited(flat, raised=prescribed - approach + flat.drops)
+    control: Any = {"load": float(loads.sum())} if balanced else {"approach": approach}
+    contact = cr.press(made, **control, influence="lattice")
+    assert contact.certificate.scope in ("global", "local")
+    assert contact.iterations <= 40
+    top = loads.max()
+    assert_allclose(contact.loads, loads, rtol=0, atol=1e-10 * top)
+    assert (np.abs(contact.loads - loads) <= contact.certificate.load_errors + 1e-12 * top).all()
+    assert_allclose(contact.gaps, gaps, rtol=0, atol=1e-10 * approach)
+    assert not ((contact.status == "open") & (loads > 1e-9 * top)).any()
+    assert not ((contact.status == "contact") & (gaps > 1e-9 * approach)).any()
+
+
+@pytest.mark.parametrize("kind", ["none", "one", "far", "huge", "random", "opposite"])
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_any_start(kind: str, control: str) -> None:
+    pressed, approach = SCENES["rough"]
+    known = dense_answer("rough")
+    n, rng = len(pressed), np.random.default_rng(3)
+    start = {
+        "none": np.zeros(n),
+        "one": 1e-9 * np.eye(n)[n // 2],
+        "far": 1e-9 * np.eye(n)[n - 1],
+        "huge": np.full(n, 1e-6),
+        "random": known.loads.max() * rng.random(n) ** 9 * (rng.random(n) < 0.3),
+        "opposite": known.loads.max() - known.loads,
+    }[kind]
+    prescribed: Any = {control: {"approach": approach, "load": known.load}[control]}
+    contact = cr.press(pressed, **prescribed, start=start, influence="lattice")
+    assert_solved(contact, steps=60)
+    assert_allclose(contact.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
+
+
+@pytest.mark.parametrize(
+    ("approach", "steps"), [(-1e-6, 0), (1e-12, 6), (1e-8, 8), (1e-6, 8), (1e-5, 8), (1e-4, 12)]
+)
+def test_approaches_of_any_size(approach: float, steps: int) -> None:
+    """From nothing that touches to everything."""
+    pressed = scene(12, height_std=1e-8, seed=6)
+    contact = cr.press(pressed, approach=approach)
+    assert contact.certificate.holds
+    assert contact.iterations <= steps
+    assert (contact.load == 0) == (approach < 0)
+    if contact.load > 0:
+        again = cr.press(pressed, load=contact.load)
+        assert again.approach == pytest.approx(approach, rel=1e-9, abs=1e-12)
+        assert_allclose(again.loads, contact.loads, rtol=0, atol=1e-9 * contact.loads.max())
+
+
+@pytest.mark.parametrize("height", [2e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_a_far_tall_asperity_is_found(control: str, height: float) -> None:
+    """Well outside the contact, where no mean displacement says that it touches; and a pair."""
+    whole = scene(8, within=0.02)
+    distances = whole.asperities.distances
+    far = int(np.argmin(np.abs(distances - 0.018)))
+    raised = np.zeros(len(whole))
+    raised[far] = whole.drops[far] - PAPER_APPROACH + min(height, 1e-3) * 2e-3
+    pressed = edited(whole, raised=raised)
+    contact = cr.press(pressed, approach=PAPER_APPROACH, influence="dense")
+    assert contact.candidates > FEW
+    prescribed: Any = {control: getattr(contact, control)}
+    found = cr.press(pressed, **prescribed, influence="lattice")
+    assert (found.status == contact.status).all()
+    assert_allclose(found.loads, contact.loads, rtol=0, atol=1e-12 * contact.loads.max())
+
+
+def test_those_left_out_at_first_are_found() -> None:
+    """Ridges that the rings of the start do not know: the neighbourhood of the contact grows."""
+    whole = scene(8)
+    x = whole.asperities.positions[:, 0]
+    pressed = edited(whole, raised=np.where(x > 0.004, 4e-5, 0.0))
+    lines: list[str] = []
+    contact = cr.press(pressed, approach=2e-5, influence="lattice", announce=lines.append)
+    dense = cr.press(pressed, approach=2e-5, influence="dense")
+    assert_allclose(contact.loads, dense.loads, rtol=0, atol=1e-12 * dense.loads.max())
+    assert (contact.loads[x > 0.004] > 0).sum() > 100
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.floats(-3, 3), st.floats(-3, 12))
+def test_units_do_not_matter(length: float, force: float) -> None:
+    pressed, approach = SCENES["rough"]
+    lam, mu = 10**length, 10**force
+    a = pressed.asperities
+    scaled = cr.Scene(
+        lam,
+        cr.Asperities(a.positions * lam, a.tip_radii * lam, a.heights * lam),
+        cr.Material(mu, 0.3),
+    )
+    known = dense_answer("rough")
+    contact = cr.press(scaled, approach=approach * lam)
+    assert_solved(contact)
+    loads = contact.loads / (lam**2 * mu)
+    assert_allclose(loads, known.loads, rtol=0, atol=1e-11 * known.loads.max())
+    assert (contact.status == known.status).all()
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, np.pi / 2])
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_order_and_orientation_do_not_matter(control: str, angle: float) -> None:
+    pressed, _ = SCENES["rough"]
+    a, known = pressed.asperities, dense_answer("rough")
+    order = np.random.default_rng(8).permutation(len(a))
+    c, s = np.cos(angle), np.sin(angle)
+    positions = (a.positions @ np.array([[c, s], [-s, c]]))[order]
+    shuffled = cr.Asperities(positions, a.tip_radii[order], a.heights[order])
+    prescribed: Any = {control: getattr(known, control)}
+    contact = cr.press(replace(pressed, asperities=shuffled), **prescribed)
+    assert_solved(contact)
+    assert_allclose(contact.loads, known.loads[order], rtol=0, atol=1e-11 * known.loads.max())
+    assert (contact.status == known.status[order]).all()
+
+
+@pytest.mark.parametrize("kind", ["dropped", "perturbed", "swapped", "single precision", "added"])
+def test_the_certificate_under_attack(kind: str) -> None:
+    """Its bounds hold and its words stay right for thousands of wrong loads, too."""
+    pressed, approach = SCENES["rough"]
+    known = dense_answer("rough")
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        wrong, loaded = known.loads.copy(), np.flatnonzero(known.loads)
+        if kind == "dropped":
+            wrong[rng.choice(loaded, 1 + 9 * seed)] = 0.0
+        elif kind == "perturbed":
+            wrong *= 1 + 10.0 ** rng.uniform(-12, -2) * rng.uniform(-1, 1, len(wrong))
+        elif kind == "swapped":
+            i, j = rng.choice(loaded, 2)
+            wrong[[i, j]] = wrong[[j, i]]
+        elif kind == "single precision":
+            wrong = wrong.astype(np.float32).astype(np.float64)
+        else:
+            wrong[rng.integers(len(wrong), size=5)] += 10.0 ** rng.uniform(-9, 0) * wrong.max()
+        for prescribed in ({"approach": approach}, {"load": known.load}):
+            judged = cr.certify(pressed, wrong, **prescribed, influence="lattice")
+            slack = known.certificate.load_errors + 1e-14 * known.loads.max()
+            assert (np.abs(wrong - known.loads) <= judged.load_errors + slack).all()
+            assert not ((judged.status == "open") & (known.status == "contact")).any()
+            assert not ((judged.status == "contact") & (known.status == "open")).any()
+            between = np.abs(judged.gaps - known.gaps)
+            assert (between <= judged.gap_errors + known.certificate.gap_errors).all()
+
+
+def test_fifty_digits_of_some_hundred() -> None:
+    """The largest contact that is worth proving in ball arithmetic: 253 candidates."""
+    pressed = scene(2.2, height_std=1e-6, seed=9)
+    contact = cr.press(pressed, approach=PAPER_APPROACH, influence="lattice")
+    exact = multiprecision.solve(
+        pressed.asperities.positions,
+        pressed.asperities.tip_radii,
+        pressed.asperities.heights,
+        sphere_radius=1.0,
+        contact_modulus=1.0,
+        approach=PAPER_APPROACH,
+        start=contact.loads,
+    )
+    truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
+    assert contact.certificate.holds
+    assert truth.max() <= 1e-13 * contact.loads.max()
+    assert (truth <= contact.certificate.load_errors).all()
+    gaps = np.abs(multiprecision.errors(contact.gaps, exact.gaps))
+    assert (gaps <= contact.certificate.gap_errors).all()

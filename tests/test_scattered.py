@@ -1,0 +1,401 @@
+"""The coupling on a mesh: the sum over pairs, bounds on the error, an approximate inverse."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from convexrough.influence import DenseInfluence, inverse_distances
+from convexrough.influence.mesh import Product, within
+from convexrough.influence.plan import Plan
+from convexrough.influence.scattered import ScatteredCoupling, ScatteredInfluence
+from convexrough.influence.softened import Softened, _steepest, lagrange, lebesgue
+
+SCALE = 0.37
+COUNT = 4000
+
+
+def _disc(rng: np.random.Generator, count: int = COUNT) -> np.ndarray:
+    angle, radius = rng.uniform(0, 2 * np.pi, count), np.sqrt(rng.random(count))
+    return np.stack((radius * np.cos(angle), radius * np.sin(angle)), axis=1)
+
+
+def _clustered(rng: np.random.Generator) -> np.ndarray:
+    centres = rng.uniform(-1, 1, (20, 2))
+    sizes = 10.0 ** rng.uniform(-3, -1, 20)
+    which = rng.integers(0, 20, COUNT)
+    return centres[which] + sizes[which, None] * rng.standard_normal((COUNT, 2))
+
+
+def _two(rng: np.random.Generator) -> np.ndarray:
+    return np.concatenate(
+        (_disc(rng, COUNT // 2), _disc(rng, COUNT // 2) + np.array([300.0, 40.0]))
+    )
+
+
+def _line(rng: np.random.Generator) -> np.ndarray:
+    return np.stack((rng.uniform(-1, 1, COUNT), np.zeros(COUNT)), axis=1)
+
+
+def _jittered(rng: np.random.Generator) -> np.ndarray:
+    sites = np.stack(np.meshgrid(np.arange(63.0), np.arange(63.0)), axis=-1).reshape(-1, 2)
+    return (sites + rng.uniform(-0.3, 0.3, sites.shape)) * 1e-4
+
+
+def _coincident(rng: np.random.Generator) -> np.ndarray:
+    points = _disc(rng, COUNT // 2)
+    return np.concatenate((points, points + 10.0 ** rng.uniform(-12, -6, points.shape)))
+
+
+LAYOUTS = {
+    "disc": _disc,
+    "clustered": _clustered,
+    "two": _two,
+    "line": _line,
+    "jittered": _jittered,
+    "coincident": _coincident,
+}
+
+
+def exact(points: np.ndarray, others: np.ndarray, values: np.ndarray, power: int = 1) -> np.ndarray:
+    """sum_j values_j / r_ij^power in long double: further from rounding by 11 bits."""
+    total = np.empty(len(points), dtype=np.longdouble)
+    x, y = others.astype(np.longdouble).T
+    for i, point in enumerate(points.astype(np.longdouble)):
+        squares = (x - point[0]) ** 2 + (y - point[1]) ** 2
+        apart = squares > 0
+        total[i] = (values[apart] / np.sqrt(squares[apart]) ** power).sum()
+    return total
+
+
+def meshed(operator: ScatteredInfluence) -> bool:
+    return operator._double.plan.meshed
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_product_and_its_bound(layout: str) -> None:
+    rng = np.random.default_rng(1)
+    points = LAYOUTS[layout](rng)
+    rows = rng.integers(0, len(points), 300)
+    operator = ScatteredInfluence.assemble(points, SCALE)
+    assert meshed(operator)
+    smooth, rough = np.ones(len(points)), rng.standard_normal(len(points))
+    few = np.where(rng.random(len(points)) < 0.01, rng.random(len(points)), 0.0)
+    for loads in (smooth, rough, few):
+        true = SCALE * exact(points[rows], points, loads)
+        sizes = operator.apply(np.abs(loads))
+        error = np.abs(operator.apply(loads)[rows] - true)
+        assert error.max() <= 1e-13 * sizes.max()
+        rounding = operator.rounding(loads)
+        assert (error <= rounding.of(sizes)[rows]).all()
+        # Never so weak that nothing could be proved with it.
+        assert rounding.norm <= 1e-10 * np.linalg.norm(sizes)
+        assert rounding.each <= 1e-10 * sizes.max()
+        assert rounding.relative <= 1e-12
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_interpolation_is_within_its_bound(tolerance: float) -> None:
+    """Coarse enough that interpolation is all of the error."""
+    rng = np.random.default_rng(2)
+    points = _disc(rng)
+    plan = Plan.choose(points, 1, tolerance)
+    assert plan.meshed
+    product = Product.assemble(points, plan, np.float64)
+    matrix = inverse_distances(points, points)
+    for loads in (np.ones(len(points)), rng.standard_normal(len(points))):
+        error = product.apply(loads) - matrix @ loads
+        bound = product.interpolation(np.abs(loads)) + product.rounding(loads).of(
+            product.apply(np.abs(loads))
+        )
+        assert (np.abs(error) <= bound).all()
+        norm = np.linalg.norm(loads)
+        machine = product.rounding(loads).norm
+        assert np.linalg.norm(error) <= product.interpolation_norm * norm + 2 * machine
+    # The bound is asked to be the tolerance, and is not beyond it by much.
+    largest = np.median(matrix.sum(axis=1))
+    assert product.interpolation_norm <= 2 * tolerance * largest
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+@pytest.mark.parametrize("order", [4, 8, 16])
+def test_error_of_a_pair(power: int, order: int) -> None:
+    """One load and one point, at distances where interpolation is at its worst."""
+    rng = np.random.default_rng(order)
+    kernel = Softened(power, order, 1.0)
+    plan = Plan(kernel, 1.0 / (1.2 * order), order)
+    worst = 0.0
+    for _ in range(30):
+        points = rng.uniform(0, 1.2, (40, 2))
+        product = Product.assemble(points, plan, np.float64)
+        loads = np.zeros(len(points))
+        loads[0] = 1.0
+        error = product.apply(loads) - inverse_distances(points, points[:1])[:, 0] ** power
+        worst = max(worst, float(np.abs(error).max()))
+    bound = kernel.pair_error(plan.spacing)
+    assert worst <= bound
+    assert worst >= 1e-3 * bound
+
+
+def test_upper_bounds_on_sums() -> None:
+    """Also where what is computed is too low, as on a mesh that is coarse enough."""
+    rng = np.random.default_rng(13)
+    points = rng.uniform(0, 1.2, (300, 2))
+    plan = Plan(Softened(3, 16, 1.0), 1.0 / 20, 8)
+    product = Product.assemble(points, plan, np.float64)
+    inverse = inverse_distances(points, points) ** 3
+    too_low = 0
+    for i in range(20):
+        strengths = np.zeros(len(points))
+        strengths[i] = 1.0
+        assert (product.above(strengths) >= inverse[i]).all()
+        relative = product.rounding(strengths).relative
+        low = product.apply(strengths) < (1 - relative) * inverse[i]
+        too_low += int(low[inverse[i] > 0].sum())
+    assert too_low > 100
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+@pytest.mark.parametrize("order", [4, 12, 22])
+def test_nothing_is_left_beyond_the_cut(power: int, order: int) -> None:
+    kernel = Softened(power, order, 2.0)
+    for spacing in (0.3, 0.1, 0.03):
+        squares = np.linspace(kernel.cut(spacing), kernel.reach, 50) ** 2
+        left = squares ** (-power / 2) - kernel.smooth(squares)
+        noise = 1e-14
+        assert (left <= kernel.pair_error(spacing) * 0.1 + noise).all()
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+@pytest.mark.parametrize("order", [4, 10, 28])
+def test_steepest_derivative(power: int, order: int) -> None:
+    """Against exact arithmetic, along lines; and it is nearly reached."""
+    terms = [Fraction(1)]
+    for k in range(1, order + 1):
+        terms.append(terms[-1] * (Fraction(power, 2) + k - 1) / k)
+    largest = 0.0
+    for y2 in (Fraction(0), Fraction(1, 9), Fraction(1, 2), Fraction(7, 8)):
+        # sum c_k (1 - x^2 - y^2)^k in powers of x
+        base, power_of_base = [1 - y2, Fraction(0), Fraction(-1)], [Fraction(1)]
+        total = [Fraction(0)] * (2 * order + 1)
+        for term in terms:
+            for k, value in enumerate(power_of_base):
+                total[k] += term * value
+            power_of_base = _times(power_of_base, base)
+        for x in (Fraction(i, 40) for i in range(41)):
+            if x * x + y2 <= 1:
+                value = sum(
+                    math.comb(k, order) * total[k] * x ** (k - order)
+                    for k in range(order, 2 * order + 1)
+                )
+                largest = max(largest, abs(float(value)))
+    bound = _steepest(order, power)
+    assert largest <= bound
+    beyond = math.comb(order + power - 1, order)
+    assert max(largest, beyond) >= 0.5 * bound
+
+
+def _times(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
+    product = [Fraction(0)] * (len(a) + len(b) - 1)
+    for i, x in enumerate(a):
+        for j, y in enumerate(b):
+            product[i + j] += x * y
+    return product
+
+
+def test_lagrange_polynomials() -> None:
+    rng = np.random.default_rng(3)
+    places = rng.random(200)
+    for order in (4, 12, 28):
+        nodes = np.arange(order) - (order // 2 - 1)
+        weights = lagrange(places, order)
+        for degree in range(order):
+            assert_allclose(
+                weights @ (nodes / order) ** degree, (places / order) ** degree, atol=1e-14
+            )
+        assert np.abs(weights).sum(axis=1).max() <= lebesgue(order) * (1 + 1e-15)
+        assert (lagrange(np.zeros(1), order)[0] == (nodes == 0)).all()
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_single_precision(layout: str) -> None:
+    rng = np.random.default_rng(4)
+    points = LAYOUTS[layout](rng)
+    operator = ScatteredInfluence.assemble(points, SCALE)
+    loads = rng.random(len(points))
+    single, double = operator.apply(loads.astype(np.float32)), operator.apply(loads)
+    assert single.dtype == np.float32
+    assert np.linalg.norm(single - double) <= 1e-5 * np.linalg.norm(double)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("power", [2, 3])
+def test_falloff(layout: str, power: int) -> None:
+    rng = np.random.default_rng(5)
+    points = LAYOUTS[layout](rng)
+    rows = rng.integers(0, len(points), 300)
+    operator = ScatteredInfluence.assemble(points, SCALE)
+    for strengths in (rng.random(len(points)), np.where(rng.random(len(points)) < 0.1, 1.0, 0.0)):
+        true = exact(points[rows], points, strengths, power)
+        above = operator.falloff(strengths, power)[rows]
+        assert (above >= true).all()
+        if layout != "coincident":
+            assert (above <= 1.05 * true + 0.02 * np.median(true[true > 0])).all()
+
+
+def test_among_and_onto() -> None:
+    rng = np.random.default_rng(6)
+    points = _disc(rng)
+    operator = ScatteredInfluence.assemble(points, SCALE)
+    which = np.flatnonzero(points[:, 0] > 0.1)
+    loads = rng.random(len(which))
+    part = operator.among(which)
+    assert len(part) == len(which)
+    assert_allclose(part.apply(loads), DenseInfluence.assemble(points[which], SCALE).apply(loads))
+    others = np.concatenate((rng.uniform(-2, 2, (200, 2)), points[:5]))
+    loads = rng.random(len(points))
+    few = operator.onto(others)
+    true = SCALE * exact(others, points, loads)
+    joint = ScatteredCoupling(
+        ScatteredInfluence.assemble(np.concatenate((points, others)), SCALE), len(points)
+    )
+    for coupling in (few, joint):
+        rounding = coupling.rounding(loads)
+        assert (np.abs(coupling.apply(loads) - true) <= rounding.of(coupling.apply(loads))).all()
+        above = coupling.falloff(loads, 2)
+        exactly = exact(others, points, loads, 2)
+        assert ((above >= exactly) & (above <= 1.05 * exactly + 0.01 * exactly.max())).all()
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_matrix_separations_and_crowding(layout: str) -> None:
+    rng = np.random.default_rng(7)
+    points = LAYOUTS[layout](rng)[rng.permutation(3000)]
+    dense = DenseInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence.assemble(points, SCALE)
+    assert_allclose(operator.separations(), dense.separations(), rtol=1e-14)
+    assert_allclose(operator.matrix, dense.matrix)
+    assert operator.entry_error == pytest.approx(dense.entry_error)
+    for radii in (rng.random(3000), 10.0 ** rng.uniform(-6, 0, 3000), np.zeros(3000)):
+        assert operator.crowding(radii) == pytest.approx(dense.crowding(radii), rel=1e-12)
+
+
+def test_the_most_crowded_pair_is_not_one_of_nearest_neighbours() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [-1.3, 0.0], [-2.2, 0.0]])
+    operator = ScatteredInfluence.assemble(points, SCALE)
+    radii = np.array([1.0, 0.5, 1.0, 0.1])
+    assert operator.crowding(radii) == pytest.approx(2.0 / 1.3)
+
+
+def test_point_error_is_counted() -> None:
+    rng = np.random.default_rng(8)
+    points = _jittered(rng)
+    blur = 1e-13
+    moved = points + rng.choice([-blur, blur], points.shape)
+    operator = ScatteredInfluence.assemble(points, SCALE, blur)
+    loads = rng.random(len(points))
+    computed = operator.apply(loads)
+    true = SCALE * exact(moved[:200], moved, loads)
+    error = np.abs(computed[:200] - true)
+    assert (error <= operator.rounding(loads).of(computed)[:200]).all()
+    exactly = ScatteredInfluence.assemble(points, SCALE).rounding(loads)
+    assert (operator.rounding(loads).of(computed) >= 10 * exactly.of(computed)).all()
+    far = points + rng.choice([-2e-6, 2e-6], points.shape)
+    rough = ScatteredInfluence.assemble(points, SCALE, 2e-6)
+    for power in (2, 3):
+        above = rough.falloff(loads, power)[:200]
+        assert (above >= exact(far[:200], far, loads, power)).all()
+    assert (operator.separations() < ScatteredInfluence.assemble(points, SCALE).separations()).all()
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 50])
+def test_few_points(count: int) -> None:
+    rng = np.random.default_rng(count)
+    points = rng.uniform(-1, 1, (count, 2))
+    operator = ScatteredInfluence.assemble(points, SCALE)
+    loads = rng.random(count)
+    true = SCALE * exact(points, points, loads)
+    error = np.abs(operator.apply(loads) - true)
+    assert (error <= operator.rounding(loads).of(operator.apply(loads))).all()
+    assert operator.apply(loads.astype(np.float32)).dtype == np.float32
+    assert (operator.falloff(loads, 2) >= exact(points, points, loads, 2)).all()
+    assert len(operator.separations()) == count
+    assert operator.crowding(np.ones(count)) >= 0
+    assert operator.smoother(np.ones(count)) is None
+
+
+def test_bounds_on_what_is_near() -> None:
+    rng = np.random.default_rng(9)
+    points, strengths = _clustered(rng), rng.random(COUNT)
+    for distance in (0.001, 0.1, 10.0):
+        with np.errstate(divide="ignore"):
+            near = inverse_distances(points, points) > 1 / distance
+        np.fill_diagonal(near, True)
+        true = near @ strengths
+        bounds = within(points, strengths, distance)
+        assert (bounds >= true).all()
+
+
+@pytest.fixture(scope="module")
+def contact() -> tuple[ScatteredInfluence, np.ndarray]:
+    """Jittered asperities; W of a Hertzian contact in the middle, at 0.45 of the convex range."""
+    rng = np.random.default_rng(10)
+    points = _jittered(rng) - 31 * 1e-4
+    operator = ScatteredInfluence.assemble(points, SCALE)
+    inside = np.maximum(1 - (points**2).sum(axis=1) / 0.0025**2, 0.0)
+    theta = 0.45 * np.sqrt(inside) * rng.uniform(0.5, 1.0, len(points))
+    # theta = c scale / s with c = W^2 and s half the nearest distance
+    return operator, np.sqrt(theta * operator.separations() / 2 / SCALE)
+
+
+def test_smoother_is_symmetric_and_positive_definite(
+    contact: tuple[ScatteredInfluence, np.ndarray],
+) -> None:
+    operator, root = contact
+    smooth = operator.smoother(root)
+    assert smooth is not None
+    touching = np.flatnonzero(root)[::4]
+    columns = []
+    for i in touching:
+        unit = np.zeros(len(root), dtype=np.float32)
+        unit[i] = 1.0
+        column, _ = smooth(unit)
+        assert (column[root == 0] == 0).all()
+        columns.append(column[touching])
+    inverse = np.array(columns, dtype=np.float64)
+    assert_allclose(inverse, inverse.T, atol=1e-5)
+    assert np.linalg.eigvalsh(inverse + inverse.T)[0] > 0
+
+
+def test_smoother_saves_iterations(contact: tuple[ScatteredInfluence, np.ndarray]) -> None:
+    operator, root = contact
+    smooth = operator.smoother(root)
+    assert smooth is not None
+    rng = np.random.default_rng(11)
+    right = root * (1 + 0.1 * rng.standard_normal(len(root)))
+    plain = _iterations(operator, root, right, lambda residual: residual)
+    smoothed = _iterations(operator, root, right, lambda residual: smooth(residual)[0])
+    assert smoothed <= 0.6 * plain
+    # How much A W r is of a right side, and of noise.
+    noise = np.where(root > 0, rng.standard_normal(len(root)), 0.0)
+    for residual in (right, noise):
+        left = smooth(residual)[1]
+        assert left == pytest.approx(np.linalg.norm(operator.apply(root * residual)), rel=0.5)
+
+
+def _iterations(operator, root, right, smooth) -> int:  # type: ignore[no-untyped-def]
+    """Of conjugate gradients, for (I + W A W) y = right, to 1e-4."""
+    residual, count = right.copy(), 0
+    better = smooth(residual)
+    direction, size = better.copy(), residual @ better
+    while np.linalg.norm(residual) > 1e-4 * np.linalg.norm(right):
+        image = direction + root * operator.apply(root * direction)
+        step = size / (direction @ image)
+        residual = residual - step * image
+        better = smooth(residual)
+        size, last = residual @ better, size
+        direction = better + size / last * direction
+        count += 1
+    return count

@@ -1,0 +1,219 @@
+"""Friction of many asperities: state after state by an operator, against matrices and limits."""
+
+import re
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import MATERIAL, PAPER_APPROACH
+from test_shear import FRICTION, NAMES, pressed
+
+import convexrough as cr
+from convexrough import annulus, hertz
+from convexrough.family import Family
+from convexrough.influence import LatticeInfluence
+from convexrough.shear_certificate import judge_in_turn, judge_states
+from convexrough.stages import compute
+from convexrough.tangential import TangentialProblem
+from convexrough.tangential_newton import by_matrices, solve_in_turn, solve_together
+
+
+@cache
+def refined(influence: Any = None, times: int = 3, heights: float = 3e-7) -> cr.Contact:
+    """The paper's example with asperities `times` as dense and as sharp, of random heights."""
+    asperities = cr.Asperities.hexagonal(
+        spacing=0.0025 / times,
+        tip_radius=0.02 / times,
+        within=0.01,
+        height_std=heights,
+        seed=11,
+    )
+    scene = cr.Scene(1.0, asperities, MATERIAL, FRICTION)
+    return cr.press(scene, approach=PAPER_APPROACH, influence=influence)
+
+
+@pytest.mark.parametrize("fraction", [1e-9, 1e-3, 0.2, 0.5, 0.9, 0.999, 1.0])
+def test_the_same_states_by_matrices_and_by_transforms(fraction: float) -> None:
+    """Forces to 1e-11 of the largest, words, and bounds that cover the difference."""
+    one, other = (
+        cr.shear(contact, force=fraction * FRICTION * contact.load)
+        for contact in (refined("dense"), refined("lattice"))
+    )
+    assert one.certificate.holds
+    assert other.certificate.holds
+    assert (one.status == other.status).all()
+    assert one.displacement == pytest.approx(other.displacement, rel=1e-12)
+    errors = one.certificate.force_errors + other.certificate.force_errors
+    assert (np.abs(one.forces - other.forces) <= errors).all()
+    assert_allclose(one.forces, other.forces, rtol=0, atol=1e-11 * one.forces.max())
+    errors = one.certificate.slip_errors + other.certificate.slip_errors
+    assert (np.abs(one.slips - other.slips) <= errors).all()
+    assert_allclose(one.slips, other.slips, rtol=0, atol=1e-11 * one.displacement)
+    assert errors.max() <= 1e-5 * one.displacement
+
+
+def test_the_same_cycles_by_matrices_and_by_transforms() -> None:
+    dense, lattice = refined("dense"), refined("lattice")
+    fractions = np.array([0.7, 1e-9, 0.3, 1e-4, 0.7, 1.0])  # in no order, one twice
+    ours = cr.cycles(lattice, fractions * FRICTION * lattice.load)
+    theirs = cr.cycles(dense, fractions * FRICTION * dense.load)
+    for one, other in zip(ours, theirs, strict=True):
+        assert one.energy == pytest.approx(other.energy, rel=1e-10)
+        assert one.balance_defect < 1e-11
+        assert (one.status == other.status).all()
+        assert_allclose(one.energies, other.energies, rtol=0, atol=1e-10 * other.energies.max())
+    assert (ours[0].status == "sliding").sum() > (ours[2].status == "sliding").sum() > 0
+    assert (ours[0].status == "open").any()
+
+
+def test_the_same_history_by_matrices_and_by_transforms() -> None:
+    dense, lattice = refined("dense"), refined("lattice")
+    path = np.array([0.5, -0.2, 0.3, -0.5, 0.8, 0.8, 0.0]) * FRICTION * dense.load
+    one, other = cr.history(dense, forces=path), cr.history(lattice, forces=path)
+    assert_allclose(one.forces, other.forces, rtol=0, atol=1e-11 * one.forces.max())
+    assert_allclose(one.displacements, other.displacements, rtol=1e-11)
+    assert_allclose(one.slips, other.slips, rtol=0, atol=1e-11 * one.displacements.max())
+    assert_allclose(one.energy, other.energy, rtol=1e-10)
+    deep = one.asperity_displacements
+    assert_allclose(deep, other.asperity_displacements, rtol=0, atol=1e-11 * deep.max())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_in_turn_and_together(name: str) -> None:
+    """With a matrix, too, states in turn are those found together, each force to 1e-11 of itself.
+
+    From those nearest to them, in whatever order, and down to any shear force.
+    """
+    problem = TangentialProblem.of(pressed(name))
+    assert by_matrices(problem)
+    parts = np.array([0.5, 1e-30, 0.0, 1e-290, 0.9, 1e-12, 0.501, 1.0, 0.2, 1e-5, 0.5])
+    totals = problem.limited(parts * problem.limit)
+    together = solve_together(problem, totals)
+    lines: list[str] = []
+    first = problem.as_on_a_smooth_sphere
+    in_turn = solve_in_turn(problem, totals, first, announce=lines.append)
+    again = solve_in_turn(problem, totals, first, known=in_turn)
+    for states in in_turn, again:
+        assert_allclose(states.increments, together.increments, rtol=1e-11)
+        assert_allclose(states.rises, together.rises, rtol=1e-12)
+        assert_allclose(states.slips, together.slips, atol=1e-12 * together.rises.max())
+        assert_allclose(states.increments.sum(axis=1), totals, rtol=1e-14)
+    assert len(lines) == np.count_nonzero(totals)
+
+
+def test_judged_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A block of states or all of them at once: the same bounds."""
+    contact = refined("lattice")
+    problem = TangentialProblem.of(contact)
+    states = problem.solve(np.linspace(0, 1, 7) * problem.limit)
+    whole = judge_states(problem, contact, states)
+    monkeypatch.setattr("convexrough.shear_certificate.BLOCK", 2 * len(problem))
+    assert len(list(judge_in_turn(problem, contact, states))) == 4
+    for all_at_once, in_blocks in zip(whole, judge_states(problem, contact, states), strict=True):
+        assert_allclose(all_at_once, in_blocks, rtol=1e-12)
+
+
+def test_elastic_shares_to_rounding() -> None:
+    """Through the operator as through a factorisation; (H + A) q is the same everywhere."""
+    by_matrix, by_operator = (TangentialProblem.of(refined(kind)) for kind in ("dense", "lattice"))
+    q = by_operator.elastic
+    level = q / by_operator.stiffest + by_operator.couple(q)
+    assert_allclose(level, level.mean(), rtol=1e-13)
+    assert_allclose(q, by_matrix.elastic, rtol=0, atol=1e-13 * q.max())
+    assert q.sum() == pytest.approx(1.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("fraction", [1e-12, 1e-8, 1e-5])
+def test_small_forces_keep_their_digits(fraction: float) -> None:
+    """As Q -> 0: the displacement is elastic, and the loss of third order with the elastic shares.
+
+    w = (1/6) f''(...) T^3 comes from the local laws alone: sum P ceiling e(u / P), e = 5 t^3 / 81.
+    """
+    family = Family(refined("lattice"))
+    problem, q = family.problem, family.problem.elastic
+    total = fraction * problem.limit
+    states, _ = family.states(np.array([total]))
+    t = q * total / problem.loads
+    expected = 0.6 * float(problem.loads * problem.ceilings @ t**3) * 5 / 81
+    near = 300 * fraction  # the next order, at the least loaded asperities
+    elastic = float(q @ (q / problem.stiffest + problem.couple(q))) * total
+    assert states.rises[0] == pytest.approx(elastic, rel=1e-12 + near)
+    assert family.partial_slip(states).sum() == pytest.approx(expected, rel=1e-10 + 100 * near)
+    assert family.trapezoid_error(states)[0] == pytest.approx(expected, rel=1e-10 + 100 * near)
+
+
+def test_one_state_takes_few_products(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Started from its neighbours a state takes a few steps, and two products to be judged."""
+    counted = {"float32": 0, "float64": 0}
+    apply = LatticeInfluence.apply
+
+    def counting(self: LatticeInfluence, loads: Any) -> Any:
+        counted[loads.dtype.name] += 1
+        return apply(self, loads)
+
+    contact = refined("lattice", times=5, heights=0.0)
+    problem = TangentialProblem.of(contact)
+    judge_states(problem, contact, problem.solve(np.array([0.0])))  # what is known of the loads
+    monkeypatch.setattr(LatticeInfluence, "apply", counting)
+    states = problem.solve(np.linspace(0.05, 0.95, 19) * problem.limit)
+    assert counted["float64"] <= 19 * 6
+    assert counted["float32"] <= 19 * 26
+    counted["float64"] = 0
+    judge_states(problem, contact, states)
+    assert counted["float64"] == 19 * 2
+
+
+def test_every_stage_tells_how_far_it_is() -> None:
+    contact = refined("lattice")
+    lines: list[str] = []
+    compute(
+        contact,
+        shear_at=[0.5],
+        cycle_between=([0.2, 0.4, 1.0], [-0.2, -0.4, -1.0]),
+        history_of=[0.3, -0.3],
+        announce=lines.append,
+    )
+    pattern = r"state (\d+) of (\d+): residual \de[-+]\d\d of the displacement, [\d,]+ sliding"
+    told = [found.groups() for line in lines if (found := re.fullmatch(pattern, line))]
+    assert told[:2] == [("1", "3"), ("2", "3")]
+    assert ("1", "1") in told
+    assert lines.count("certified 3 states") == 1
+    told_before = len(lines)
+    cr.cycle(contact, maximum=0.2 * FRICTION * contact.load).loop(20, announce=lines.append)
+    assert len(lines) > told_before + 9
+    quiet: list[str] = []
+    cr.shear(pressed("paper"), force=1e-8, announce=quiet.append)
+    assert quiet == []
+
+
+def test_onset_of_some() -> None:
+    """In the order asked for; of too many, which ones must be said."""
+    contact, other = refined("lattice", times=5), refined("dense")
+    touching = np.flatnonzero(contact.loads)
+    which = np.array([touching[400], int(np.flatnonzero(contact.loads == 0)[0]), touching[7]])
+    onsets = cr.onset_of_sliding(contact, which=which)
+    assert onsets.shape == (3,)
+    assert np.isnan(onsets[1])
+    state = cr.shear(contact, force=onsets[0] * (1 + 1e-9))
+    assert 0 < state.slips[which[0]] < 1e-8 * state.displacement
+    with pytest.raises(cr.InputError, match=r"which: found \d+ loaded asperities"):
+        cr.onset_of_sliding(contact)
+    all_of_them, some = cr.onset_of_sliding(pressed("rough")), np.array([5, 3, 60])
+    assert_allclose(cr.onset_of_sliding(pressed("rough"), which=some), all_of_them[some])
+    for bad in ([-1], [len(other.scene)], [0.5], ["a"], [[0, 1]]):
+        with pytest.raises(cr.InputError, match="which"):
+            cr.onset_of_sliding(other, which=bad)  # type: ignore[arg-type]
+
+
+def test_the_law_by_the_width_of_the_annulus() -> None:
+    """Closed forms: against the series and exponentials of `hertz`, at any share of friction."""
+    t = np.concatenate(([0.0], np.logspace(-15, -1), np.linspace(0.1, 1, 50)))
+    x = annulus.width_under(t)
+    assert_allclose(annulus.force(x), t, rtol=1e-15)
+    assert_allclose(annulus.width_at(hertz.deflection(t)), x, rtol=1e-14, atol=1e-16)
+    for name in ("deflection", "excess_deflection", "potential", "excess_potential", "loss"):
+        assert_allclose(getattr(annulus, name)(x), getattr(hertz, name)(t), rtol=3e-14)
+    assert (annulus.width_at(np.array([1.0, -1.0, 3.0])) == 1).all()
+    assert (annulus.width_under(-t) == x).all()
