@@ -229,7 +229,9 @@ def _fit(problem: NormalProblem, loads: Array) -> _Fit:
     rounding = off.relative * (np.maximum(displacement, 0.0) + off.single) + problem.offset_errors
     rounding += SUM_ROUNDOFFS * ROUNDOFF * (local + np.abs(displacement) + abs(approach))
     residual = np.where(loads > 0, np.abs(gap) + rounding, np.maximum(rounding - gap, 0.0))
-    return _Fit(displacement, indentation, gap, local, rounding, off.norm, off.single, residual, approach)
+    return _Fit(
+        displacement, indentation, gap, local, rounding, off.norm, off.single, residual, approach
+    )
 
 
 def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box | None:

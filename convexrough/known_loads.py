@@ -18,10 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.certificate import SUM_ROUNDOFFS
+from convexrough.certificate import FIT_FROM, SUM_ROUNDOFFS
 from convexrough.checks import Array, Indices
 from convexrough.contact import Contact
-from convexrough.influence import couple, spread
+from convexrough.influence import couple, fitted_shells, spread
+from convexrough.normal import FITTED
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.tangential import TangentialProblem
 
@@ -62,7 +63,7 @@ class Known(NamedTuple):
             stray_effect=effect,
             loose_effect=couple_above(problem, loose) if loose.any() else loose,
             stiffness=h,
-            convexity_number=float((problem.shells / h).max()) * (1 + SAFETY),
+            convexity_number=_convexity_number(problem, h),
             # Collatz and Wielandt: by the trial vector H^-1/2.
             coupling=float(couple_above(problem, 1.0 / h).max(where=sure, initial=0.0)),
             reach=spread(A, A.scale, 1.0 / h),
@@ -92,6 +93,16 @@ def couple_above(problem: TangentialProblem, values: Array) -> Array:
     return product + problem.influence.rounding(values).of(product)
 
 
+def _convexity_number(problem: TangentialProblem, stiffness: Array) -> float:
+    """theta: H + A >= (1 - theta) H, by the better of two kinds of shells."""
+    theta = float((problem.shells / stiffness).max())
+    if theta > FIT_FROM:
+        radii = (np.pi / 2.0) * problem.influence.scale / stiffness
+        fitted = fitted_shells(problem.influence, radii, FITTED)
+        theta = min(theta, float((fitted / stiffness).max()))
+    return theta * (1 + SAFETY)
+
+
 def _effect(problem: TangentialProblem, contact: Contact, strays: Indices, most: Array) -> Array:
     """(n,) bounds on what loads of up to `most` elsewhere do to the loaded asperities."""
     if len(strays) == 0:
@@ -110,7 +121,7 @@ def _distance(
     P, ceilings, length = problem.loads, problem.ceilings, problem.units.length
     bent = np.cbrt(P / (P + errors))
     h = bent / problem.stiffest
-    theta = float((problem.shells / h).max()) * (1 + SAFETY)
+    theta = _convexity_number(problem, h)
     if not theta < 1:
         return np.inf
     displacement, noise = problem.couple(P), problem.influence.rounding(P)

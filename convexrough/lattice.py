@@ -78,13 +78,16 @@ def _nearest_sites(points: Array, basis: Array) -> Sites:
 
 
 def _shortest(points: Array) -> Array | None:
-    """Two short vectors (2, 2) among the points, reduced (Lagrange and Gauss); None if on a line.
+    """The two shortest vectors (2, 2) between points near the origin; None if all are on a line.
 
-    Where the points are on a lattice and two neighbours of the origin are not missing, its basis.
+    Of points on a lattice, of which not too many are missing, its reduced basis (Lagrange, Gauss).
     """
     squares = (points**2).sum(axis=1)
-    near = np.argsort(squares) if len(points) < 64 else np.argpartition(squares, 63)[:64]
-    near = near[np.argsort(squares[near])]
+    few = min(len(points), 64)
+    nearby = points[np.argpartition(squares, few - 1)[:few]]
+    points = (nearby[:, None] - nearby).reshape(-1, 2)
+    squares = (points**2).sum(axis=1)
+    near = np.argsort(squares)
     near = near[squares[near] > 0]
     if len(near) < 2:
         return None

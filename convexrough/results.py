@@ -212,5 +212,7 @@ def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
     with beside(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows(zip(*(array.tolist() for array in arrays), strict=True))  # repr of each float
+        writer.writerows(
+            zip(*(array.tolist() for array in arrays), strict=True)
+        )  # repr of each float
     return path

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 from convexrough import hertz
 from convexrough.errors import FileError, InputError, SceneFileError
-from convexrough.io import read_summits, read_text
 from convexrough.influence import Kind
+from convexrough.io import read_summits, read_text
 from convexrough.load_control import highest_approach
 from convexrough.patterns import CUT
 from convexrough.scene import Asperities, Material, Scene, largest_tip_radius, reach

@@ -22,8 +22,8 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from convexrough import solvers
-from convexrough.influence import KINDS
 from convexrough.checks import nearest
+from convexrough.influence import KINDS
 
 #: What `[solver] name` may say.
 SOLVERS: dict[str, Callable[[], solvers.Solver]] = {

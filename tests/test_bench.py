@@ -376,6 +376,9 @@ def test_figures() -> None:
             box = text.get_window_extent()
             assert figure.bbox.padded(1).contains(box.x0, box.y0), text
             assert figure.bbox.padded(1).contains(box.x1, box.y1), text
+    work = figures["work-precision"]
+    below = next(each for each in work.findobj(Text) if each.get_text().startswith("largest"))
+    assert not below.get_window_extent().overlaps(work.legends[0].get_window_extent())
     many = replace(tiny(), panels=tiny().panels * 5)
     labels = {text.get_text() for text in words(bench_figures(many)["work-precision"])}
     assert {"newton (default)", "conic", "bristles", "frontier", "seconds"} <= labels

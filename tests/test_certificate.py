@@ -24,7 +24,7 @@ from scenes import (
 )
 
 import convexrough as cr
-from convexrough.certificate import _convex_margin, judge
+from convexrough.certificate import _convex_margin, _find_box, judge
 from convexrough.influence import Influence, Kind, Rounding
 from convexrough.normal import NormalProblem
 
@@ -214,6 +214,40 @@ def test_scopes() -> None:
         assert pressed(0.0012, 0.03, kind).scope == "local"
         assert pressed(0.0012, 0.2, kind).scope == "local"
         assert pressed(0.0025, 5.0, kind).scope == "none"
+
+
+@pytest.mark.parametrize("operator", OPERATORS)
+def test_shells_that_fit_the_contacts(operator: Kind) -> None:
+    """Where neighbours differ in size, half the distance to each would prove nothing."""
+    tips = dict(tip_radius=0.08 / 3, tip_radius_cv=0.6, height_std=2e-6, seed=4)
+    lattice = cr.Asperities.hexagonal(spacing=0.0025 / 3, within=0.01, **tips)
+    scene = cr.Scene(1.0, lattice, MATERIAL)
+    contact = cr.press(scene, approach=PAPER_APPROACH, influence=operator)
+    problem = NormalProblem.assemble(scene, approach=PAPER_APPROACH, influence=operator)
+    loads = contact.loads[problem.candidates] / problem.units.force
+    assert problem.convexity_number(loads) > 1
+    assert contact.certificate.scope == "local"
+    assert contact.certificate.holds
+
+
+@pytest.mark.parametrize("operator", OPERATORS)
+@pytest.mark.parametrize("seed", range(20))
+def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
+    """For any loads: also of a few large contacts among many asperities that are open."""
+    rng = np.random.default_rng(seed)
+    lattice = cr.Asperities.square(spacing=1e-3, tip_radius=0.05, within=6e-3)
+    scene = cr.Scene(1e3, lattice, MATERIAL)
+    touching = rng.choice(len(scene), 2 + seed // 5, replace=False)
+    radii = np.zeros(len(scene))
+    radii[touching] = 1e-3 * rng.uniform(0.6, 0.75, len(touching))
+    problem = NormalProblem.assemble(scene, approach=1e-3, influence=operator)
+    loads = 4 / 3 * radii**3 / scene.relative_radii / problem.units.force
+    box = _find_box(problem, loads, problem.influence.apply(loads))
+    if box is None:
+        return
+    root = 1 / np.sqrt(box.stiffness)
+    hessian = np.eye(len(scene)) + root[:, None] * problem.influence.matrix * root
+    assert np.linalg.eigvalsh(hessian)[0] >= 1 - box.convexity_number - 1e-12
 
 
 @settings(max_examples=100, deadline=None)

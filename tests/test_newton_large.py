@@ -22,13 +22,12 @@ Array = NDArray[np.float64]
 
 
 def scene(
-    k: float, *, pattern: str = "hexagonal", within: float = 0.01, **options: Any
+    k: float, *, pattern: str = "hexagonal", geometry: Any = "summit", **rough: Any
 ) -> cr.Scene:
     """The paper's sphere on a lattice k times finer, of tips k times smaller."""
-    make = {"hexagonal": cr.Asperities.hexagonal, "square": cr.Asperities.square}[pattern]
-    geometry = options.pop("geometry", "summit")
-    tips = {"tip_radius": 0.02 / k, **options}
-    asperities = make(spacing=0.0025 / k, within=within, **tips)
+    make = cr.Asperities.hexagonal if pattern == "hexagonal" else cr.Asperities.square
+    options = {"within": 0.01, **rough}
+    asperities = make(spacing=0.0025 / k, tip_radius=0.02 / k, **options)
     return cr.Scene(1.0, asperities, MATERIAL, geometry=geometry)
 
 
@@ -159,13 +158,13 @@ def dense_answer(name: str) -> cr.Contact:
     ],
 )
 def test_few_products(options: Any, steps: int, products: int, control: str) -> None:
-    """At some 36,000 asperities, and no more of them than at 2,300."""
+    """At some 36,000 asperities, and at most twice those at 2,100."""
     spent = []
     for k in (6, 25):
         pressed = scene(k, **options)
         contact = cr.press(pressed, approach=PAPER_APPROACH)
         assert_solved(contact, steps=steps)
-        assert (contact.loads > 0).sum() > 0.4 * len(pressed)
+        assert (contact.loads > 0).sum() > 0.25 * len(pressed)
         prescribed: Any = {control: getattr(contact, control)}
         problem = NormalProblem.assemble(pressed, **prescribed, influence="lattice")
         assert residual(problem, contact) <= 1e-12
@@ -179,7 +178,7 @@ def test_few_products(options: Any, steps: int, products: int, control: str) -> 
         assert counts["float32"] > 0
         spent.append(sum(counts.values()))
     assert max(spent) <= products
-    assert spent[1] <= 1.5 * spent[0] + 4
+    assert spent[1] <= 2 * spent[0] + 4
 
 
 @pytest.mark.parametrize("k", [6, 12, 25])
@@ -264,34 +263,54 @@ def test_approaches_of_any_size(approach: float, steps: int) -> None:
         assert_allclose(again.loads, contact.loads, rtol=0, atol=1e-9 * contact.loads.max())
 
 
-@pytest.mark.parametrize("height", [2e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("above", [1e-7, 4e-6])
 @pytest.mark.parametrize("control", ["approach", "load"])
-def test_a_far_tall_asperity_is_found(control: str, height: float) -> None:
-    """Well outside the contact, where no mean displacement says that it touches; and a pair."""
-    whole = scene(8, within=0.02)
-    distances = whole.asperities.distances
-    far = int(np.argmin(np.abs(distances - 0.018)))
+def test_a_far_tall_asperity_is_found(control: str, above: float) -> None:
+    """Well outside the contact, where the surface hardly sinks."""
+    whole = scene(6, within=0.02)
+    far = int(np.argmin(np.abs(whole.asperities.distances - 0.018)))
     raised = np.zeros(len(whole))
-    raised[far] = whole.drops[far] - PAPER_APPROACH + min(height, 1e-3) * 2e-3
+    sinks = 4 / 3 * PAPER_APPROACH**1.5 / (np.pi * 0.018)
+    raised[far] = whole.drops[far] - PAPER_APPROACH + sinks + above
     pressed = edited(whole, raised=raised)
-    contact = cr.press(pressed, approach=PAPER_APPROACH, influence="dense")
-    assert contact.candidates > FEW
-    prescribed: Any = {control: getattr(contact, control)}
+    known = cr.press(pressed, approach=PAPER_APPROACH, influence="dense")
+    assert known.candidates > FEW
+    assert known.status[far] == "contact"
+    prescribed: Any = {control: getattr(known, control)}
     found = cr.press(pressed, **prescribed, influence="lattice")
-    assert (found.status == contact.status).all()
-    assert_allclose(found.loads, contact.loads, rtol=0, atol=1e-12 * contact.loads.max())
+    assert (found.status == known.status).all()
+    assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
 
-def test_those_left_out_at_first_are_found() -> None:
-    """Ridges that the rings of the start do not know: the neighbourhood of the contact grows."""
-    whole = scene(8)
-    x = whole.asperities.positions[:, 0]
-    pressed = edited(whole, raised=np.where(x > 0.004, 4e-5, 0.0))
-    lines: list[str] = []
-    contact = cr.press(pressed, approach=2e-5, influence="lattice", announce=lines.append)
-    dense = cr.press(pressed, approach=2e-5, influence="dense")
-    assert_allclose(contact.loads, dense.loads, rtol=0, atol=1e-12 * dense.loads.max())
-    assert (contact.loads[x > 0.004] > 0).sum() > 100
+class Watched(Counted):
+    """Records how many asperities the iteration is about."""
+
+    def among(self, which: Any) -> Counted:
+        self.counts[f"part {len(self.counts)}"] = len(which)
+        return super().among(which)
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_those_left_out_at_first_are_found(control: str) -> None:
+    """The contact lies beside the axis, and across from it there are peaks. In rings about the axis
+    they are alike, so the start takes the surface to sink where it does not."""
+    whole = scene(7)
+    x, y = whole.asperities.positions.T
+    peaks = (np.hypot(x + 0.006, y) < 0.003) & (np.arange(len(whole)) % 20 == 0)
+    level = np.where(peaks, -3.45e-5, -((x - 0.006) ** 2 + y**2) / 2)
+    pressed = edited(whole, raised=level + whole.drops)
+    known = cr.press(pressed, approach=5e-5, influence="dense")
+    assert known.certificate.holds
+    assert (known.status[peaks] == "contact").any()
+    prescribed: Any = {control: getattr(known, control)}
+    problem = NormalProblem.assemble(pressed, **prescribed, influence="lattice")
+    watched: Any = Watched(problem.influence, {})
+    solution = Newton().solve(replace(problem, influence=watched))
+    loads = problem.to_scene(solution.loads) * problem.units.force
+    assert_allclose(loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
+    parts = [count for part, count in watched.counts.items() if part.startswith("part")]
+    assert len(parts) > 1
+    assert parts[0] < parts[-1] < len(problem)
 
 
 @settings(max_examples=6, deadline=None)

@@ -332,6 +332,51 @@ def test_doubt_about_the_loads_is_counted(
     assert off(state.displacement, truth.displacement) <= certificate.displacement_error
 
 
+@pytest.mark.parametrize("kind", ["approach", "load", "random", "one", "fringe"])
+@pytest.mark.parametrize("fraction", [1e-6, 0.1, 0.3, 0.6, 0.95])
+@pytest.mark.parametrize("influence", KINDS)
+def test_all_that_wrong_loads_can_do_is_counted(influence: Any, fraction: float, kind: str) -> None:
+    """A certificate that leaves the loads no room beyond what they are off by."""
+    contact = pressed("rough", influence, "load" if kind == "load" else "approach")
+    off_by, loaded, approach = 1e-6, contact.loads > 0, contact.approach
+    if kind in ("approach", "load"):
+        near = cr.press(contact.scene, approach=approach * (1 + off_by), influence=influence)
+        loads, approach = near.loads, near.approach
+    else:
+        size = np.random.default_rng(5).choice([-1, 1], len(loaded)).astype(float)
+        if kind != "random":
+            order = np.argsort(np.where(loaded, contact.loads, np.inf))
+            chosen = order[:6] if kind == "fringe" else order[int(loaded.sum()) - 1 :]
+            size = np.isin(np.arange(len(loaded)), chosen).astype(float)
+        loads = contact.loads * (1 + off_by * size)
+    wrong = replace(
+        contact,
+        loads=loads,
+        load=float(loads.sum()),
+        contact_radii=hertz.contact_radius(loads, 1.0, contact.scene.relative_radii),
+        certificate=replace(
+            contact.certificate,
+            load_errors=np.abs(loads - contact.loads) * (1 + 1e-9) + 1e-14 * contact.loads,
+            approach=approach if kind == "load" else contact.approach,
+            approach_error=abs(approach - contact.approach) if kind == "load" else 0.0,
+        ),
+    )
+    problem = TangentialProblem.of(wrong)
+    known = Known.of(problem, wrong)
+    missed = (loads - contact.loads)[problem.touching] / problem.units.force
+    distance = np.sqrt(known.stiffness @ missed**2)
+    assert distance <= known.distance * (1 + 1e-9)
+    assert known.distance < 2 * distance
+    force = fraction * FRICTION * contact.load
+    state, truth = cr.shear(wrong, force=force), cr.shear(contact, force=force)
+    proof = state.certificate
+    assert (np.abs(state.forces - truth.forces) <= proof.force_errors).all()
+    assert (np.abs(state.slips - truth.slips) <= proof.slip_errors).all()
+    assert abs(state.displacement - truth.displacement) <= proof.displacement_error
+    assert proof.force_errors.max() < 1e-3 * state.forces.max()
+    assert (state.status == truth.status).all()
+
+
 @pytest.mark.parametrize("ulps", [0, 2, -2, 8, -8])
 @pytest.mark.parametrize("fraction", [1e-12, 1e-9, 0.25, 0.9])
 def test_an_asperity_that_may_or_may_not_touch(fraction: float, ulps: int) -> None:

@@ -1,6 +1,7 @@
 """Friction of many asperities: state after state by an operator, against matrices and limits."""
 
 import re
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -125,6 +126,24 @@ def test_elastic_shares_to_rounding() -> None:
     assert q.sum() == pytest.approx(1.0, rel=1e-14)
 
 
+@pytest.mark.parametrize("fraction", [1e-3, 0.5])
+def test_one_wrong_load_among_many_is_counted(fraction: float) -> None:
+    """What it does to its neighbours is in the bounds, as far as its certificate lets it be off."""
+    contact = refined("lattice", times=5)
+    off = 1e-6 * contact.loads * (np.arange(len(contact.loads)) == np.argmax(contact.loads))
+    proof = replace(contact.certificate, load_errors=off + 1e-14 * contact.loads)
+    loads = contact.loads + off
+    wrong = replace(contact, loads=loads, load=float(loads.sum()), certificate=proof)
+    force = fraction * FRICTION * contact.load
+    state, truth = cr.shear(wrong, force=force), cr.shear(contact, force=force)
+    difference = np.abs(state.forces - truth.forces)
+    assert (difference <= state.certificate.force_errors).all()
+    assert np.sort(difference)[-7] > 0.01 * difference.max()  # the neighbours feel it
+    error = state.certificate.displacement_error
+    assert abs(state.displacement - truth.displacement) <= error
+    assert state.certificate.holds
+
+
 @pytest.mark.parametrize("fraction", [1e-12, 1e-8, 1e-5])
 def test_small_forces_keep_their_digits(fraction: float) -> None:
     """As Q -> 0: the displacement is elastic, and the loss of third order with the elastic shares.
@@ -158,8 +177,8 @@ def test_one_state_takes_few_products(monkeypatch: pytest.MonkeyPatch) -> None:
     judge_states(problem, contact, problem.solve(np.array([0.0])))  # what is known of the loads
     monkeypatch.setattr(LatticeInfluence, "apply", counting)
     states = problem.solve(np.linspace(0.05, 0.95, 19) * problem.limit)
-    assert counted["float64"] <= 19 * 6
-    assert counted["float32"] <= 19 * 26
+    assert counted["float64"] <= 19 * 4.5
+    assert counted["float32"] <= 19 * 25
     counted["float64"] = 0
     judge_states(problem, contact, states)
     assert counted["float64"] == 19 * 2

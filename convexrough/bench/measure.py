@@ -224,9 +224,8 @@ def _measure_cost(family: str, scene: Scene, patience: float) -> CostRow:
     memory = MemoryRise()
     contact, seconds = timed(lambda: press(scene, approach=APPROACH))
     risen = memory.risen()
-    spent = seconds
-    repeats = 1
-    while spent < patience and repeats < MOST_REPEATS:
+    spent, repeats = seconds, 1
+    while repeats < 3 or (spent < patience and repeats < MOST_REPEATS):
         _, again = timed(lambda: press(scene, approach=APPROACH))
         seconds, spent, repeats = min(seconds, again), spent + again, repeats + 1
     row = measure(scene, Attempt("newton", "", Newton(), growth=None), None, patience=0.0)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from convexrough.checks import Array, Indices
 from convexrough.roundoff import SAFETY
-from convexrough.scene import nearest_distances
 
 #: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points: differences 1,
 #: squares 3, their sum 4, its root 3, then a product with pi and a division.
@@ -161,10 +160,3 @@ def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
     with np.errstate(divide="ignore"):
         values: Array = influence.scale / s
     return values
-
-
-def separations(points: Array, point_error: float = 0.0) -> Array:
-    """(n,) [length] distances to the nearest neighbour, less what errors of the points can hide."""
-    if len(points) < 2:
-        return np.full(len(points), np.inf)
-    return np.maximum(nearest_distances(points) - 3.0 * point_error, 0.0)

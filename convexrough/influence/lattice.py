@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from convexrough.checks import Array, Indices
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.interface import Coupling, Kind, Rounding, Smoother
+from convexrough.influence.neighbours import crowding, separations
 from convexrough.influence.smoother import block_smoother
 from convexrough.lattice import Lattice, Sites
 from convexrough.roundoff import ROUNDOFF
@@ -32,6 +33,9 @@ PASS_ROUNDOFFS = {2: 6, 3: 13, 5: 18, 7: 23, 11: 35}
 
 #: Transforms of more numbers than this use every core.
 PARALLEL = 2**18
+
+#: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree.
+FILLED = 0.2
 
 #: Columns transformed at a time: what a cache holds.
 COLUMNS = 256
@@ -173,13 +177,14 @@ class LatticeCoupling:
 
     def falloff(self, strengths: Array, power: int) -> Array:
         """In single precision, with a bound on its rounding added."""
-        kernel = self.box.kernel(power, np.float32)
+        nearest = self._nearest
+        kernel = Box(self.box.shape, self.box.basis / nearest).kernel(power, np.float32)
         largest = float(strengths.max(initial=0.0)) or 1.0
         shares = (strengths / largest).astype(np.float32)
         total = self._convolve(shares, kernel.spectrum).astype(np.float64)
         total += self.box.bound_each(kernel, 2.0**-24) * float(np.linalg.norm(shares))
-        stretched = 1.0 / (1.0 - min(self.blur / self._nearest, 0.5)) ** power
-        return np.maximum(total, 0.0) * (largest * stretched * (1.0 + 1e-6))
+        stretched = 1.0 / (1.0 - min(self.blur / nearest, 0.5)) ** power
+        return np.maximum(total, 0.0) * (largest * stretched * (1.0 + 1e-6) / nearest**power)
 
     @cached_property
     def _nearest(self) -> float:
@@ -263,14 +268,21 @@ class LatticeInfluence(LatticeCoupling):
         n = len(self)
         return LatticeCoupling(box, index[:n], index[n:], self.scale, self.blur)
 
+    @property
+    def _filled(self) -> bool:
+        """Whether a neighbouring site is mostly taken."""
+        return len(self) > FILLED * self.box.shape[0] * self.box.shape[1]
+
     def separations(self) -> Array:
+        if not self._filled:
+            return separations(self.points, self.point_error)
         nearest = self.lattice.spacing - self.blur if len(self) > 1 else np.inf
         return np.full(len(self), max(nearest, 0.0))
 
     def crowding(self, radii: Array) -> float:
         """Pairs in the order of their distance, until none further apart can be more crowded."""
-        if len(self) < 2:
-            return 0.0
+        if not self._filled:
+            return crowding(self.points, radii)
         field = np.full(self.box.shape, -np.inf)
         field.ravel()[self.sources] = radii
         most, worst = 2.0 * float(radii.max()), 0.0

@@ -14,8 +14,9 @@ import numpy as np
 
 from convexrough.checks import Array, Indices
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
-from convexrough.influence.interface import Coupling, Kind, Rounding, Smoother, separations
+from convexrough.influence.interface import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.mesh import Product
+from convexrough.influence.neighbours import crowding, separations
 from convexrough.influence.plan import Plan
 
 #: Error of a product, relative to its own size, that is left to interpolation.
@@ -26,9 +27,6 @@ SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
 
 #: Up to so many pairs (asperity, other point) are coupled one by one.
 FEW_PAIRS = 10**8
-
-#: Asperities looked at together for the most crowded pair.
-BATCH = 256
 
 #: Nodes of the coarse mesh that a smoother solves on, about; and too few touching points for one.
 COARSE, FEW_TOUCHING = 1000, 200
@@ -112,27 +110,7 @@ class ScatteredInfluence:
         return separations(self.points, self.point_error)
 
     def crowding(self, radii: Array) -> float:
-        """Each asperity with those smaller and near enough to beat the nearest neighbours."""
-        from scipy.spatial import cKDTree
-
-        if len(self) < 2:
-            return 0.0
-        tree = cKDTree(self.points)
-        found = tree.query(self.points, k=2)
-        distances, nearest = (np.asarray(each)[:, 1] for each in found)
-        worst = float(((radii + radii[nearest]) / distances).max())
-        if worst == 0:
-            return 0.0
-        order = np.argsort(-radii)
-        for start in range(0, len(self), BATCH):
-            some = order[start : start + BATCH]
-            some = some[2.0 * radii[some] > worst * distances[some]]
-            around = tree.query_ball_point(self.points[some], 2.0 * radii[some] / worst)
-            for i, others in zip(some.tolist(), around, strict=True):
-                j = np.array([k for k in others if k != i], dtype=np.intp)
-                apart = np.hypot(*(self.points[j] - self.points[i]).T)
-                worst = max(worst, float(((radii[i] + radii[j]) / apart).max(initial=0.0)))
-        return worst
+        return crowding(self.points, radii)
 
     def smoother(self, root: Array) -> Smoother | None:
         return coarse_inverse(self.points, self.scale, root)

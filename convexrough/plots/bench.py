@@ -76,7 +76,7 @@ def work_figure(panels: Sequence[Panel]) -> Figure:
     figure.legend(
         [handles[name] for name in order],
         names,
-        loc="outside lower center",
+        loc="outside upper center",
         ncols=3,
         fontsize=TICK,
         frameon=False,

@@ -25,7 +25,18 @@ OWN_SHARE = 1.10
 
 
 def mean_field_indentation(problem: NormalProblem) -> Array:
-    """(n,) indentations of the candidates, negative where open (own units)."""
+    """(n,) indentations of the candidates, negative where open (own units).
+
+    Where the rings' displacements are not found, those of a smooth sphere: any start will do.
+    """
+    try:
+        start = _mean_field(problem)
+    except np.linalg.LinAlgError:
+        return problem.smooth_indentation()
+    return start if np.isfinite(start).all() else problem.smooth_indentation()
+
+
+def _mean_field(problem: NormalProblem) -> Array:
     every = max(1, len(problem) // SAMPLE)
     rings = max(4, min(RINGS, len(problem) // LEAST))
     squares = problem.scene.asperities.distances[problem.candidates] ** 2

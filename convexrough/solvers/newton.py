@@ -95,7 +95,8 @@ class Newton:
                 return Solution(loads, state.approach, iterations, residual)
             indentation = -gap
             indentation[near] = state.indentation
-            near = np.flatnonzero(indentation > -MARGIN * highest)
+            touched[near] = True  # none leaves, so that this ends
+            near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
     def _iterate(
         self,
