@@ -27,8 +27,8 @@ from convexrough.influence import DenseInfluence, Influence, Smoother
 #: Up to so many touching asperities, with a matrix at hand, a Cholesky factor is cheapest.
 FACTORISED = 1500
 
-#: What conjugate gradients in single precision can still reduce the residual to.
-SINGLE_LIMIT = 2e-6
+#: What conjugate gradients in single and double precision can still reduce the residual to.
+SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 
 MOST_ITERATIONS = 500
 
@@ -125,7 +125,8 @@ def _iterate(
     """
     single = influence.single
     dtype: Any = np.float32 if single else np.float64
-    tolerance = max(tolerance, SINGLE_LIMIT if single else 1e-13)
+    limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
+    tolerance = max(tolerance, limit)
     size = float(np.abs(defect).max()) or 1.0
     w: Values = root.astype(dtype)
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
@@ -150,10 +151,10 @@ def _iterate(
     y_displacement = np.zeros_like(w)  # A W y
     z, left = smoothed()
     p = z.copy()
-    size_of = float(residual @ z)
+    first = size_of = float(residual @ z)
     enough = tolerance * float(np.linalg.norm(defect)) / size
     products = 0
-    while left > enough and products < MOST_ITERATIONS:
+    while left > enough and size_of > limit**2 * first and products < MOST_ITERATIONS:
         q = influence.apply(w * p)
         products += 1
         bent = diagonal * p + w * q

@@ -19,7 +19,8 @@ them. The residual of both is that of the contact law,
 with the gaps g computed from the loads by the package's own operator, and the approach that fits
 them best. tamaas stops by a criterion of its own (pressure times gap, over both their sizes), so
 its tolerance is lowered tenfold until the residual is at most 1e-8, and only runs with the last
-tolerance count. Newton's method is not stopped early: it ends at rounding, and its residual is printed.
+tolerance count. Newton's method is not stopped early: it ends at rounding, and its residual is
+printed.
 """
 
 import os

@@ -13,7 +13,7 @@ import convexrough as cr
 from convexrough.influence import Kind, couple
 
 #: The ways of coupling that the tests of the dense path run through, where a scene allows them.
-OPERATORS: tuple[Kind, ...] = ("dense", "lattice")
+OPERATORS: tuple[Kind, ...] = ("dense", "lattice", "scattered")
 
 MATERIAL = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
 STEEL = cr.Material.from_youngs(210e9, 0.3)

@@ -354,7 +354,13 @@ LATTICE = 'pattern = "hexagonal"\nspacing = {}\ntip_radius = {}'
         (scene_text()[:-30], "a.toml: "),
         ("[sphere]\nradius = 1.", "line 2, column"),
         (scene_text(LATTICE.format(1e-9, 1)), "spacing: found 3.63e+14 asperities"),
-        (scene_text(LATTICE.format(0.0025, 1), "approach = 1.0"), "asperities that could touch"),
+        (
+            scene_text(
+                LATTICE.format(0.0025, 1), "approach = 1.0", more='[solver]\ninfluence = "dense"'
+            ),
+            "asperities that could touch",
+        ),
+        (scene_text(more='[solver]\ninfluence = "fft"'), "[solver] influence: found 'fft'"),
     ],
 )
 def test_bad_scenes(command: Any, tmp_path: Path, scene: str, expected: str) -> None:

@@ -14,6 +14,7 @@ from scenes import MATERIAL, PAPER_APPROACH, STEEL
 
 import convexrough as cr
 from convexrough import hertz
+from convexrough.influence import Kind
 from convexrough.normal import NormalProblem
 from convexrough.solvers import Newton
 from convexrough.solvers.newton import FEW
@@ -74,6 +75,16 @@ SCENES: dict[str, tuple[cr.Scene, float]] = {
 }
 
 
+def scattered(whole: cr.Scene, by: float, seed: int) -> cr.Scene:
+    """Off the lattice, each asperity by at most this."""
+    rng = np.random.default_rng(seed)
+    return edited(whole, shift=rng.uniform(-by, by, (len(whole), 2)))
+
+
+SCENES["scattered"] = (scattered(scene(7), 6e-5, 6), PAPER_APPROACH)
+SCENES["scattered heights"] = (scattered(scene(7, height_std=1e-6, seed=2), 5e-5, 6), 5e-5)
+
+
 class Counted:
     """An operator that counts its products, those of parts included."""
 
@@ -95,10 +106,10 @@ class Counted:
         return self.influence.apply(loads)
 
 
-def assert_solved(contact: cr.Contact, *, steps: int = 12) -> None:
+def assert_solved(contact: cr.Contact, kind: Kind = "lattice", *, steps: int = 12) -> None:
     """Proved, by one who knows no solver, and to many digits."""
     certificate = contact.certificate
-    assert contact.influence == "lattice"
+    assert contact.influence == kind
     assert certificate.scope in ("global", "local")
     assert certificate.holds
     assert certificate.load_error <= 1e-8 * contact.loads.max()
@@ -113,15 +124,20 @@ def residual(problem: NormalProblem, contact: cr.Contact) -> float:
 
 
 @pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize("kind", ["lattice", "scattered"])
 @pytest.mark.parametrize("name", SCENES)
-def test_as_through_the_matrix(name: str, control: str) -> None:
+def test_as_through_the_matrix(name: str, kind: Kind, control: str) -> None:
     """Loads agree within what is proved of each, and to 1e-12; words are the same."""
     pressed, approach = SCENES[name]
+    if kind == "lattice" and pressed.lattice is None:
+        with pytest.raises(cr.InputError, match="lattice"):
+            cr.press(pressed, approach=approach, influence=kind)
+        return
     dense = dense_answer(name)
     prescribed: Any = {control: {"approach": approach, "load": dense.load}[control]}
-    contact = cr.press(pressed, **prescribed, influence="lattice")
+    contact = cr.press(pressed, **prescribed, influence=kind)
     assert 1500 < contact.candidates < 5000
-    assert_solved(contact)
+    assert_solved(contact, kind)
     assert dense.certificate.holds
     apart = np.abs(contact.loads - dense.loads)
     assert apart.max() <= 1e-12 * dense.loads.max()
@@ -131,7 +147,7 @@ def test_as_through_the_matrix(name: str, control: str) -> None:
     assert (contact.status == dense.status).all()
     assert contact.approach == pytest.approx(approach, rel=1e-12)
     assert contact.crowding == pytest.approx(dense.crowding, rel=1e-9)
-    assert contact.model_error == pytest.approx(dense.model_error, rel=0.01)
+    assert contact.model_error == pytest.approx(dense.model_error, rel=0.03)
     problem = NormalProblem.assemble(pressed, approach=approach, influence="dense")
     assert residual(problem, contact) <= 1e-12
 

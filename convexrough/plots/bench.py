@@ -160,7 +160,7 @@ def cost_figure(bench: Bench) -> Figure:
         ends = sizes[[0, -1]]
         low = min(row.seconds / row.asperities for row in answered)
         axes.plot(ends, 0.6 * low * ends, ":", color="0.3", lw=1.0, label="slope 1")
-        axes.legend(fontsize=TICK, frameon=False, loc="upper left")
+        axes.legend(fontsize=TICK, frameon=False, loc="lower right")
         axes.set_xlim(10.0 ** np.floor(np.log10(ends[0])), 10.0 ** np.ceil(np.log10(ends[1])))
     label(axes, "asperities", "seconds for a press, certified")
     axes.xaxis.set_minor_formatter(NullFormatter())

@@ -39,7 +39,7 @@ MARGIN = 0.1
 MOST_LEFT = 0.1
 
 #: A residual is negligible at this part of the rounding that the certificate allows for.
-NEGLIGIBLE = 0.1
+NEGLIGIBLE = 0.01
 
 
 class _State(NamedTuple):
