@@ -11,9 +11,11 @@ subtracted from another: each keeps its relative accuracy down to x = 0. Sliding
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from convexrough.hertz import Number
+Number = Any  # float or float64 array; the result has the shape of the arguments
 
 
 def width_at(deflection: Number) -> Number:

@@ -7,12 +7,12 @@ Source: Johnson, Contact Mechanics (1985), chapters 3 and 4.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import factorial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from convexrough import annulus
 
 Number = Any  # float or float64 array; the result has the shape of the arguments
 
@@ -74,7 +74,8 @@ def less_sine(angle: Number) -> Number:
 # The tangential law of one sphere (Cattaneo-Mindlin) at constant normal load P. With t = Q / (f P)
 # and the largest deflection ceiling = k P^(2/3), everything is a function of t alone, times
 # c_t f ceiling (displacements) or c_t f^2 P ceiling (energies); c_t is `mindlin_ratio`. Each
-# function below is accurate relative to its own value, also where that is of third order in t.
+# function below is accurate relative to its own value, also where that is of third order in t:
+# they are the positive polynomials of `annulus`.
 
 
 def mindlin_ratio(poisson_ratio: Number) -> Number:
@@ -84,33 +85,17 @@ def mindlin_ratio(poisson_ratio: Number) -> Number:
 
 def deflection(t: Number) -> Number:
     """phi(t) = 1 - (1 - t)^(2/3), of either sign: phi(-t) = -phi(t)."""
-    size = np.minimum(np.abs(t), 1.0)
-    with np.errstate(divide="ignore"):
-        return np.copysign(np.expm1((2.0 / 3.0) * np.log1p(-size)), t)
+    return np.copysign(annulus.deflection(annulus.width_under(t)), t)
 
 
 def force(deflection: Number) -> Number:
     """t = 1 - (1 - phi)^(3/2), the inverse of `deflection`; all that friction can bear beyond 1."""
-    size = np.minimum(np.abs(deflection), 1.0)
-    with np.errstate(divide="ignore"):
-        return np.copysign(np.expm1(1.5 * np.log1p(-size)), deflection)
-
-
-def excess_deflection(t: Number) -> Number:
-    """phi(t) - (2/3) t for 0 <= t <= 1: what partial slip adds to the elastic deflection."""
-    return _by_series(t, lambda t: deflection(t) - (2.0 / 3.0) * t, -_BINOMIAL[2 / 3], first=2)
+    return np.copysign(annulus.force(annulus.width_at(deflection)), deflection)
 
 
 def potential(t: Number) -> Number:
     """Integral of phi from 0 to t:  t - (3/5) [1 - (1 - t)^(5/3)]."""
-    coefficients = 0.6 * _BINOMIAL[5 / 3]
-    return _by_series(np.abs(t), lambda t: t - 0.6 * _lost(t), coefficients, first=2)
-
-
-def excess_potential(t: Number) -> Number:
-    """Integral of phi(t) - (2/3) t:  `potential(t)` - t^2 / 3."""
-    coefficients = 0.6 * _BINOMIAL[5 / 3]
-    return _by_series(t, lambda t: potential(t) - t**2 / 3.0, coefficients, first=3)
+    return annulus.potential(annulus.width_under(t))
 
 
 def loss(t: Number) -> Number:
@@ -119,38 +104,4 @@ def loss(t: Number) -> Number:
     A cycle between +-Q costs (9 (2 - nu) f^2 P^2 / (5 G a)) e(Q / (f P)), which is
     (24/5) c_t f^2 P ceiling e: equation (16) of the source, for both bodies.
     """
-    shifted = np.concatenate(([0.0], _BINOMIAL[2 / 3][:-1]))
-    coefficients = -_BINOMIAL[5 / 3] - 5.0 / 6.0 * shifted
-    return _by_series(
-        t,
-        lambda t: _lost(t) - (5.0 / 6.0) * t * (2.0 - deflection(t)),
-        coefficients,
-        first=3,
-    )
-
-
-def _lost(t: Number) -> Number:
-    """1 - (1 - t)^(5/3)."""
-    with np.errstate(divide="ignore"):
-        return -np.expm1((5.0 / 3.0) * np.log1p(-np.minimum(t, 1.0)))
-
-
-def _binomial(power: float, terms: int = 56) -> NDArray[np.float64]:
-    """Coefficients of (1 - t)^power in powers of t."""
-    m = np.arange(1, terms)
-    return np.concatenate(([1.0], np.cumprod((m - 1 - power) / m)))
-
-
-_BINOMIAL = {power: _binomial(power) for power in (2 / 3, 5 / 3)}
-
-
-def _by_series(
-    t: Number, directly: Callable[[Number], Number], coefficients: Any, *, first: int
-) -> Number:
-    """The power series from its first term on, for t < 1/2; `directly` beyond."""
-    t = np.asarray(t, dtype=np.float64)
-    small = np.minimum(t, 0.5)
-    total = np.zeros_like(small)
-    for coefficient in coefficients[: first - 1 : -1]:
-        total = total * small + coefficient
-    return np.where(t < 0.5, total * small**first, directly(t))
+    return annulus.loss(annulus.width_under(t))

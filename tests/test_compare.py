@@ -40,7 +40,7 @@ class Sloppy:
     instead: Exception | None = None
     name: str = "sloppy"
 
-    def solve(self, problem: NormalProblem, start: Any = None) -> Solution:
+    def solve(self, problem: NormalProblem, start: Any = None, announce: Any = None) -> Solution:
         if self.instead is not None:
             raise self.instead
         solution = Newton().solve(problem, start)
@@ -135,10 +135,12 @@ def test_solvers_that_do_not_answer() -> None:
 def test_without_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     solve = Newton.solve
 
-    def fail(self: Newton, problem: NormalProblem, start: Any = None) -> Solution:
+    def fail(
+        self: Newton, problem: NormalProblem, start: Any = None, announce: Any = None
+    ) -> Solution:
         if self.tolerance == Newton().tolerance:
             raise cr.SolverError("newton: stopped")
-        return solve(self, problem, start)
+        return solve(self, problem, start, announce)
 
     monkeypatch.setattr(Newton, "solve", fail)
     comparison = compare(paper(), approach=5e-5, solvers=[BristleQP(16), Newton(tolerance=1e-3)])
@@ -158,7 +160,9 @@ def test_wrong_input_is_raised() -> None:
 def test_memory() -> None:
     @dataclass(frozen=True)
     class Greedy(Sloppy):
-        def solve(self, problem: NormalProblem, start: Any = None) -> Solution:
+        def solve(
+            self, problem: NormalProblem, start: Any = None, announce: Any = None
+        ) -> Solution:
             self.fill(80_000_000 if len(problem) > 2 else 8)
             return super().solve(problem, start)
 

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flint import arb, ctx
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH
 from test_shear import FRICTION, NAMES, pressed
 
 import convexrough as cr
-from convexrough import annulus, hertz
+from convexrough import annulus
 from convexrough.family import Family
 from convexrough.influence import LatticeInfluence
 from convexrough.shear_certificate import judge_in_turn, judge_states
@@ -227,12 +228,26 @@ def test_onset_of_some() -> None:
 
 
 def test_the_law_by_the_width_of_the_annulus() -> None:
-    """Closed forms: against the series and exponentials of `hertz`, at any share of friction."""
-    t = np.concatenate(([0.0], np.logspace(-15, -1), np.linspace(0.1, 1, 50)))
-    x = annulus.width_under(t)
-    assert_allclose(annulus.force(x), t, rtol=1e-15)
-    assert_allclose(annulus.width_at(hertz.deflection(t)), x, rtol=1e-14, atol=1e-16)
-    for name in ("deflection", "excess_deflection", "potential", "excess_potential", "loss"):
-        assert_allclose(getattr(annulus, name)(x), getattr(hertz, name)(t), rtol=3e-14)
+    """Each function of the share t of friction to its last digits, against the definitions in 60.
+
+    The potentials are integrals over t of what is above them.
+    """
+    ctx.dps = 60
+    for t in (1e-15, 1e-9, 1e-3, 0.1, 0.37, 0.5, 0.999, 1 - 1e-9, 1.0):
+        x, exact = annulus.width_under(t), arb(t)
+        left = (1 - exact) if t < 1 else arb(0)
+        phi = 1 - left ** (arb(2) / 3)
+        lost = 1 - left ** (arb(5) / 3)
+        laws = {
+            "force": exact,
+            "deflection": phi,
+            "excess_deflection": phi - 2 * exact / 3,
+            "potential": exact - 3 * lost / 5,
+            "excess_potential": exact - 3 * lost / 5 - exact**2 / 3,
+            "loss": lost - 5 * exact / 6 * (2 - phi),
+        }
+        for name, law in laws.items():
+            assert getattr(annulus, name)(x) == pytest.approx(float(law), rel=5e-15), (name, t)
+        assert annulus.width_at(float(phi)) == pytest.approx(float(1 - left ** (arb(1) / 3)), 1e-14)
+        assert annulus.width_under(-t) == x
     assert (annulus.width_at(np.array([1.0, -1.0, 3.0])) == 1).all()
-    assert (annulus.width_under(-t) == x).all()

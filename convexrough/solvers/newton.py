@@ -32,6 +32,9 @@ from convexrough.solvers.solution import Announce, Solution
 #: Of more candidates than this, only those near the contact are iterated on.
 FEW = 1000
 
+#: The residual, over |D0| + max |d_i|, that an answer must reach unless it is asked for less.
+ACCURATE = 1e-12
+
 #: Near the contact: with a gap of at most this part of the largest prescribed approach.
 MARGIN = 0.1
 
@@ -56,13 +59,15 @@ class _State(NamedTuple):
 class Newton:
     """Settings of Newton's method on the normal map.
 
-    Stops when  max_i |delta_i + (A P)_i - D_i| <= tolerance (|D0| + max_i |d_i|)  and that residual
-    is small beside what rounding can make of A P, which the certificate has to allow for anyway, or
-    a further step no longer halves it. Raises SolverError if `max_iterations` steps do not get
-    there.
+    tolerance : it stops where  max_i |delta_i + (A P)_i - D_i| <= tolerance (|D0| + max_i |d_i|);
+        0 asks for all that float64 can do
+
+    In any case it stops where that residual is small beside what rounding can make of A P, which
+    the certificate has to allow for anyway, or where it is below 1e-12 and a further step does not
+    halve it. Raises SolverError if `max_iterations` steps do not get there.
     """
 
-    tolerance: float = 1e-12
+    tolerance: float = 0.0
     max_iterations: int = 100
     name: str = field(default="newton", init=False)
 
@@ -116,22 +121,24 @@ class Newton:
                     f"step {iteration}, residual {state.residual / whole.ceiling:.1e}, "
                     f"{touching:,} touching"
                 )
-            accurate = state.residual <= self.tolerance * (abs(state.approach) + farthest)
+            scale = abs(state.approach) + farthest
+            accurate = state.residual <= ACCURATE * scale
             noise = problem.influence.rounding(state.loads)
             size = float(np.linalg.norm(state.defect))
             target = NEGLIGIBLE * (
                 noise.relative * float(np.linalg.norm(state.displacement)) + noise.norm
             )
-            if accurate and size <= target:
+            if state.residual <= self.tolerance * scale or (accurate and size <= target):
                 return state, iteration - 1
             forcing = min(MOST_LEFT, (size / before) ** 2) if before < np.inf else MOST_LEFT
-            following = _step(problem, state, max(forcing, 0.3 * target / size))
+            enough = max(target / size, self.tolerance * scale / state.residual)
+            following = _step(problem, state, max(forcing, 0.3 * enough))
             if accurate and following.residual >= 0.5 * state.residual:
                 return min(state, following, key=lambda s: s.residual), iteration
             state, before = following, size
         raise SolverError(
             f"newton: residual {state.residual:.3g} in units of the approach after "
-            f"{self.max_iterations} steps, tolerance {self.tolerance:g}"
+            f"{self.max_iterations} steps, {max(self.tolerance, ACCURATE) * scale:.3g} needed"
         )
 
 
