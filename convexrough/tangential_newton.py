@@ -19,7 +19,7 @@ from convexrough.errors import SolverError
 from convexrough.influence import DenseInfluence
 from convexrough.newton_system import FACTORISED, correct
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.solvers.newton import MOST_LEFT, NEGLIGIBLE
+from convexrough.solvers.newton import MOST_LEFT
 from convexrough.solvers.solution import Announce
 from convexrough.tangential_energy import TangentialEnergy
 
@@ -172,7 +172,7 @@ def _converge(
         accurate = state.residuals[0] <= TOLERANCE * state.rises[0]
         noise = energy.influence.rounding(state.increments[0])
         size = float(np.linalg.norm(state.defects))
-        target = NEGLIGIBLE * (noise.relative * float(np.linalg.norm(state.coupling)) + noise.norm)
+        target = noise.negligible(state.coupling)
         if accurate and size <= target:
             break
         forcing = min(MOST_LEFT, (size / before) ** 2)

@@ -73,7 +73,7 @@ def attempts(plan: Plan) -> list[Attempt]:
     """Every solver at several tolerances, those that end with a Newton step also without it."""
     powers = (2, 6, 12) if plan.quick else (2, 4, 6, 8, 10, 12)
     found = [
-        Attempt("newton", "default", Newton()),
+        Attempt("newton", "default", Newton(), growth=None),
         *(_newton("newton", power, None) for power in powers),
         *(_newton("newton, dense", power, "dense") for power in powers),
         *(_newton("newton, lattice", power, "lattice") for power in powers),

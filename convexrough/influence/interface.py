@@ -41,6 +41,14 @@ class Rounding(NamedTuple):
         """A bound for each component; `displacement` is A |P| as computed."""
         return self.relative * np.maximum(displacement, 0.0) + self.single
 
+    def negligible(self, displacement: Array) -> float:
+        """2-norm of a residual that solvers need not reduce: small beside these bounds.
+
+        By a factor of 10 beside that of sums, which is near the truth, and of 100 beside that of
+        transforms, which is some thousand times the truth.
+        """
+        return 0.1 * self.relative * float(np.linalg.norm(displacement)) + 0.01 * self.norm
+
     @property
     def single(self) -> float:
         """Bound on each |r_i|, and on what it adds to the relative part."""

@@ -41,9 +41,6 @@ MARGIN = 0.1
 #: Most of the residual that the linear solver may leave in a step.
 MOST_LEFT = 0.1
 
-#: A residual is negligible at this part of the rounding that the certificate allows for.
-NEGLIGIBLE = 0.01
-
 
 class _State(NamedTuple):
     indentation: Array  # delta
@@ -123,11 +120,8 @@ class Newton:
                 )
             scale = abs(state.approach) + farthest
             accurate = state.residual <= ACCURATE * scale
-            noise = problem.influence.rounding(state.loads)
             size = float(np.linalg.norm(state.defect))
-            target = NEGLIGIBLE * (
-                noise.relative * float(np.linalg.norm(state.displacement)) + noise.norm
-            )
+            target = problem.influence.rounding(state.loads).negligible(state.displacement)
             if state.residual <= self.tolerance * scale or (accurate and size <= target):
                 return state, iteration - 1
             forcing = min(MOST_LEFT, (size / before) ** 2) if before < np.inf else MOST_LEFT
