@@ -170,7 +170,9 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
         gap_errors=frozen(error * problem.units.length),
         approach=fit.approach * problem.units.length,
         approach_error=approach_error * problem.units.length,
-        duality_gap=problem.duality_gap(loads, fit.displacement, fit.approach, near)
+        duality_gap=problem.duality_gap(
+            loads, fit.displacement, fit.approach, near, fit.rounding + fit.single
+        )
         * (problem.units.force * problem.units.length),
     )
 

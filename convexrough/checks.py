@@ -120,20 +120,21 @@ def exactly_one(first: str, a: object, second: str, b: object) -> None:
         raise InputError(f"{first}, {second}", found=found, expected="exactly one of the two")
 
 
-def fits_in_memory(what: str, count: float, bytes_each: float) -> None:
-    """Refuse to start on something this machine cannot hold."""
+def fits_in_memory(what: str, count: float, bytes_each: float, power: int = 1) -> None:
+    """Refuse to start on something this machine cannot hold: bytes_each * count^power."""
     count = float(count)
-    if count * bytes_each < 2**26:
+    needed = bytes_each * count**power
+    if needed < 2**26:
         return
     import psutil  # only asked when something may be large
 
     available = psutil.virtual_memory().available
-    if count * bytes_each > available:
+    if needed > available:
+        most = (available / bytes_each) ** (1.0 / power)
         raise InputError(
             what,
-            found=f"{count:.3g} asperities ({count * bytes_each / 2**30:.3g} GiB)",
-            expected=f"at most {available / bytes_each:.3g} for the {available / 2**30:.3g} GiB "
-            "of memory available",
+            found=f"{count:.3g} asperities ({needed / 2**30:.3g} GiB)",
+            expected=f"at most {most:.3g} for the {available / 2**30:.3g} GiB of memory available",
         )
 
 

@@ -78,7 +78,7 @@ class VectorProblem:
     @lru_cache(maxsize=4)
     def of(cls, contact: Contact) -> VectorProblem:
         n = int(np.count_nonzero(contact.loads))
-        checks.fits_in_memory("loaded asperities", n, 5 * 4 * 8 * n)
+        checks.fits_in_memory("loaded asperities", n, 5 * 4 * 8, power=2)
         scalar = TangentialProblem.of(contact)
         nu = contact.scene.material.poisson_ratio
         bias = nu / (2.0 - nu)

@@ -15,8 +15,8 @@ Sites = NDArray[np.int64]
 #: computing them in float64 loses.
 BLUR = 32 * 2.0**-53
 
-#: ... and of the shortest distance between sites by this part, so that sites are told apart.
-CLOSEST = 1e-3
+#: ... and of the shortest distance between sites by this part: the bounds on products count it.
+CLOSEST = 1e-7
 
 #: A lattice is of use where its sites are at most so many times the points.
 SPARSEST = 50
@@ -26,7 +26,7 @@ SPARSEST = 50
 class Lattice:
     """The points origin + i b1 + j b2, i and j whole numbers.
 
-    basis   : (2, 2) [length] rows b1 and b2, reduced: b1 is a shortest vector of the lattice
+    basis   : (2, 2) [length] rows b1 and b2, reduced to rounding
     blur    : [length] bound on how far each coordinate of the points it was found from is off
     """
 
@@ -36,8 +36,9 @@ class Lattice:
 
     @property
     def spacing(self) -> float:
-        """[length] the shortest distance between two sites."""
-        return float(np.hypot(*self.basis[0]))
+        """[length] the shortest distance between two sites: on a reduced basis, one of these."""
+        a, b = self.basis
+        return float(min(np.hypot(*vector) for vector in (a, b, a + b, a - b)))
 
     @classmethod
     def through(cls, points: Array) -> Lattice | None:
@@ -58,19 +59,19 @@ class Lattice:
         except np.linalg.LinAlgError:
             return None
         reach = float(np.abs(points).max())
-        off = float(np.abs(points - anchor - away @ fitted).max()) + 8 * 2.0**-53 * reach
-        spacing = float(np.hypot(*fitted[1]))
-        if not (off <= BLUR * reach and off <= CLOSEST * spacing) or _crowded(sites):
-            return None
+        off = float(np.abs(points - anchor - away @ fitted).max()) + 12 * 2.0**-53 * reach
         origin = anchor + fitted[0] - middle @ fitted[1:]
-        return cls(origin, fitted[1:], off + 4 * 2.0**-53 * reach)
+        found = cls(origin, fitted[1:], off + 4 * 2.0**-53 * reach)
+        if not off <= min(BLUR * reach, CLOSEST * found.spacing) or _crowded(sites):
+            return None
+        return found
 
     def sites(self, points: Array) -> Sites | None:
         """(n, 2) i and j of points on the lattice; None if one is not."""
         sites = _nearest_sites(points - self.origin, self.basis)
         off = np.abs(points - self.origin - sites @ self.basis).max(initial=0.0)
         reach = np.abs(points).max(initial=0.0)
-        return sites if off <= self.blur + 4 * 2.0**-53 * reach else None
+        return sites if off + 4 * 2.0**-53 * reach <= self.blur else None
 
 
 def _nearest_sites(points: Array, basis: Array) -> Sites:

@@ -39,6 +39,8 @@ def approach_bound(
     With q = weights / sum(weights), alpha_i = q_i k_i and c = A q, for every lambda >= max c:
 
         D0 <= lambda L + (4/27) sum alpha_i^3 / (lambda - c_i)^2 - d'q.
+
+    displacement : (n,) no less than A times weights;  offsets : (n,) no more than d
     """
     total = float(weights.sum())
     q, c = weights / total, displacement / total
@@ -61,7 +63,8 @@ def approach_bound(
         (4.0 / 27.0) * float((cubes / (height - c_active) ** 2).sum()),
         -float(offsets @ q),
     )
-    return sum(terms) + SAFETY * sum(map(abs, terms))
+    size = terms[0] + terms[1] + float(np.abs(offsets) @ q)
+    return sum(terms) + (SAFETY + len(q) * ROUNDOFF) * size
 
 
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
@@ -86,7 +89,8 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     ):
         product = coupling.apply(pressing)
         displacement[index] = product + coupling.rounding(pressing).of(product)
-    bound = approach_bound(weights, displacement, coefficients, scene.offsets, load)
+    least = scene.offsets - scene.offset_errors
+    bound = approach_bound(weights, displacement, coefficients, least, load)
     if not np.isfinite(bound):
         raise InputError("load", found=load, expected="a load this scene's units can hold")
     return bound

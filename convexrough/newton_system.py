@@ -23,9 +23,13 @@ from numpy.typing import NDArray
 from convexrough.checks import Array, Indices
 from convexrough.errors import SolverError
 from convexrough.influence import DenseInfluence, Influence, Smoother
+from convexrough.influence.dense import dense_matrix
 
-#: Up to so many touching asperities, with a matrix at hand, a Cholesky factor is cheapest.
+#: Up to so many touching asperities, a Cholesky factor is cheapest: with a matrix at hand, ...
 FACTORISED = 1500
+
+#: ... and without.
+FACTORISED_FEW = 100
 
 #: What conjugate gradients in single and double precision can still reduce the residual to.
 SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
@@ -63,7 +67,8 @@ def correct(
     touching = np.flatnonzero(root)
     if len(touching) == 0:
         return Correction(-defect, 0.0, 0)
-    direct = isinstance(influence, DenseInfluence) and len(touching) <= FACTORISED
+    at_hand = isinstance(influence, DenseInfluence)
+    direct = len(touching) <= (FACTORISED if at_hand else FACTORISED_FEW)
     for extra in (None, shells):
         try:
             if direct:
@@ -89,7 +94,10 @@ def _factorise(
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
     w = root[touching]
-    matrix = influence.matrix[touching[:, None], touching]
+    if isinstance(influence, DenseInfluence):
+        matrix = influence.matrix[touching[:, None], touching]
+    else:
+        matrix = dense_matrix(influence.points[touching], influence.scale)
     matrix *= w
     matrix *= w[:, None]
     matrix.ravel()[:: len(w) + 1] = 1.0 if shells is None else 1.0 + w * shells[touching] * w
@@ -137,21 +145,22 @@ def _iterate(
         border, _ = smooth(w)
         weight = float(w @ border)
 
-    def smoothed() -> tuple[Values, float]:
-        """M r and the 2-norm of A W r, after r has been put back on the plane."""
+    def smoothed() -> tuple[Values, float, float]:
+        """M r, once r is back on the plane; of r as it was, the 2-norm of A W r, and r' M r."""
         nonlocal residual, shift
         z, left = smooth(residual)
+        whole = float(residual @ z)
         if balanced:
             off = -float(w @ z) / weight
             shift += off
             residual += dtype(off) * w
             z += dtype(off) * border
-        return z, left
+        return z, left, whole
 
     y_displacement = np.zeros_like(w)  # A W y
-    z, left = smoothed()
+    z, left, first = smoothed()
     p = z.copy()
-    first = size_of = float(residual @ z)
+    size_of = float(residual @ z)
     enough = tolerance * float(np.linalg.norm(defect)) / size
     products = 0
     while left > enough and size_of > limit**2 * first and products < MOST_ITERATIONS:
@@ -164,7 +173,7 @@ def _iterate(
         length = dtype(size_of / curvature)
         y_displacement += length * q
         residual -= length * bent
-        z, left = smoothed()
+        z, left, _ = smoothed()
         before, size_of = size_of, float(residual @ z)
         p *= dtype(size_of / before)
         p += z

@@ -200,7 +200,14 @@ class NormalProblem:
         ratio = self.shells / self.stiffness(loads)
         return float(ratio.max(initial=0.0)) * (1 + SAFETY)
 
-    def duality_gap(self, loads: Array, displacement: Array, approach: float, box: Array) -> float:
+    def duality_gap(
+        self,
+        loads: Array,
+        displacement: Array,
+        approach: float,
+        box: Array,
+        error: Array | float = 0.0,
+    ) -> float:
         """Upper bound on Phi(P) less its minimum over 0 <= P <= box, from the loads alone.
 
         With M = A + diag(shells), positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2,
@@ -212,7 +219,7 @@ class NormalProblem:
         any estimate of the multiplier and `loads` must add up to the load. Infinite where the
         shells do not prove the box convex. Rounding is counted, so it is never quite 0.
 
-        displacement : A P
+        displacement : A P, and a bound on its error beyond that of a few roundings
         """
         if self.convexity_number(box) > 1:
             return np.inf
@@ -238,6 +245,12 @@ class NormalProblem:
 
         size = 0.6 * k_box + shell_box + np.abs(slope)
         rounding = 32 * ROUNDOFF * float(((loads + best) * size).sum())
+        # A slope off by e moves a term by e times the distance from P to the best x at most, and
+        # the best x by e over the least curvature there.
+        curvature = self.stiffness(box) - shells
+        moved = np.divide(error, curvature, out=np.full(len(self), np.inf), where=curvature > 0)
+        distance = np.minimum(np.abs(loads - best) + moved, np.maximum(loads, box))
+        rounding += float((error * distance).sum()) * (1 + SAFETY)
         return float(np.maximum(charge(loads) - charge(best), 0.0).sum()) + rounding
 
     def overhang(self, weights: Array, displacement: Array) -> float:
@@ -248,7 +261,8 @@ class NormalProblem:
         """
         assert self.load is not None
         displacement = displacement + self.influence.rounding(weights).of(displacement)
-        return approach_bound(weights, displacement, self.coefficients, self.offsets, self.load)
+        least = self.offsets - self.offset_errors
+        return approach_bound(weights, displacement, self.coefficients, least, self.load)
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """Values of the candidates, set among zeros for all other asperities of the scene."""

@@ -39,7 +39,9 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     if kind != "scattered" and scene.lattice is not None:
         return LatticeInfluence.assemble(points, scene.lattice, scale, error)
     if kind == "lattice":
-        raise InputError("influence", found="lattice", expected="asperities on a lattice")
+        raise InputError(
+            "influence", found="lattice", expected="asperities on a two-dimensional lattice"
+        )
     if kind is None and n <= SCATTERED_FEW:
         return DenseInfluence.assemble(points, scale, error)
     return ScatteredInfluence.assemble(points, scale, error)

@@ -23,7 +23,7 @@ from convexrough.roundoff import ROUNDOFF
 
 def fits_densely(count: int) -> None:
     """Refuse what the matrix of all pairs, and the copies that a solution needs, cannot hold."""
-    checks.fits_in_memory("asperities that could touch", count, 5 * 8 * count)
+    checks.fits_in_memory("asperities that could touch", count, 5 * 8, power=2)
 
 
 def dense_matrix(points: Array, scale: float) -> Array:

@@ -67,7 +67,9 @@ class Coupling(Protocol):
         ...
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """(m,) upper bounds, a few per cent high at most, on sum_j strengths_j / r_ij^power.
+        """(m,) upper bounds on sum_j strengths_j / r_ij^power, to be a few per cent of it high.
+
+        Higher where the strengths differ by many powers of ten, and the sum is small.
 
         strengths : (n,) not negative;  power : 2 or 3
         """

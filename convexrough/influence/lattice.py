@@ -19,7 +19,7 @@ from convexrough.checks import Array, Indices
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.interface import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.neighbours import crowding, separations
-from convexrough.influence.smoother import block_smoother
+from convexrough.influence.smoother import block_smoother, differences
 from convexrough.lattice import Lattice, Sites
 from convexrough.roundoff import ROUNDOFF
 
@@ -45,7 +45,8 @@ COLUMNS = 256
 class Box:
     """A box of sites, and convolutions on it.
 
-    shape : (rows, columns) of sites;  basis : (2, 2) [length]
+    shape : (rows, columns) of sites;  basis : (2, 2) rows b1 and b2, in units of the spacing: so
+        single precision holds the kernel whatever the scene's units
     """
 
     shape: tuple[int, int]
@@ -74,7 +75,7 @@ class Box:
         from scipy import fft
 
         rows, columns = self.padded
-        i, j = _differences(rows), _differences(columns)
+        i, j = differences(rows), differences(columns)
         j_used = np.abs(j) < self.shape[1]
         half = np.zeros((rows, columns // 2 + 1), dtype=np.result_type(dtype, np.complex64))
         total = square = 0.0
@@ -150,49 +151,52 @@ class LatticeCoupling:
     """From loads on some sites of a box to displacements on others.
 
     sources : (n,) places in the box, row by row;  targets : (m,)
-    blur    : [length] bound on how far the difference of two points is from that of their sites
+    spacing : [length] the shortest distance of two sites
+    blur    : [spacing] bound on how far the difference of two points is from that of their sites
     """
 
     box: Box
     sources: Indices
     targets: Indices
     scale: float
+    spacing: float
     blur: float
 
     def apply(self, loads: Array) -> Array:
         dtype = np.float32 if loads.dtype == np.float32 else np.float64
         product = self._convolve(loads.astype(dtype, copy=False), self._spectrum(dtype))
-        product *= dtype(self.scale)
+        product *= dtype(self._unit)
         return product
 
     def rounding(self, loads: Array) -> Rounding:
         # Points off their sites change 1/r by blur / r^2 at most; the sum of that over a row
         # bounds the effect on the 2-norm and on the largest.
-        kernel, off = self._kernel, self._moved * self._kernel.norm**2
+        kernel, off = self._kernel, self.blur / self._least * self._kernel.norm**2
         size, largest = float(np.linalg.norm(loads)), float(np.abs(loads).max(initial=0.0))
         norm = self.box.bound(kernel, ROUNDOFF) * size + off * size
         each = self.box.bound_each(kernel, ROUNDOFF) * size + off * largest
         relative = 1.01 * ENTRY_ROUNDOFFS * ROUNDOFF
-        return Rounding(relative, self.scale * norm, self.scale * each)
+        return Rounding(relative, self._unit * norm, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         """In single precision, with a bound on its rounding added."""
-        nearest = self._nearest
-        kernel = Box(self.box.shape, self.box.basis / nearest).kernel(power, np.float32)
+        kernel = self.box.kernel(power, np.float32)
         largest = float(strengths.max(initial=0.0)) or 1.0
         shares = (strengths / largest).astype(np.float32)
         total = self._convolve(shares, kernel.spectrum).astype(np.float64)
         total += self.box.bound_each(kernel, 2.0**-24) * float(np.linalg.norm(shares))
-        stretched = 1.0 / (1.0 - min(self.blur / nearest, 0.5)) ** power
-        return np.maximum(total, 0.0) * (largest * stretched * (1.0 + 1e-6) / nearest**power)
-
-    @cached_property
-    def _nearest(self) -> float:
-        return float(np.hypot(*self.box.basis[0]))
+        stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
+        return np.maximum(total, 0.0) * (largest * stretched)
 
     @property
-    def _moved(self) -> float:
-        return self.blur / (1.0 - min(self.blur / self._nearest, 0.5))
+    def _unit(self) -> float:
+        """A_ij of nearest neighbours."""
+        return self.scale / self.spacing
+
+    @property
+    def _least(self) -> float:
+        """[spacing] the least that the shortest distance of two points can be."""
+        return 1.0 - min(self.blur, 0.5)
 
     @cached_property
     def _kernel(self) -> Kernel:
@@ -241,8 +245,10 @@ class LatticeInfluence(LatticeCoupling):
         cls, points: Array, lattice: Lattice, places: Sites, scale: float, point_error: float
     ) -> LatticeInfluence:
         box, index = _boxed(lattice, places)
-        blur = _blur(lattice, point_error)
-        return cls(box, index, index, scale, blur, points, lattice, places, point_error)
+        off = 2.0 * float(np.sqrt(2.0)) * (lattice.blur + point_error)
+        spacing = lattice.spacing
+        both = scale, spacing, off / spacing
+        return cls(box, index, index, *both, points, lattice, places, point_error)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -253,7 +259,7 @@ class LatticeInfluence(LatticeCoupling):
 
     @property
     def entry_error(self) -> float:
-        return entry_error(self.point_error, self.lattice.spacing - self.blur)
+        return entry_error(self.point_error, self.spacing * self._least)
 
     def among(self, which: Indices) -> LatticeInfluence:
         return self._of(
@@ -266,7 +272,7 @@ class LatticeInfluence(LatticeCoupling):
             return DenseCoupling(self.points, points, self.scale, self.point_error)
         box, index = _boxed(self.lattice, np.concatenate((self.places, places)))
         n = len(self)
-        return LatticeCoupling(box, index[:n], index[n:], self.scale, self.blur)
+        return LatticeCoupling(box, index[:n], index[n:], self.scale, self.spacing, self.blur)
 
     @property
     def _filled(self) -> bool:
@@ -276,8 +282,8 @@ class LatticeInfluence(LatticeCoupling):
     def separations(self) -> Array:
         if not self._filled:
             return separations(self.points, self.point_error)
-        nearest = self.lattice.spacing - self.blur if len(self) > 1 else np.inf
-        return np.full(len(self), max(nearest, 0.0))
+        nearest = self.spacing * self._least * (1.0 - 8 * ROUNDOFF) if len(self) > 1 else np.inf
+        return np.full(len(self), nearest)
 
     def crowding(self, radii: Array) -> float:
         """Pairs in the order of their distance, until none further apart can be more crowded."""
@@ -287,7 +293,7 @@ class LatticeInfluence(LatticeCoupling):
         field.ravel()[self.sources] = radii
         most, worst = 2.0 * float(radii.max()), 0.0
         for on_sites, i, j in _neighbours(self.box):
-            distance = on_sites - self.blur  # at least that of the points
+            distance = self.spacing * (on_sites - self.blur)  # at least that of the points
             if most <= worst * distance:
                 break
             here, there = field[i:], field[: len(field) - i]
@@ -300,27 +306,17 @@ class LatticeInfluence(LatticeCoupling):
 
     def smoother(self, root: Array) -> Smoother:
         box = self.box
-        return block_smoother(box.shape, box.basis, self.sources, self.scale, root, box.workers)
+        return block_smoother(box.shape, box.basis, self.sources, self._unit, root, box.workers)
 
 
 def _boxed(lattice: Lattice, places: Sites) -> tuple[Box, Indices]:
     """The smallest box, and where in it each place is."""
     if len(places) == 0:
-        return Box((1, 1), lattice.basis), np.zeros(0, dtype=np.intp)
+        return Box((1, 1), lattice.basis / lattice.spacing), np.zeros(0, dtype=np.intp)
     low = places.min(axis=0)
     rows, columns = (places.max(axis=0) - low + 1).tolist()
     index = (places[:, 0] - low[0]) * columns + (places[:, 1] - low[1])
-    return Box((rows, columns), lattice.basis), index
-
-
-def _blur(lattice: Lattice, point_error: float) -> float:
-    return 2.0 * float(np.sqrt(2.0)) * (lattice.blur + point_error)
-
-
-def _differences(length: int) -> NDArray[np.int64]:
-    """0, 1, ..., -2, -1: whole numbers modulo the length, nearest to 0."""
-    i = np.arange(length)
-    return np.where(i <= (length - 1) // 2, i, i - length)
+    return Box((rows, columns), lattice.basis / lattice.spacing), index
 
 
 def _blocks(width: int) -> Iterator[slice]:

@@ -119,7 +119,7 @@ def _block_spectrum(
     from scipy import fft
 
     rows, columns = (fft.next_fast_len(length, real=True) for length in blocks)
-    i, j = _differences(rows), _differences(columns)
+    i, j = differences(rows), differences(columns)
     x = np.add.outer(i * (m * basis[0, 0]), j * (m * basis[1, 0]))
     y = np.add.outer(i * (m * basis[0, 1]), j * (m * basis[1, 1]))
     x[0, 0] = np.inf
@@ -139,7 +139,7 @@ def _block_spectrum(
     return (rows, columns), np.ascontiguousarray(spectrum)
 
 
-def _differences(length: int) -> NDArray[np.int64]:
+def differences(length: int) -> NDArray[np.int64]:
     """0, 1, ..., -2, -1: whole numbers modulo the length, nearest to 0."""
     i = np.arange(length)
     return np.where(i <= (length - 1) // 2, i, i - length)

@@ -69,7 +69,9 @@ class Conic:
     def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
         """What Clarabel makes of the program in these boxes, not yet judged."""
         clarabel = load_library("clarabel", self.name)
-        checks.fits_in_memory("asperities of the cone program", n := len(boxes.members), 100 * n)
+        checks.fits_in_memory(
+            "asperities of the cone program", n := len(boxes.members), 100, power=2
+        )
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_iter = self.max_iterations

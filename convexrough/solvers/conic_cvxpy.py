@@ -61,7 +61,7 @@ class ConicCVXPY:
             return cp.SOC(x + y, cp.vstack([x - y, 2 * w]), axis=0)
 
         i, n = boxes.members, len(boxes.members)
-        checks.fits_in_memory("asperities of the cone program in CVXPY", n, 400 * n)
+        checks.fits_in_memory("asperities of the cone program in CVXPY", n, 400, power=2)
         B, S, e = boxes.loads, boxes.S, boxes.energies(normal)
         M = normal.influence.matrix[np.ix_(i, i)] + np.diag(normal.shells[i])
         d = normal.offsets[i]

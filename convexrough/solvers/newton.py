@@ -112,13 +112,13 @@ class Newton:
         farthest = float(np.abs(whole.offsets).max())
         before = np.inf
         for iteration in range(1, self.max_iterations + 1):
+            scale = abs(state.approach) + farthest
             if announce is not None:
                 touching = int(np.count_nonzero(state.loads))
                 announce(
-                    f"step {iteration}, residual {state.residual / whole.ceiling:.1e}, "
+                    f"step {iteration}, residual {state.residual / scale:.1e}, "
                     f"{touching:,} touching"
                 )
-            scale = abs(state.approach) + farthest
             accurate = state.residual <= ACCURATE * scale
             size = float(np.linalg.norm(state.defect))
             target = problem.influence.rounding(state.loads).negligible(state.displacement)
