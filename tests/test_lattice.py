@@ -23,6 +23,7 @@ from convexrough.influence.lattice import Box, _neighbours, _pass_roundoffs
 from convexrough.lattice import BLUR, Lattice
 from convexrough.newton_system import correct
 from convexrough.roundoff import ROUNDOFF
+from convexrough.scene import nearest_distances
 
 Array = NDArray[np.float64]
 
@@ -480,3 +481,14 @@ def test_the_smoother_saves_products(kind: str, balanced: bool) -> None:
     size = np.linalg.norm(exact.change)
     assert np.linalg.norm(found.change - exact.change) <= 1e-3 * size
     assert found.shift == pytest.approx(exact.shift, abs=1e-3 * np.abs(defect).max())
+
+
+def test_the_spacing_is_that_of_the_shortest_vector() -> None:
+    """Also where b2 is shorter than b1 by less than the reduction of the basis can tell."""
+    basis = np.array([[1.0, 0.0], [0.0, 1.0 - 4e-10]])
+    sites = np.stack(np.meshgrid(np.arange(-10, 11), np.arange(-10, 11)), -1).reshape(-1, 2)
+    points = sites[~((sites[:, 0] == 0) & (np.abs(sites[:, 1]) == 1))] @ basis
+    lattice = Lattice.through(points)
+    assert lattice is not None
+    separations = LatticeInfluence.assemble(points, lattice, 1.0).separations()
+    assert (separations <= nearest_distances(points)).all()

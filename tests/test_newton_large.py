@@ -412,3 +412,54 @@ def test_fifty_digits_of_some_hundred() -> None:
     assert (truth <= contact.certificate.load_errors).all()
     gaps = np.abs(multiprecision.errors(contact.gaps, exact.gaps))
     assert (gaps <= contact.certificate.gap_errors).all()
+
+
+@pytest.mark.parametrize("power", [-100, -60, 60, 90])
+def test_extreme_units_and_loads_a_little_off(power: int) -> None:
+    """Sums of 1 / r^3 stay in the range of single precision, and the bounds hold."""
+    unit = 2.0**power
+    asperities = cr.Asperities.square(
+        spacing=2.5e-3 * unit,
+        tip_radius=0.02 * unit,
+        within=0.03 * unit,
+        height_std=1e-6 * unit,
+        seed=1,
+    )
+    pressed = cr.Scene(unit, asperities, MATERIAL)
+    true = cr.press(pressed, approach=1e-4 * unit, influence="dense")
+    loads = true.loads * (1 + 1e-3 * np.random.default_rng(0).standard_normal(len(pressed)))
+    judged = cr.certify(pressed, loads, approach=1e-4 * unit, influence="lattice")
+    assert judged.scope == "global"
+    assert (np.abs(loads - true.loads) <= judged.load_errors).all()
+    assert (np.abs(judged.gaps - true.gaps) <= judged.gap_errors).all()
+    through = cr.press(pressed, approach=1e-4 * unit, influence="lattice")
+    assert through.model_error == pytest.approx(true.model_error, rel=0.02)
+
+
+@pytest.mark.parametrize("kind", ["lattice", "scattered"])
+def test_few_touching_under_a_load(kind: Kind) -> None:
+    """A defect that is the same at all that touch lies wholly in the change of the approach."""
+    rng = np.random.default_rng(0)
+    flat = cr.Asperities.square(spacing=2.5e-3, tip_radius=0.01, within=0.05)
+    for _ in range(12):
+        heights = flat.distances**2 / 2
+        few = int(rng.integers(1, 6))
+        heights[rng.choice(len(flat), few, replace=False)] += rng.uniform(1e-5, 3e-5, few)
+        asperities = cr.Asperities(flat.positions, 0.01, heights)
+        pressed = cr.Scene(1.0, asperities, MATERIAL, friction=0.3)
+        load = 0.5 * cr.press(pressed, approach=1e-6).load
+        contact = cr.press(pressed, load=load, influence=kind)
+        assert contact.certificate.holds
+        assert cr.shear(contact, force=0.15 * load).certificate.holds
+
+
+@pytest.mark.parametrize("approach", [0.0, -1e-6, 5e-5])
+def test_news_of_the_steps(approach: float) -> None:
+    asperities = cr.Asperities.square(
+        spacing=2.5e-3, tip_radius=0.02, within=0.01, height_std=1e-5, seed=1
+    )
+    news: list[str] = []
+    cr.press(cr.Scene(1.0, asperities, MATERIAL), approach=approach, announce=news.append)
+    assert news[-1] == "certifying"
+    assert news[0].startswith("step 1, residual ")
+    assert " touching" in news[0]
