@@ -134,6 +134,10 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
         norm = _norm(fit, h, theta)
         errors = norm / np.sqrt(h)
 
+    duality_gap = problem.duality_gap(
+        loads, fit.displacement, fit.approach, near, fit.rounding + fit.single
+    ) * (problem.units.force * problem.units.length)
+
     # What it says of A P and D0, and so of delta* = D - A P*.
     A = problem.influence
     moved = norm * spread(A, A.scale, 1.0 / h) * (1 + SAFETY)
@@ -159,7 +163,7 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
         error[others] = moved + without.rounding + approach_error
     load_errors = scene_loads.copy()
     load_errors[problem.candidates] = errors * problem.units.force
-    words = np.where(indentation < -error, 2, 0)
+    words = np.where(indentation < -error, np.int8(2), np.int8(0))
     words[problem.candidates[touches]] = 1
     return Certificate(
         scope=box.scope,
@@ -170,10 +174,7 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
         gap_errors=frozen(error * problem.units.length),
         approach=fit.approach * problem.units.length,
         approach_error=approach_error * problem.units.length,
-        duality_gap=problem.duality_gap(
-            loads, fit.displacement, fit.approach, near, fit.rounding + fit.single
-        )
-        * (problem.units.force * problem.units.length),
+        duality_gap=duality_gap,
     )
 
 

@@ -44,10 +44,10 @@ class Rounding(NamedTuple):
     def negligible(self, displacement: Array) -> float:
         """2-norm of a residual that solvers need not reduce: small beside these bounds.
 
-        By a factor of 10 beside that of sums, which is near the truth, and of 100 beside that of
+        By a factor of 10 beside that of sums, which is near the truth, and of 20 beside that of
         transforms, which is some thousand times the truth.
         """
-        return 0.1 * self.relative * float(np.linalg.norm(displacement)) + 0.01 * self.norm
+        return 0.1 * self.relative * float(np.linalg.norm(displacement)) + 0.05 * self.norm
 
     @property
     def single(self) -> float:
