@@ -19,7 +19,7 @@ from convexrough.influence import (
     inverse_distances,
     shells,
 )
-from convexrough.influence.lattice import Box, _neighbours, _pass_roundoffs
+from convexrough.influence.box import Box, _pass_roundoffs, neighbours
 from convexrough.lattice import BLUR, Lattice
 from convexrough.newton_system import correct
 from convexrough.roundoff import ROUNDOFF
@@ -342,7 +342,7 @@ def test_neighbours_come_by_distance(name: str, shape: tuple[int, int]) -> None:
     """Each difference of two sites of a box once, up to its sign."""
     lattice = Lattice.through(patch(turned(BASES[name], 0.2), 60))
     assert lattice is not None
-    found = list(_neighbours(Box(shape, lattice.basis)))
+    found = list(neighbours(Box(shape, lattice.basis)))
     rows, columns = shape
     assert len({(i, j) for _, i, j in found}) == len(found)
     assert len(found) == ((2 * rows - 1) * (2 * columns - 1) - 1) // 2

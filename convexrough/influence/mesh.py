@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.checks import Array, Indices
+from convexrough.influence.box import Box, Kernel
 from convexrough.influence.interface import Rounding
-from convexrough.influence.lattice import Box, Kernel
 from convexrough.influence.near import Near, Order
 from convexrough.influence.plan import Plan
 from convexrough.influence.softened import Softened, lagrange, lebesgue, weight_roundoffs
