@@ -1,18 +1,18 @@
 """Rough frictional contact as one convex program, with a proof of which asperities touch."""
 
 from convexrough import solvers
-from convexrough.certificate import Certificate, certify
 from convexrough.contact import Contact, press
-from convexrough.cycle import Cycle, Loop, cycle, cycles
 from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
-from convexrough.friction import VectorShearState, shear_vector
-from convexrough.friction_cones import FrictionConic
-from convexrough.friction_newton import FrictionNewton
-from convexrough.history import History, history
-from convexrough.scene import Asperities, Material, Scene
-from convexrough.scene_file import SceneFile, read_scene
-from convexrough.shear import ShearCertificate, ShearState, onset_of_sliding, shear
-from convexrough.smooth import SmoothSphere, smooth
+from convexrough.normal.certificate import Certificate, certify
+from convexrough.run.scene_file import SceneFile, read_scene
+from convexrough.scene.scene import Asperities, Material, Scene
+from convexrough.shearing.cycle import Cycle, Loop, cycle, cycles
+from convexrough.shearing.history import History, history
+from convexrough.shearing.state import ShearCertificate, ShearState, onset_of_sliding, shear
+from convexrough.sphere.smooth import SmoothSphere, smooth
+from convexrough.vector_shear.cones import FrictionConic
+from convexrough.vector_shear.newton import FrictionNewton
+from convexrough.vector_shear.state import VectorShearState, shear_vector
 from convexrough.version import __version__
 
 __all__ = [

@@ -14,9 +14,9 @@ from convexrough.errors import ConvexroughError, FileError, InputError, SolverEr
 from convexrough.version import __version__
 
 if TYPE_CHECKING:
-    from convexrough.report import Summary
-    from convexrough.scene_file import UnitNames
-    from convexrough.stages import Outcome
+    from convexrough.run.report import Summary
+    from convexrough.run.scene_file import UnitNames
+    from convexrough.run.stages import Outcome
 
 DONE, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
 
@@ -104,9 +104,9 @@ def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: b
     Results go to the folder SCENE-results unless --out names another.
     """
     from convexrough.contact import press
-    from convexrough.results import claim_folder
-    from convexrough.scene_file import read_scene
-    from convexrough.stages import compute
+    from convexrough.run.results import claim_folder
+    from convexrough.run.scene_file import read_scene
+    from convexrough.run.stages import compute
 
     file = read_scene(scene)
     folder = out or Path(f"{scene.stem}-results")
@@ -141,10 +141,10 @@ def verify(scene: Path, loads: Path, as_json: bool) -> int:
 
     LOADS is a CSV file with a column load, and x and y unless in the scene's order.
     """
-    from convexrough.certificate import certify
-    from convexrough.io import read_loads
-    from convexrough.report import certificate_summary
-    from convexrough.scene_file import read_scene
+    from convexrough.normal.certificate import certify
+    from convexrough.run.report import certificate_summary
+    from convexrough.run.scene_file import read_scene
+    from convexrough.run.tables import read_loads
 
     file = read_scene(scene)
     values = read_loads(loads, file.scene)
@@ -164,13 +164,13 @@ def compare(scene: Path, as_json: bool) -> int:
     other: that would be a mistake in the mathematics.
     """
     from convexrough.compare import compare as compare_solvers
-    from convexrough.report import (
+    from convexrough.run.report import (
         comparison_summary,
         comparison_warnings,
         describe_comparison,
         to_json,
     )
-    from convexrough.scene_file import read_scene
+    from convexrough.run.scene_file import read_scene
 
     file = read_scene(scene)
     with _blamed_on(scene), _progress(f"pressing on {len(file.scene)} asperities") as show:
@@ -213,8 +213,8 @@ def new(scene: Path) -> int:
 @_output
 def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int:
     """Reproduce the source paper's example (Dini and Hills 2009)."""
-    from convexrough import paper as example
-    from convexrough import report, results
+    from convexrough.paper import example
+    from convexrough.run import report, results
 
     folder = out or Path("paper-results")
     results.claim_folder(folder, force=force)
@@ -224,7 +224,7 @@ def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int
         summary = report.summarise(outcome) | {"paper": comparison}
         files = results.write_tables(folder, example.figure_data(outcome.contact))
         if not no_figures:
-            from convexrough.plots import paper_figures
+            from convexrough.paper.figures import paper_figures
 
             files += results.write_figures(folder, paper_figures(outcome.contact))
         files += results.write_results(folder, outcome, summary, figures=False)
@@ -245,8 +245,8 @@ def bench(
     go between the markers of that page, and the figures into the folder figures beside it.
     """
     from convexrough import bench as benching
-    from convexrough.report import to_json
-    from convexrough.results import claim_folder
+    from convexrough.run.report import to_json
+    from convexrough.run.results import claim_folder
 
     if page is not None:
         benching.split_page(page)  # a page without markers is refused before anything is computed
@@ -278,8 +278,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _finish(folder: Path, outcome: Outcome, units: UnitNames, figures: bool, as_json: bool) -> int:
     """Write and say the results of a run."""
-    from convexrough.report import summarise
-    from convexrough.results import write_results
+    from convexrough.run.report import summarise
+    from convexrough.run.results import write_results
 
     summary = summarise(outcome)
     with _progress("writing results"):
@@ -295,7 +295,7 @@ def _say(
     summary: Summary, as_json: bool, lines: Sequence[str] = (), units: UnitNames | None = None
 ) -> int:
     """Print the summary, then `lines`, and return the exit status that it deserves."""
-    from convexrough.report import describe, proved, to_json, warnings
+    from convexrough.run.report import describe, proved, to_json, warnings
 
     if as_json:
         click.echo(to_json(summary))

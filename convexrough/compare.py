@@ -18,12 +18,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from convexrough import solvers
-from convexrough.certificate import Certificate
 from convexrough.checks import Array
 from convexrough.contact import Contact, press
 from convexrough.errors import ConvexroughError, InputError, SolverError
 from convexrough.memory import MemoryRise
-from convexrough.scene import Asperities, Material, Scene
+from convexrough.normal.certificate import Certificate
+from convexrough.scene.scene import Asperities, Material, Scene
 
 #: How many asperities a message names before it says "and so many more".
 MOST_NAMED = 5

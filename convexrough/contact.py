@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from convexrough import checks, hertz
-from convexrough.certificate import Certificate, judge
+from convexrough import checks
 from convexrough.checks import Array, frozen
 from convexrough.influence import Influence, Kind
-from convexrough.normal import NormalProblem
-from convexrough.scene import Scene
+from convexrough.normal.certificate import Certificate, judge
+from convexrough.normal.problem import NormalProblem
+from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton, Solution, Solver
 from convexrough.solvers.solution import Announce
+from convexrough.sphere import hertz
 
 
 @dataclass(frozen=True, eq=False)

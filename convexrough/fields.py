@@ -11,11 +11,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from convexrough import checks, hertz, mindlin
+from convexrough import checks
 from convexrough.checks import Array, Indices
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.shear import ShearState
+from convexrough.shearing.state import ShearState
+from convexrough.sphere import hertz, surface_shear
 
 #: Pairs of a point and an asperity evaluated at a time: what stays in a cache.
 BLOCK = 2**14
@@ -75,7 +76,7 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
         points,
         asperities.centres,
         asperities.radii,
-        lambda distances, disc: mindlin.traction(
+        lambda distances, disc: surface_shear.traction(
             distances, asperities.radii[disc], asperities.shares[disc], asperities.peaks[disc]
         ),
     )
@@ -92,7 +93,7 @@ def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
     material = state.contact.scene.material
 
     def each(x: Array, y: Array) -> Array:
-        displacements: Array = mindlin.surface_displacement(
+        displacements: Array = surface_shear.surface_displacement(
             x,
             y,
             asperities.radii,
@@ -107,7 +108,7 @@ def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
 
 
 class _Sheared:
-    """The loaded asperities of a friction state, as `convexrough.mindlin` asks for them.
+    """The loaded asperities of a friction state, as `sphere.surface_shear` asks for them.
 
     centres : (n, 2) [length];  radii : (n,) a [length];  peaks : (n,) f p0 [force / length^2]
     shares  : (n,) Q_i / (f P_i), exactly +-1 where sliding

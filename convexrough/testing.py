@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from convexrough.certificate import Certificate, certify
 from convexrough.checks import Array, Indices
 from convexrough.compare import Answer, contradictions, listed
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.scene import Scene
+from convexrough.normal.certificate import Certificate, certify
+from convexrough.scene.scene import Scene
 
 
 def assert_certified(

@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 
 import convexrough as cr
-from convexrough.normal import NormalProblem
+from convexrough.normal.problem import NormalProblem
 
 RESIDUAL = 1e-8
 PATIENCE = 20.0  # seconds

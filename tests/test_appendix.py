@@ -7,9 +7,9 @@ from scenes import PAPER_APPROACH, paper
 from scipy.optimize import brentq
 
 import convexrough as cr
-from convexrough import appendix
-from convexrough.hertz import mindlin_ratio
-from convexrough.smooth import smooth
+from convexrough.paper import appendix
+from convexrough.sphere.hertz import mindlin_ratio
+from convexrough.sphere.smooth import smooth
 
 RATIOS = [0.0, 0.3, 0.5]
 

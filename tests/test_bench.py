@@ -18,15 +18,15 @@ from test_cli import Outcome
 import convexrough as cr
 from convexrough import bench as benching
 from convexrough import cli
-from convexrough.bench import measure, reference, tell
+from convexrough.bench import measure, reference, summary
+from convexrough.bench.figures import bench_figures
 from convexrough.bench.frontier import better_than_default, exponent, mark_frontier
 from convexrough.bench.measure import Attempt, CostRow, Row, Tally, counted
 from convexrough.bench.plan import Plan, attempts, full_plan, quick_plan
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, scene
 from convexrough.bench.suite import Bench, Panel
 from convexrough.influence import DenseInfluence, LatticeInfluence
-from convexrough.normal import NormalProblem
-from convexrough.plots import bench_figures
+from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, Conic, Newton
 
 ROOT = Path(__file__).parent.parent
@@ -227,14 +227,14 @@ def invented(*rows: Row, reference: Any = None) -> Bench:
 
 def test_verdicts() -> None:
     bench = invented(row("newton", 1.0, 1e-15), row("conic", 0.1, 1e-6))
-    first, second = tell.verdicts(bench)
+    first, second = summary.verdicts(bench)
     assert first.endswith("in 1 of 1 scenes.")
     assert second.startswith("The time of a press grows as n^1.10 from 10,000 to 1,000,000 ")
     bench = invented(row("newton", 1.0, 1e-15), row("conic", 0.1, 1e-16))
-    lines = tell.verdicts(bench)
+    lines = summary.verdicts(bench)
     assert lines[0].endswith("in 0 of 1 scenes.")
     assert lines[1] == "NOT on the frontier with 61 asperities (lattice): conic, "
-    panel = tell.summarise(bench)["work_precision"][0]
+    panel = summary.summarise(bench)["work_precision"][0]
     assert panel["default_on_frontier"] is False
     assert panel["better_than_default"] == [["conic", ""]]
 
@@ -246,7 +246,7 @@ def test_settings_that_make_no_difference_are_one_line() -> None:
     ]
     rows += [replace(row("conic", 1.0, error), setting=str(error)) for error in (1e-3, 1e-6)]
     rows += [Row("bristles", str(m), False, "left out", expected=m) for m in (16, 64)]
-    first, *conic, last = tell.condensed(rows)
+    first, *conic, last = summary.condensed(rows)
     assert (first.setting, first.seconds, first.default) == ("tolerance 1e-2 to 1e-12", 1.0, True)
     assert [each.setting for each in conic] == ["0.001", "1e-06"]
     assert (last.setting, last.expected) == ("every setting", 16)
@@ -318,7 +318,7 @@ def test_json(command: Any, tmp_path: Path) -> None:
     assert {each["what"] for each in summary["shear"]} == {"state", "loss curve"}
 
 
-PAGE = f"# Title\n\nBefore.\n\n{tell.BEGIN}\nold\n{tell.END}\n\nAfter.\n"
+PAGE = f"# Title\n\nBefore.\n\n{summary.BEGIN}\nold\n{summary.END}\n\nAfter.\n"
 
 
 def test_a_page_is_renewed_between_its_markers(command: Any, tmp_path: Path) -> None:
@@ -340,7 +340,7 @@ def test_a_page_is_renewed_between_its_markers(command: Any, tmp_path: Path) -> 
 
 @pytest.mark.parametrize(
     "text",
-    ["nothing", PAGE.replace(tell.END, ""), PAGE.replace(tell.BEGIN, ""), PAGE + PAGE],
+    ["nothing", PAGE.replace(summary.END, ""), PAGE.replace(summary.BEGIN, ""), PAGE + PAGE],
     ids=["no block", "no end", "no beginning", "two blocks"],
 )
 def test_a_page_without_one_block_is_refused_first(command: Any, tmp_path: Path, text: str) -> None:
@@ -357,7 +357,7 @@ def test_the_page_of_the_documentation() -> None:
     page = ROOT / "docs" / "performance.md"
     before, _ = benching.split_page(page)
     assert "convexrough bench --page docs/performance.md" in before
-    block = page.read_text("utf-8").split(tell.BEGIN)[1].split(tell.END)[0]
+    block = page.read_text("utf-8").split(summary.BEGIN)[1].split(summary.END)[0]
     assert "| newton (default) " in block
     tables = [line for line in block.splitlines() if line.startswith("|")]
     assert all(line.endswith("|") for line in tables)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, scattered
 
 import convexrough as cr
-from convexrough.normal import NormalProblem
+from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP
 
 CONTROLS = ("approach", "load")

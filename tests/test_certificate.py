@@ -24,9 +24,9 @@ from scenes import (
 )
 
 import convexrough as cr
-from convexrough.certificate import _convex_margin, _find_box, judge
 from convexrough.influence import Influence, Kind, Rounding
-from convexrough.normal import NormalProblem
+from convexrough.normal.certificate import _convex_margin, _find_box, judge
+from convexrough.normal.problem import NormalProblem
 
 Array = NDArray[np.float64]
 

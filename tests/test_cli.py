@@ -17,7 +17,7 @@ from test_io import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
 from convexrough import cli
-from convexrough.scene_file import read_scene
+from convexrough.run.scene_file import read_scene
 
 
 class Outcome(NamedTuple):

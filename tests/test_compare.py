@@ -18,7 +18,7 @@ import convexrough as cr
 from convexrough import cli
 from convexrough import compare as comparing
 from convexrough.compare import Answer, compare, contradictions, every_solver
-from convexrough.normal import NormalProblem
+from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, Newton, Solution
 
 NAMES = [

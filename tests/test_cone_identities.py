@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from convexrough.cones import (
+from convexrough.convex.cones import (
     FIVE_CONES,
     FIVE_CONES_LIMIT,
     FOUR_CONES,

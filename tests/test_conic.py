@@ -13,9 +13,9 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, reference
 
 import convexrough as cr
-from convexrough.normal import NormalProblem
+from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Conic, ConicCVXPY, Newton, Solution, TooDenseError
-from convexrough.solvers.lifted import Answer, Boxes, solve_in
+from convexrough.solvers.cone_boxes import Answer, Boxes, solve_in
 
 SOLVERS = [Conic(), ConicCVXPY()]
 RAW = [Conic(newton_step=False), ConicCVXPY(newton_step=False)]

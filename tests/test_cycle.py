@@ -11,9 +11,9 @@ from scenes import NAMED, PAPER_APPROACH, paper, random_scenes
 from test_shear import FRICTION, KINDS, pressed, with_friction
 
 import convexrough as cr
-from convexrough import hertz
-from convexrough.history import _remember
 from convexrough.influence import inverse_distances
+from convexrough.shearing.history import _remember
+from convexrough.sphere import hertz
 
 NU = 0.3
 

@@ -13,10 +13,17 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, scattered
 
 import convexrough as cr
-from convexrough import cones, friction_cones, hertz
-from convexrough.friction import FrictionConic, FrictionNewton, VectorShearState, shear_vector
-from convexrough.friction_certificate import judge_vectors
-from convexrough.friction_problem import VectorProblem, VectorState
+from convexrough.convex import cones
+from convexrough.sphere import hertz
+from convexrough.vector_shear import cones as friction_cones
+from convexrough.vector_shear.certificate import judge_vectors
+from convexrough.vector_shear.problem import VectorProblem, VectorState
+from convexrough.vector_shear.state import (
+    FrictionConic,
+    FrictionNewton,
+    VectorShearState,
+    shear_vector,
+)
 
 FRICTION = 0.5
 FRACTIONS = [1e-9, 1e-3, 0.1, 0.3, 0.5, 0.8, 0.99]

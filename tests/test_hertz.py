@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import dblquad, quad
 
-from convexrough import hertz
+from convexrough.sphere import hertz
 
 MODULUS, RADIUS, LOAD = 3.0, 0.7, 2e-5
 A = float(hertz.contact_radius(LOAD, MODULUS, RADIUS))

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import convexrough as cr
-from convexrough import results
-from convexrough.io import ASPERITY_COLUMNS, read_loads, read_summits, read_table
-from convexrough.report import Summary, summarise, to_json
-from convexrough.results import beside, claim_folder, write_results
-from convexrough.scene_file import UnitNames, read_scene
-from convexrough.stages import Outcome
+from convexrough.run import results
+from convexrough.run.report import Summary, summarise, to_json
+from convexrough.run.results import beside, claim_folder, write_results
+from convexrough.run.scene_file import UnitNames, read_scene
+from convexrough.run.stages import Outcome
+from convexrough.run.tables import ASPERITY_COLUMNS, read_loads, read_summits, read_table
 
 HEXAGONAL = """
 pattern = "hexagonal"

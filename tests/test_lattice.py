@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scenes import paper, rough, steel
 
 import convexrough as cr
+from convexrough.convex.newton_step import correct
 from convexrough.influence import (
     DenseInfluence,
     LatticeInfluence,
@@ -19,11 +20,10 @@ from convexrough.influence import (
     inverse_distances,
     shells,
 )
-from convexrough.influence.box import Box, _pass_roundoffs, neighbours
-from convexrough.lattice import BLUR, Lattice
-from convexrough.newton_system import correct
+from convexrough.influence.convolution import Box, _pass_roundoffs, neighbours
 from convexrough.roundoff import ROUNDOFF
-from convexrough.scene import nearest_distances
+from convexrough.scene.lattice import BLUR, Lattice
+from convexrough.scene.scene import nearest_distances
 
 Array = NDArray[np.float64]
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scenes import MATERIAL, PAPER_APPROACH, STEEL
 
 import convexrough as cr
-from convexrough import hertz
 from convexrough.influence import Kind
-from convexrough.normal import NormalProblem
+from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Newton
 from convexrough.solvers.newton import FEW
+from convexrough.sphere import hertz
 
 Array = NDArray[np.float64]
 

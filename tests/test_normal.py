@@ -22,12 +22,12 @@ from scenes import (
 )
 
 import convexrough as cr
-from convexrough import hertz
 from convexrough.influence import Kind, inverse_distances
-from convexrough.load_control import highest_approach, shifted_to_load
-from convexrough.normal import NormalProblem
+from convexrough.normal.load_control import highest_approach, shifted_to_load
+from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Newton
 from convexrough.solvers.newton import _evaluate, _step
+from convexrough.sphere import hertz
 
 Case = tuple[cr.Scene, float, Kind]
 

@@ -16,8 +16,9 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel
 
 import convexrough as cr
-from convexrough import fields, hertz
+from convexrough import fields
 from convexrough.plots import press_figures
+from convexrough.sphere import hertz
 
 
 def three() -> cr.Contact:

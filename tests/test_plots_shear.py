@@ -14,11 +14,13 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough
 
 import convexrough as cr
-from convexrough import fields, hertz, plots
+from convexrough import fields, plots
+from convexrough.paper.figures import paper_figures
 from convexrough.plots import cycle as loops
 from convexrough.plots import style
 from convexrough.plots.shear import SLIDING
-from convexrough.smooth import smooth
+from convexrough.sphere import hertz
+from convexrough.sphere.smooth import smooth
 
 UNITS: Any = dict(length_unit="µm", force_unit="mN")
 
@@ -56,7 +58,7 @@ def past(name: str, shares: Any) -> cr.History:
 
 @cache
 def of_paper(name: str) -> dict[str, Figure]:
-    return plots.paper_figures(contact(name), **UNITS)
+    return paper_figures(contact(name), **UNITS)
 
 
 def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
@@ -344,7 +346,7 @@ def test_no_contact_is_said() -> None:
         plots.shear_figures([cr.shear(nothing, force=0.0)] * 2, **UNITS)
         | plots.cycle_figures(cr.cycles(nothing, [0.0, 0.0]), **UNITS)
         | plots.history_figures(cr.history(nothing, forces=[0.0, 0.0]), **UNITS)
-        | plots.paper_figures(nothing, **UNITS)
+        | paper_figures(nothing, **UNITS)
     )
     assert len(figures) == 10
     for figure in figures.values():

@@ -22,8 +22,8 @@ from scenes import (
 from scipy.optimize import brentq
 
 import convexrough as cr
-from convexrough import hertz
 from convexrough.influence import Kind
+from convexrough.sphere import hertz
 
 Case = tuple[cr.Scene, float, Kind]
 

@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose
 
 from convexrough.influence import DenseInfluence, inverse_distances
 from convexrough.influence.mesh import Product, within
-from convexrough.influence.plan import Plan
 from convexrough.influence.scattered import ScatteredCoupling, ScatteredInfluence
 from convexrough.influence.softened import Softened, _steepest, lagrange, lebesgue
+from convexrough.influence.splitting import Plan
 
 SCALE = 0.37
 COUNT = 4000

@@ -13,7 +13,7 @@ from scenes import MATERIAL, paper
 from scipy.optimize import minimize
 
 import convexrough as cr
-from convexrough.scene import CUT, largest_tip_radius, reach
+from convexrough.scene.scene import CUT, largest_tip_radius, reach
 
 
 def test_material() -> None:

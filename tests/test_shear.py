@@ -13,11 +13,11 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, solve_exactly
 
 import convexrough as cr
-from convexrough import hertz
 from convexrough.influence import inverse_distances
-from convexrough.known_loads import Known
-from convexrough.shear_certificate import judge_states
-from convexrough.tangential import TangentialProblem
+from convexrough.shearing.certificate import judge_states
+from convexrough.shearing.load_errors import Known
+from convexrough.shearing.problem import TangentialProblem
+from convexrough.sphere import hertz
 
 FRICTION = 0.5
 DIGITS = 80

@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper
 
 import convexrough as cr
-from convexrough import fields, hertz, mindlin
+from convexrough import fields
+from convexrough.sphere import hertz, surface_shear
 
 A, PEAK, G = 0.7, 2.0, 3.0
 RATIOS = [0.0, 0.3, 0.5]
@@ -17,7 +18,9 @@ DIRECTIONS = np.array([0.0, 0.7, np.pi / 2, 2.5])
 
 
 def displacement(r: Any, angle: Any, nu: float, share: float = 1.0) -> Any:
-    return mindlin.surface_displacement(r * np.cos(angle), r * np.sin(angle), A, share, PEAK, G, nu)
+    return surface_shear.surface_displacement(
+        r * np.cos(angle), r * np.sin(angle), A, share, PEAK, G, nu
+    )
 
 
 def cerruti(r: float, angle: float, nu: float, a: float, q0: float) -> float:
@@ -117,9 +120,9 @@ def test_sixty_digits(share: float, nu: float) -> None:
         for angle in DIRECTIONS:
             x, y = ratio * A * np.cos(angle), ratio * A * np.sin(angle)
             traction, moved = exact(x, y, nu, share)
-            computed = mindlin.surface_displacement(x, y, A, share, PEAK, G, nu)
+            computed = surface_shear.surface_displacement(x, y, A, share, PEAK, G, nu)
             assert computed == pytest.approx(moved, rel=1e-13), (ratio, angle)
-            q = mindlin.traction(np.hypot(x, y), A, share, PEAK)
+            q = surface_shear.traction(np.hypot(x, y), A, share, PEAK)
             assert q == pytest.approx(traction, rel=1e-13), (ratio, angle)
 
 
@@ -211,7 +214,7 @@ def test_displacement_is_the_plain_sum_in_blocks(
     for i in np.flatnonzero(contact.loads):
         share = state.forces[i] / (0.5 * contact.loads[i]) if state.stick_radii[i] else 1.0
         x, y = np.moveaxis(points - scene.contact_points[i], -1, 0)
-        plain += mindlin.surface_displacement(
+        plain += surface_shear.surface_displacement(
             x,
             y,
             contact.contact_radii[i],

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.smooth import SmoothSphere, smooth
+from convexrough.sphere.smooth import SmoothSphere, smooth
 
 R, RHO, FRICTION = 1.3, 0.4, 0.35
 RELATIVE = 1 / (1 / R + 1 / RHO)

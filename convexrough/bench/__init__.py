@@ -3,7 +3,7 @@
 from convexrough.bench.files import write_bench
 from convexrough.bench.plan import Plan, full_plan, quick_plan
 from convexrough.bench.suite import Bench, Panel, run
-from convexrough.bench.tell import describe, split_page, summarise
+from convexrough.bench.summary import describe, split_page, summarise
 
 __all__ = [
     "Bench",

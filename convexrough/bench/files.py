@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from convexrough.bench.suite import Bench
-from convexrough.bench.tell import renewed_page, summarise, tables
+from convexrough.bench.summary import renewed_page, summarise, tables
 from convexrough.errors import FileError
-from convexrough.report import to_json
-from convexrough.results import beside, write_figures, write_tables
+from convexrough.run.report import to_json
+from convexrough.run.results import beside, write_figures, write_tables
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +27,7 @@ def write_bench(folder: Path, bench: Bench, *, figures: bool, page: Path | None)
     written = write_tables(folder, tables(bench))
     drawn: Mapping[str, Figure] = {}
     if figures or page is not None:
-        from convexrough.plots import bench_figures  # matplotlib: only when it draws
+        from convexrough.bench.figures import bench_figures  # matplotlib: only when it draws
 
         drawn = bench_figures(bench)
     if figures:

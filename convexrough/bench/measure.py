@@ -13,14 +13,14 @@ import numpy as np
 
 from convexrough.bench.reference import Reference
 from convexrough.bench.scenes import APPROACH
-from convexrough.certificate import judge
 from convexrough.checks import Array
 from convexrough.contact import press
 from convexrough.errors import InputError, SolverError
 from convexrough.influence import Influence, Kind
 from convexrough.memory import MemoryRise
-from convexrough.normal import NormalProblem
-from convexrough.scene import Scene
+from convexrough.normal.certificate import judge
+from convexrough.normal.problem import NormalProblem
+from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton, Solver
 
 MOST_REPEATS = 25

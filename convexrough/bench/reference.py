@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import hertz
 from convexrough.checks import Array, Indices
+from convexrough.convex.newton_step import correct
 from convexrough.errors import InputError, SolverError
-from convexrough.lattice import Lattice
-from convexrough.newton_system import correct
-from convexrough.normal import NormalProblem
-from convexrough.scene import Scene
+from convexrough.normal.problem import NormalProblem
+from convexrough.scene.lattice import Lattice
+from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz
 
 Long = np.longdouble
 LongArray = NDArray[np.longdouble]

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from convexrough.scene import Asperities, Material, Scene
+from convexrough.scene.scene import Asperities, Material, Scene
 
 Family = Literal["lattice", "rough", "scattered"]
 

@@ -25,12 +25,12 @@ from convexrough.bench.plan import Plan, attempts
 from convexrough.bench.reference import Reference, measurable, refine
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import Contact, press
-from convexrough.cycle import cycles
 from convexrough.errors import InputError, SolverError
 from convexrough.memory import MemoryRise
-from convexrough.normal import NormalProblem
-from convexrough.scene import Scene
-from convexrough.shear import shear
+from convexrough.normal.problem import NormalProblem
+from convexrough.scene.scene import Scene
+from convexrough.shearing.cycle import cycles
+from convexrough.shearing.state import shear
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 
 #: The exponent of cost is fitted from so many asperities on: below, fixed costs count.

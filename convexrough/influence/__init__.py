@@ -1,8 +1,7 @@
 """Elastic coupling between asperities, as an operator that knows its own rounding error."""
 
 from convexrough.influence.choice import KINDS, couple
-from convexrough.influence.dense import DenseInfluence
-from convexrough.influence.interface import (
+from convexrough.influence.coupling import (
     Coupling,
     Influence,
     Kind,
@@ -13,6 +12,7 @@ from convexrough.influence.interface import (
     shells,
     spread,
 )
+from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.scattered import ScatteredInfluence
 

@@ -6,11 +6,11 @@ from typing import get_args
 
 from convexrough.checks import Indices
 from convexrough.errors import InputError
+from convexrough.influence.coupling import Influence, Kind
 from convexrough.influence.dense import DenseInfluence
-from convexrough.influence.interface import Influence, Kind
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.scattered import ScatteredInfluence
-from convexrough.scene import Scene
+from convexrough.scene.scene import Scene
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 

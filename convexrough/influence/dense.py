@@ -11,7 +11,7 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.checks import Array, Indices
-from convexrough.influence.interface import (
+from convexrough.influence.coupling import (
     ENTRY_ROUNDOFFS,
     Kind,
     Rounding,

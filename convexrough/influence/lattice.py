@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.checks import Array, Indices
-from convexrough.influence.box import Box, Kernel, neighbours
+from convexrough.influence.convolution import Box, Kernel, neighbours
+from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
-from convexrough.influence.interface import Coupling, Kind, Rounding, Smoother
-from convexrough.influence.neighbours import crowding, separations
-from convexrough.influence.smoother import block_smoother
-from convexrough.lattice import Lattice, Sites
+from convexrough.influence.lattice_smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF
+from convexrough.scene.lattice import Lattice, Sites
+from convexrough.scene.neighbours import crowding, separations
 
 #: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
 ENTRY_ROUNDOFFS = 24

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.checks import Array, Indices
-from convexrough.influence.box import Box, Kernel
-from convexrough.influence.interface import Rounding
-from convexrough.influence.near import Near, Order
-from convexrough.influence.plan import Plan
+from convexrough.influence.convolution import Box, Kernel
+from convexrough.influence.coupling import Rounding
+from convexrough.influence.near_pairs import Near, Order
 from convexrough.influence.softened import Softened, lagrange, lebesgue, weight_roundoffs
+from convexrough.influence.splitting import Plan
 from convexrough.roundoff import ROUNDOFF
 
 #: Points of one block at most: what keeps sums short, and a matrix product in the cache.

@@ -13,11 +13,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from convexrough.checks import Array, Indices
+from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
-from convexrough.influence.interface import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.mesh import Product
-from convexrough.influence.neighbours import crowding, separations
-from convexrough.influence.plan import Plan
+from convexrough.influence.splitting import Plan
+from convexrough.scene.neighbours import crowding, separations
 
 #: Error of a product, relative to its own size, that is left to interpolation.
 TOLERANCE = 1e-13

@@ -5,18 +5,14 @@ converted. No global state of matplotlib is touched: save a figure, or show it i
 of dense scenes are pixels inside a vector file: save that with a `dpi` too.
 """
 
-from convexrough.plots.bench import bench_figures
 from convexrough.plots.cycle import cycle_figures
 from convexrough.plots.history import history_figures
-from convexrough.plots.paper import paper_figures
 from convexrough.plots.press import press_figures
 from convexrough.plots.shear import shear_figures
 
 __all__ = [
-    "bench_figures",
     "cycle_figures",
     "history_figures",
-    "paper_figures",
     "press_figures",
     "shear_figures",
 ]

@@ -11,11 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
-from convexrough import hertz
 from convexrough.checks import Array
 from convexrough.contact import Contact
-from convexrough.cycle import Cycle, Loop
-from convexrough.history import history
 from convexrough.plots.style import (
     DASHED,
     DOUBLE,
@@ -30,7 +27,10 @@ from convexrough.plots.style import (
     round_ticks,
     spread,
 )
-from convexrough.smooth import SmoothSphere
+from convexrough.shearing.cycle import Cycle, Loop
+from convexrough.shearing.history import history
+from convexrough.sphere import hertz
+from convexrough.sphere.smooth import SmoothSphere
 
 MOST_LOOPS, MOST_ASPERITIES = 4, 6
 POINTS = 400  # of a loop

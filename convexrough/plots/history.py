@@ -15,7 +15,6 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from convexrough.checks import Array
-from convexrough.history import History, history
 from convexrough.plots.style import (
     DOUBLE,
     SMOOTH,
@@ -24,6 +23,7 @@ from convexrough.plots.style import (
     label,
     no_contact_figure,
 )
+from convexrough.shearing.history import History, history
 
 MOST_POINTS, MOST_NUMBERS, MOST_DOTS = 2000, 12, 60
 

@@ -8,7 +8,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from convexrough import fields, hertz
+from convexrough import fields
 from convexrough.checks import Array
 from convexrough.contact import Contact
 from convexrough.plots.style import (
@@ -35,6 +35,7 @@ from convexrough.plots.style import (
     say_no_contact,
     towards_rim,
 )
+from convexrough.sphere import hertz
 
 
 def press_figures(

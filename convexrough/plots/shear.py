@@ -35,7 +35,7 @@ from convexrough.plots.style import (
     round_ticks,
     spread,
 )
-from convexrough.shear import ShearState
+from convexrough.shearing.state import ShearState
 
 #: The more slip, the darker, also in grey.
 STICK, SLIP, SLIDING = "#b9d0e5", "#e0842a", "#701c05"

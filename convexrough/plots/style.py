@@ -17,10 +17,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
-from convexrough import hertz
 from convexrough.checks import Array, Indices
 from convexrough.contact import Contact
-from convexrough.smooth import SmoothSphere, smooth
+from convexrough.sphere import hertz
+from convexrough.sphere.smooth import SmoothSphere, smooth
 
 LABEL, TICK = 9, 8  # points
 SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal

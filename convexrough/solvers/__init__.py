@@ -4,9 +4,9 @@ Those written elsewhere (Clarabel, CVXPY, OSQP) are imported when first used.
 """
 
 from convexrough.solvers.bristles import BristleQP
+from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.conic import Conic
 from convexrough.solvers.conic_cvxpy import ConicCVXPY, LiftedModel
-from convexrough.solvers.lifted import TooDenseError
 from convexrough.solvers.newton import Newton
 from convexrough.solvers.solution import Solution, Solver
 

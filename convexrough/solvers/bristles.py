@@ -38,14 +38,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks, hertz
+from convexrough import checks
 from convexrough.checks import Array
+from convexrough.convex.libraries import load_library
 from convexrough.errors import InputError, SolverError
-from convexrough.normal import NormalProblem
-from convexrough.solvers.libraries import load_library
-from convexrough.solvers.lifted import TooDenseError
+from convexrough.normal.problem import NormalProblem
+from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.newton import newton_step
 from convexrough.solvers.solution import Announce, Solution
+from convexrough.sphere import hertz
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix

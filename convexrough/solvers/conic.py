@@ -16,11 +16,11 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.checks import Array
-from convexrough.cones import power_cones
+from convexrough.convex.cones import power_cones
+from convexrough.convex.libraries import load_library
 from convexrough.errors import SolverError
-from convexrough.normal import NormalProblem
-from convexrough.solvers.libraries import load_library
-from convexrough.solvers.lifted import Answer, Boxes, solve_in_boxes
+from convexrough.normal.problem import NormalProblem
+from convexrough.solvers.cone_boxes import Answer, Boxes, solve_in_boxes
 from convexrough.solvers.solution import Announce, Solution
 
 #: From this many asperities on Clarabel's supernodal factorisation is the faster one.

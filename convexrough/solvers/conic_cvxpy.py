@@ -14,10 +14,10 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.checks import Array
+from convexrough.convex.libraries import load_library
 from convexrough.errors import InputError, SolverError
-from convexrough.normal import NormalProblem
-from convexrough.solvers.libraries import load_library
-from convexrough.solvers.lifted import Answer, Boxes, accept, solve_in_boxes
+from convexrough.normal.problem import NormalProblem
+from convexrough.solvers.cone_boxes import Answer, Boxes, accept, solve_in_boxes
 from convexrough.solvers.solution import Announce, Solution
 
 

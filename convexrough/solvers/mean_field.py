@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from convexrough import hertz
 from convexrough.checks import Array
-from convexrough.normal import NormalProblem
+from convexrough.normal.problem import NormalProblem
+from convexrough.sphere import hertz
 
 #: At most so many rings, and of so many asperities at least.
 RINGS, LEAST = 128, 150

@@ -6,7 +6,7 @@ P_i = (max(delta_i, 0) / k_i)^(3/2) the whole contact law is the square system
     F(delta) = delta + A P(delta) - D = 0,
 
 once differentiable, and no active set is guessed: it is the sign of the answer. A step is that of
-`convexrough.newton_system`; in the convex range it descends the energy Phi(P(delta)).
+`convexrough.convex.newton_step`; in the convex range it descends the energy Phi(P(delta)).
 
 Of many asperities only those near the contact take part in the iteration. What the others feel is
 looked at once it has ended; where one of them would touch, it goes on with more.
@@ -19,15 +19,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from convexrough import hertz
 from convexrough.checks import Array
+from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
-from convexrough.load_control import shifted_to_load
-from convexrough.newton_system import correct
-from convexrough.normal import NormalProblem
+from convexrough.normal.load_control import shifted_to_load
+from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import SAFETY
 from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.solvers.solution import Announce, Solution
+from convexrough.sphere import hertz
 
 #: Of more candidates than this, only those near the contact are iterated on.
 FEW = 1000

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from convexrough.checks import Array
-from convexrough.normal import NormalProblem
+from convexrough.normal.problem import NormalProblem
 
 #: Told in a line how far long work has come.
 Announce = Callable[[str], object]

@@ -1,0 +1,168 @@
+"""A box of sites of a lattice, and convolutions on it by Fourier transforms of known rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.checks import Array
+from convexrough.influence.lattice_smoother import differences
+
+#: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.2 for the
+#: twiddle factors and the products with them, and sqrt(p) ((p - 1) / 2 + 4) for the sums of p terms
+#: (1 for p = 2). Radices 4 and 8 cost less than two and three passes of radix 2.
+PASS_ROUNDOFFS = {2: 6, 3: 13, 5: 18, 7: 23, 11: 35}
+
+#: Transforms of more numbers than this use every core.
+PARALLEL = 2**18
+
+#: Columns transformed at a time: what a cache holds.
+COLUMNS = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A box of sites, and convolutions on it.
+
+    shape : (rows, columns) of sites;  basis : (2, 2) rows b1 and b2, in units of the spacing: so
+        single precision holds the kernel whatever the scene's units
+    """
+
+    shape: tuple[int, int]
+    basis: Array
+
+    @cached_property
+    def padded(self) -> tuple[int, int]:
+        """The size of the transforms."""
+        from scipy.fft import next_fast_len  # 0.1 s to import: only where there is a lattice
+
+        rows, columns = self.shape
+        return next_fast_len(2 * rows - 1), next_fast_len(2 * columns - 1, real=True)
+
+    @property
+    def workers(self) -> int:
+        """Threads: all cores (-1) where that pays."""
+        return -1 if self.padded[0] * self.padded[1] > PARALLEL else 1
+
+    @cached_property
+    def loss(self) -> float:
+        """Roundoffs of one two-dimensional transform, relative in the 2-norm."""
+        return float(sum(_pass_roundoffs(length) for length in self.padded))
+
+    def kernel(self, power: int, dtype: Any) -> Kernel:
+        """1 / |i b1 + j b2|^power for every difference of two sites of the box, 0 for none."""
+        from scipy import fft
+
+        rows, columns = self.padded
+        i, j = differences(rows), differences(columns)
+        j_used = np.abs(j) < self.shape[1]
+        half = np.zeros((rows, columns // 2 + 1), dtype=np.result_type(dtype, np.complex64))
+        total = square = 0.0
+        block = max(1, 2**20 // columns)
+        for start in range(0, self.shape[0], block):
+            taken = slice(start, min(start + block, self.shape[0]))
+            x = np.add.outer(i[taken] * self.basis[0, 0], j * self.basis[1, 0])
+            y = np.add.outer(i[taken] * self.basis[0, 1], j * self.basis[1, 1])
+            x *= x
+            y *= y
+            x += y
+            np.sqrt(x, out=x)
+            if start == 0:
+                x[0, 0] = np.inf
+            values = j_used / x
+            if power > 1:
+                values **= power
+            weights = np.where(i[taken] > 0, 2.0, 1.0)  # i and -i
+            total += float(weights @ values.sum(axis=1))
+            square += float(weights @ (values * values).sum(axis=1))
+            half[taken] = fft.rfft(values.astype(dtype), axis=1, workers=self.workers)
+        # The kernel is even: row -i is row i read backwards.
+        last = self.shape[0] - 1
+        if last:
+            half[-last:] = np.conj(half[last:0:-1])
+        spectrum = np.empty(half.shape, dtype=dtype)
+        for each in _blocks(half.shape[1]):
+            spectrum[:, each] = fft.fft(half[:, each], axis=0, workers=self.workers).real
+        return Kernel(spectrum, total, float(np.sqrt(square)))
+
+    def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
+        """The convolution of a field (rows, columns) with a kernel, on the box."""
+        from scipy import fft
+
+        rows, columns = self.padded
+        half = fft.rfft(field, columns, axis=1, workers=self.workers)
+        for each in _blocks(half.shape[1]):
+            full = fft.fft(half[:, each], rows, axis=0, workers=self.workers)
+            full *= spectrum[:, each]
+            full = fft.ifft(full, axis=0, overwrite_x=True, workers=self.workers)
+            half[:, each] = full[: self.shape[0]]
+        result: NDArray[Any] = fft.irfft(half, columns, axis=1, workers=self.workers)
+        return result[:, : self.shape[1]]
+
+    def bound(self, kernel: Kernel, roundoff: float) -> float:
+        """Bound on the 2-norm of the error of `convolve`, relative to that of the field."""
+        size = float(np.sqrt(float(self.padded[0]) * self.padded[1]))
+        spectral = self.loss * size * kernel.norm
+        return 1.01 * roundoff * ((2 * self.loss + 4) * kernel.total + spectral)
+
+    def bound_each(self, kernel: Kernel, roundoff: float) -> float:
+        """Bound on each component of that error, relative to the 2-norm of the field.
+
+        What the two forward transforms lose reaches a component through the other's 2-norm, and
+        the inverse transform loses at most so much of the mean modulus of what it adds up, which
+        is at most the product of both.
+        """
+        inverse = float(np.sqrt(2.0)) * self.loss
+        return 1.01 * roundoff * (2 * self.loss + inverse + 4) * kernel.norm
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """spectrum : of its transform, real as the kernel is even; total, norm : its sum and 2-norm."""
+
+    spectrum: NDArray[Any]
+    total: float
+    norm: float
+
+
+def _blocks(width: int) -> Iterator[slice]:
+    for start in range(0, width, COLUMNS):
+        yield slice(start, min(start + COLUMNS, width))
+
+
+def _pass_roundoffs(length: int) -> int:
+    total = 0
+    for radix, cost in PASS_ROUNDOFFS.items():
+        while length % radix == 0:
+            length //= radix
+            total += cost
+    assert length == 1  # what next_fast_len gives
+    return total
+
+
+def neighbours(box: Box) -> Iterator[tuple[float, int, int]]:
+    """Differences of two sites, one of each pair +-, by increasing distance."""
+    rows, columns = box.shape
+    reach = 1
+    done = 0.0
+    while True:
+        i = np.arange(0, min(reach, rows - 1) + 1)
+        j = np.arange(-min(reach, columns - 1), min(reach, columns - 1) + 1)
+        i, j = (each.ravel() for each in np.meshgrid(i, j, indexing="ij"))
+        half = (i > 0) | (j > 0)
+        i, j = i[half], j[half]
+        distances = np.hypot(*(box.basis.T @ np.stack((i, j))))
+        # On a reduced basis every difference beyond the square is longer than this.
+        whole = reach >= max(rows, columns) - 1
+        sure = np.inf if whole else 0.8 * (reach + 1) * float(np.hypot(*box.basis[0]))
+        order = np.argsort(distances)
+        for k in order[(distances[order] > done) & (distances[order] <= sure)]:
+            yield float(distances[k]), int(i[k]), int(j[k])
+        if whole:
+            return
+        done, reach = sure, 2 * reach

@@ -1,0 +1,154 @@
+"""Near pairs of points, found block by block, and what the smooth part leaves to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import checks
+from convexrough.checks import Array, Indices
+from convexrough.influence.splitting import Plan
+
+#: Pairs looked at together, and how many such pieces are held at once.
+PIECE, BATCH = 2**17, 32
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """Points in the order of the blocks of the mesh that they are in.
+
+    places : (n,) the points in order;  points : (n, 2) [length] in that order
+    cells  : (n, 2) mesh cells;  shares : (n, 2) where in its cell each is, from 0 to 1
+    keys   : of blocks with points, in order;  starts : (blocks + 1,) their points
+    shape  : rows and columns of blocks
+    """
+
+    places: Indices
+    points: Array
+    cells: Indices
+    shares: Array
+    keys: Indices
+    starts: Indices
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, points: Array, plan: Plan) -> Order:
+        low = points.min(axis=0) if len(points) else np.zeros(2)
+        away = (points - low) / plan.spacing if plan.meshed else np.zeros_like(points)
+        cells = np.floor(away).astype(np.intp)
+        blocks = cells // plan.block
+        rows, columns = (blocks.max(axis=0, initial=0) + 1).tolist()
+        key = blocks[:, 0] * columns + blocks[:, 1]
+        places = np.argsort(key, kind="stable")
+        keys, starts = np.unique(key[places], return_index=True)
+        return cls(
+            places,
+            points[places],
+            cells[places],
+            (away - cells)[places],
+            keys,
+            np.append(starts, len(points)).astype(np.intp),
+            (rows, columns),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """1 / r^q less its smooth part, for pairs of points nearer than the cut.
+
+    upper   : (n, n) sparse, pairs i < j;  own : what each point gets of itself
+    terms   : the most that any sum has;  nearest : [length] the least distance that is not 0
+    """
+
+    upper: Any
+    own: float
+    terms: int
+    nearest: float
+
+    @classmethod
+    def assemble(cls, order: Order, plan: Plan, dtype: Any) -> Near:
+        from scipy.sparse import csr_array
+
+        n = len(order.points)
+        pieces = list(_neighbourhoods(order, plan))
+        most = sum((rows.stop - rows.start) * int((b - a).sum()) for rows, a, b in pieces)
+        # About half of them are near; memory is taken when written to, not here.
+        checks.fits_in_memory("asperities that could touch", n, 6.0 * most / max(n, 1))
+        index: Any = np.int32 if most < 2**31 else np.int64
+        where, values = np.empty(most, dtype=index), np.empty(most, dtype=dtype)
+        counts = np.zeros(n, dtype=np.int64)
+        nearest, done = plan.cut, 0
+
+        def found(piece: Piece) -> tuple[slice, Indices, NDArray[np.int32], Array, float]:
+            rows, firsts, lasts = piece
+            others = np.concatenate(
+                [np.arange(a, b, dtype=np.int32) for a, b in zip(firsts, lasts, strict=True)]
+            )
+            mine, theirs = order.points[rows], order.points[others]
+            squares = np.subtract.outer(mine[:, 0], theirs[:, 0])
+            squares *= squares
+            y = np.subtract.outer(mine[:, 1], theirs[:, 1])
+            y *= y
+            squares += y
+            wanted = squares < plan.cut**2
+            own = lasts[0] - firsts[0]  # each pair once
+            wanted[:, :own] &= others[:own] > np.arange(rows.start, rows.stop)[:, None]
+            row, column = np.nonzero(wanted)
+            squares = squares[wanted]
+            closest = float(np.sqrt(squares[squares > 0].min(initial=np.inf)))
+            number = np.bincount(row, minlength=len(mine))
+            return rows, number, others[column], plan.kernel.local(squares), closest
+
+        with ThreadPoolExecutor(2) as threads:
+            for batch in range(0, len(pieces), BATCH):
+                for rows, number, mine, entries, closest in threads.map(
+                    found, pieces[batch : batch + BATCH]
+                ):
+                    counts[rows] = number
+                    where[done : done + len(mine)] = mine
+                    values[done : done + len(mine)] = entries
+                    done += len(mine)
+                    nearest = min(nearest, closest)
+        starts = np.concatenate(([0], np.cumsum(counts)))
+        both = counts
+        for start in range(0, done, 2**24):  # which makes a copy of each
+            both = both + np.bincount(where[start : min(start + 2**24, done)], minlength=n)
+        upper = csr_array((values[:done], where[:done], starts.astype(index)), shape=(n, n))
+        return cls(upper, -plan.kernel.centre, int(both.max(initial=0)), nearest)
+
+    def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
+        result: NDArray[Any] = self.upper @ loads
+        result += self.upper.T @ loads
+        result += loads.dtype.type(self.own) * loads
+        return result
+
+
+#: Points from and to, and where their neighbours begin and end in the order, row by row of blocks.
+Piece: TypeAlias = tuple[slice, Indices, Indices]
+
+
+def _neighbourhoods(order: Order, plan: Plan) -> Iterator[Piece]:
+    """Points, and those of their own and later blocks that can be nearer than the cut.
+
+    Blocks in a row are next to each other in the order, and so are their points.
+    """
+    rows, columns = order.shape
+    away = int(np.ceil(plan.cut / (plan.block * plan.spacing))) if plan.meshed else 0
+    away = min(away, max(rows, columns))
+    i, j = order.keys // columns, order.keys % columns
+    ahead = np.arange(min(away, rows - 1) + 1)
+    left = np.where(ahead > 0, np.maximum(j[:, None] - away, 0), j[:, None])
+    right = np.minimum(j + away, columns - 1)[:, None]
+    line = (i[:, None] + ahead) * columns
+    first = order.starts[np.searchsorted(order.keys, line + left, side="left")]
+    last = order.starts[np.searchsorted(order.keys, line + right, side="right")]
+    for block, sizes in enumerate((last - first).sum(axis=1).tolist()):
+        top, bottom = order.starts[block : block + 2].tolist()
+        step = max(1, PIECE // sizes)
+        for start in range(top, bottom, step):
+            yield slice(start, min(start + step, bottom)), first[block], last[block]

@@ -1,0 +1,1 @@
+"""Pressing: the normal problem, what a prescribed load implies, and the certificate."""

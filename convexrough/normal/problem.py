@@ -1,0 +1,272 @@
+"""The normal contact problem in its own units: energy, gap, residual, bounds, convexity.
+
+    minimise  Phi(P) = sum (3/5) k_i P_i^(5/3) + (1/2) P'AP - D'P   over P >= 0
+
+with D_i = D0 + d_i prescribed (approach control), or with sum P_i prescribed and D0 the multiplier
+of that constraint (load control). Its first-order conditions are the contact law
+
+    P >= 0,   g = k P^(2/3) + A P - D >= 0,   P_i g_i = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import checks
+from convexrough.checks import Array, Indices
+from convexrough.influence import Influence, Kind, couple, fitted_shells, shells
+from convexrough.normal.load_control import approach_bound, highest_approach, shifted_to_load
+from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz
+
+#: The part of the room between neighbours that fitted shells share out by size.
+FITTED = 0.9
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units in which the problem's numbers are about 1.
+
+    Powers of two, and the force a power of eight, so that scaling a float64 number (and its 2/3
+    power) by them is exact.
+    """
+
+    length: float  # [length] of approach
+    force: float  # [force]
+
+    @property
+    def local(self) -> float:
+        """What a local coefficient k is multiplied by: force^(2/3) / length, a power of two."""
+        return float(2.0 ** np.round(np.log2(self.force) * 2 / 3) / self.length)
+
+    @classmethod
+    def of(cls, approach: float, coefficient: float) -> Units:
+        length = 2.0 ** np.round(np.log2(approach))
+        force = 8.0 ** np.round(np.log2(length / coefficient) / 2.0)
+        return cls(float(length), float(force))
+
+
+@dataclass(frozen=True, eq=False)
+class NormalProblem:
+    """The asperities of a scene that could touch, and what is prescribed. In own units.
+
+    candidates    : (n,) their indices in the scene; all others carry nothing in any solution
+    coefficients  : (n,) k of the local law
+    offsets       : (n,) d_i = D_i - D0
+    offset_errors : (n,) bound on the rounding error of D_i, without that of D0
+    influence     : A
+    shells        : (n,) 1 / (pi E* s_i): added to the diagonal of A they make it semidefinite
+    approach      : D0, or None under load control
+    load          : total load, or None under approach control
+    ceiling       : upper bound on D0 at any solution
+    """
+
+    scene: Scene
+    units: Units
+    candidates: Indices
+    coefficients: Array
+    offsets: Array
+    offset_errors: Array
+    influence: Influence
+    shells: Array
+    approach: float | None
+    load: float | None
+    ceiling: float
+
+    def __len__(self) -> int:
+        return len(self.candidates)
+
+    @classmethod
+    def assemble(
+        cls,
+        scene: Scene,
+        *,
+        approach: float | None = None,
+        load: float | None = None,
+        influence: Kind | None = None,
+    ) -> NormalProblem:
+        """Screen, scale and couple. `approach` [length] or `load` [force], exactly one.
+
+        influence : how to couple; None for the cheapest exact way
+        """
+        checks.exactly_one("approach", approach, "load", load)
+        errors = scene.offset_errors
+        modulus = scene.material.contact_modulus
+        coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
+        if approach is not None:
+            ceiling = approach = checks.finite("approach", approach)
+        else:
+            assert load is not None  # exactly_one
+            load = checks.positive("load", load)
+            ceiling = highest_approach(scene, load, influence)
+
+        # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
+        prescribed = ceiling + scene.offsets + errors + 6 * ROUNDOFF * abs(ceiling)
+        candidates = np.flatnonzero(prescribed > 0)
+        top = float(prescribed[candidates].max(initial=0.0)) or 1.0
+        units = Units.of(top, float(np.median(coefficients)))
+
+        scale = units.force / units.length / (np.pi * modulus)
+        coupling = couple(scene, candidates, scale, influence)
+        return cls(
+            scene=scene,
+            units=units,
+            candidates=candidates,
+            coefficients=coefficients[candidates] * units.local,
+            offsets=scene.offsets[candidates] / units.length,
+            offset_errors=errors[candidates] / units.length,
+            influence=coupling,
+            shells=shells(coupling),
+            approach=None if approach is None else approach / units.length,
+            load=None if load is None else load / units.force,
+            ceiling=ceiling / units.length,
+        )
+
+    def among(self, which: Indices) -> NormalProblem:
+        """The problem of some of the candidates: all others carry nothing."""
+        return replace(
+            self,
+            candidates=self.candidates[which],
+            coefficients=self.coefficients[which],
+            offsets=self.offsets[which],
+            offset_errors=self.offset_errors[which],
+            influence=self.influence.among(which),
+            shells=self.shells[which],
+        )
+
+    def fitted_to(self, loads: Array) -> NormalProblem:
+        """The same problem, with shells as large as neighbours of these loads allow."""
+        with np.errstate(divide="ignore"):
+            radii = (np.pi / 2.0) * self.influence.scale / self.stiffness(loads)
+        shells = fitted_shells(self.influence, radii, FITTED)
+        return replace(self, shells=shells)
+
+    def energy(self, loads: Array, displacement: Array) -> float:
+        """Phi(P), with D0 = 0 under load control; `displacement` is A P."""
+        local = 0.6 * loads @ hertz.indentation(loads, self.coefficients)
+        prescribed = self.offsets + (self.approach or 0.0)
+        return float(local + loads @ (0.5 * displacement - prescribed))
+
+    def gap(self, loads: Array, displacement: Array, approach: float) -> Array:
+        """(n,) g = k P^(2/3) + A P - D, the gradient of Phi; `displacement` is A P."""
+        local: Array = hertz.indentation(loads, self.coefficients)
+        return local + displacement - self.offsets - approach
+
+    def residual(self, loads: Array, approach: float, displacement: Array | None = None) -> float:
+        """How far the contact law is from holding: max |g_i| where loaded, else max(-g_i, 0).
+
+        displacement : A P, if known
+        """
+        if displacement is None:
+            displacement = self.influence.apply(loads)
+        gap = self.gap(loads, displacement, approach)
+        return float(np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0)).max(initial=0.0))
+
+    def bounds(self, ceiling: float) -> Array:
+        """(n,) U_i = (max(D_i, 0) / k_i)^(3/2): no solution with D0 <= ceiling carries more."""
+        rounding = self.offset_errors + 6 * ROUNDOFF * abs(ceiling)
+        alone: Array = hertz.load(ceiling + self.offsets + rounding, self.coefficients)
+        return alone * (1 + SAFETY)
+
+    def stiffness(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
+        """h_i = (2/3) k_i P_i^(-1/3): the local part of the Hessian, 1 / (2 E* a_i)."""
+        with np.errstate(divide="ignore"):
+            h: Array = (2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads)
+        return h
+
+    def smooth_indentation(self) -> Array:
+        """A start: the heights, riding on the surface that a smooth sphere would make."""
+        radius, modulus = self.scene.sphere_radius, self.scene.material.contact_modulus
+        load = self.load
+        if load is None:
+            smooth = hertz.local_coefficient(modulus, radius) * self.units.local
+            alone = float(self.bounds(self.ceiling).sum())
+            load = min(float(hertz.load(self.ceiling, smooth)), alone) or alone
+        a = float(hertz.contact_radius(load * self.units.force, modulus, radius))
+        distances = self.scene.asperities.distances[self.candidates]
+        sunk = hertz.surface_displacement(distances, a, radius) / self.units.length
+        indentation: Array = self.offsets - sunk
+        return shifted_to_load(indentation, self.coefficients, load)
+
+    def convexity_number(self, loads: Array) -> float:
+        """theta = max 2 a_i / (pi s_i) over the box 0 <= P <= loads; Phi is convex where < 1.
+
+        The smallest eigenvalue of the Hessian, relative to its diagonal, is at least 1 - theta.
+        """
+        ratio = self.shells / self.stiffness(loads)
+        return float(ratio.max(initial=0.0)) * (1 + SAFETY)
+
+    def duality_gap(
+        self,
+        loads: Array,
+        displacement: Array,
+        approach: float,
+        box: Array,
+        error: Array | float = 0.0,
+    ) -> float:
+        """Upper bound on Phi(P) less its minimum over 0 <= P <= box, from the loads alone.
+
+        With M = A + diag(shells), positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2,
+        convex on the box where its convexity number is at most 1, any P gives a dual bound:
+
+            min Phi >= -P'MP / 2 + sum min over 0 <= x <= box_i of [h_i(x) - (D - M P)_i x].
+
+        Phi(P) less that is a sum of terms that are not negative. Under load control `approach` is
+        any estimate of the multiplier and `loads` must add up to the load. Infinite where the
+        shells do not prove the box convex. Rounding is counted, so it is never quite 0.
+
+        displacement : A P, and a bound on its error beyond that of a few roundings
+        """
+        if self.convexity_number(box) > 1:
+            return np.inf
+        k, shells = self.coefficients, self.shells
+        slope = approach + self.offsets - displacement - shells * loads  # (D - M P)_i
+        top = hertz.indentation(box, k) - shells * box  # h' at the box's upper end
+        # s = (x / box)^(1/3) solves k box^(2/3) s^2 - shell box s^3 = slope, by Newton's method
+        # from a lower bound.
+        k_box, shell_box = hertz.indentation(box, k), shells * box
+        target = np.clip(slope, 0.0, top)
+        s = np.sqrt(np.where(k_box > 0, target / np.where(k_box > 0, k_box, 1.0), 0.0))
+        for _ in range(60):
+            value = s * s * (k_box - shell_box * s) - target
+            rate = s * (2.0 * k_box - 3.0 * shell_box * s)
+            step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
+            s = np.clip(s - step, 0.0, 1.0)
+            if np.abs(step).max(initial=0.0) < 1e-15:
+                break
+        best = box * s**3
+
+        def charge(x: Array) -> Array:
+            return np.asarray(x * (0.6 * hertz.indentation(x, k) - shells * x / 2.0 - slope))
+
+        size = 0.6 * k_box + shell_box + np.abs(slope)
+        rounding = 32 * ROUNDOFF * float(((loads + best) * size).sum())
+        # A slope off by e moves a term by e times the distance from P to the best x at most, and
+        # the best x by e over the least curvature there.
+        curvature = self.stiffness(box) - shells
+        moved = np.divide(error, curvature, out=np.full(len(self), np.inf), where=curvature > 0)
+        distance = np.minimum(np.abs(loads - best) + moved, np.maximum(loads, box))
+        rounding += float((error * distance).sum()) * (1 + SAFETY)
+        return float(np.maximum(charge(loads) - charge(best), 0.0).sum()) + rounding
+
+    def overhang(self, weights: Array, displacement: Array) -> float:
+        """Upper bound on D0 at every solution of load control, from any trial loads.
+
+        weights      : (n,) trial loads, not negative, not all zero
+        displacement : A times weights
+        """
+        assert self.load is not None
+        displacement = displacement + self.influence.rounding(weights).of(displacement)
+        least = self.offsets - self.offset_errors
+        return approach_bound(weights, displacement, self.coefficients, least, self.load)
+
+    def to_scene(self, values: NDArray[Any]) -> Array:
+        """Values of the candidates, set among zeros for all other asperities of the scene."""
+        full = np.zeros(len(self.scene))
+        full[self.candidates] = values
+        return full

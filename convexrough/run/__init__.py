@@ -1,0 +1,1 @@
+"""A scene file in, result files out."""

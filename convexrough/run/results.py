@@ -1,0 +1,218 @@
+"""Result files of a run. Each is written beside its name and then renamed: whole, or not at all."""
+
+from __future__ import annotations
+
+import csv
+import os
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.contact import Contact
+from convexrough.errors import FileError
+from convexrough.run.report import Summary, to_json
+from convexrough.run.scene_file import UnitNames
+from convexrough.run.stages import Outcome, representatives
+from convexrough.run.tables import ASPERITY_COLUMNS
+from convexrough.shearing.cycle import Cycle
+from convexrough.shearing.state import ShearState
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Tables with more rows are written as .npz.
+MOST_CSV_ROWS = 100_000
+
+
+def claim_folder(folder: Path, *, force: bool) -> None:
+    """Make the folder and prove that it can be written to, before anything is computed.
+
+    force : accept a folder that holds something; files of the same names will be replaced
+
+    Raises FileError.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        occupied = any(folder.iterdir())
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise FileError(f"{folder}: cannot hold results: {error.strerror or error}") from error
+    if occupied and not force:
+        raise FileError(f"{folder}: not empty; --force replaces its results, --out takes another")
+
+
+def write_results(
+    folder: Path,
+    outcome: Outcome,
+    summary: Summary,
+    *,
+    figures: bool,
+    units: UnitNames | None = None,
+) -> list[Path]:
+    """Write summary.json, a table per stage (.csv, or .npz if long) and the figures.
+
+    Returns the paths. Raises FileError; files already written stay.
+    """
+    written = [_write_columns(folder / "asperities.csv", _asperity_columns(outcome.contact))]
+    if outcome.shear:
+        written.append(_write_columns(folder / "shear.csv", _shear_columns(outcome.shear)))
+    if outcome.cycles:
+        written.append(_write_columns(folder / "cycle.csv", _cycle_columns(outcome.cycles)))
+        written.append(_write_columns(folder / "loop.csv", _loop_columns(outcome)))
+    if outcome.history is not None:
+        fractions, past = outcome.history
+        columns = {
+            "fraction": np.array(fractions),
+            "force": past.applied,
+            "displacement": past.displacements,
+            "energy": past.energy,
+        }
+        written.append(_write_columns(folder / "history.csv", columns))
+    if figures:
+        written += write_figures(folder, _draw(outcome, units or UnitNames()))
+    # Last, so that a summary says that the rest is there.
+    path = folder / "summary.json"
+    with beside(path) as temporary:
+        temporary.write_text(to_json(summary) + "\n", encoding="utf-8")
+    return [path, *written]
+
+
+def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> list[Path]:
+    """Write each table, name -> columns, as NAME.csv; return the paths."""
+    return [_write_columns(folder / f"{name}.csv", table) for name, table in tables.items()]
+
+
+def write_figures(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
+    """Write each figure as PNG and SVG; return the paths."""
+    written = []
+    for stem, figure in figures.items():
+        for kind in ("png", "svg"):
+            path = folder / f"{stem}.{kind}"
+            with beside(path) as temporary:
+                figure.savefig(temporary, format=kind, dpi=200)
+            written.append(path)
+    return written
+
+
+def _draw(outcome: Outcome, units: UnitNames) -> dict[str, Figure]:
+    from convexrough import plots  # matplotlib: only when it draws
+
+    length, force = units
+    figures = plots.press_figures(outcome.contact, length_unit=length, force_unit=force)
+    if outcome.shear:
+        states = [state for _, state in outcome.shear]
+        figures |= plots.shear_figures(states, length_unit=length, force_unit=force)
+    if outcome.cycles:
+        cycles = [cycle for *_, cycle in outcome.cycles]
+        figures |= plots.cycle_figures(cycles, length_unit=length, force_unit=force)
+    if outcome.history is not None:
+        history = outcome.history[1]
+        figures |= plots.history_figures(history, length_unit=length, force_unit=force)
+    return figures
+
+
+@contextmanager
+def beside(path: Path) -> Iterator[Path]:
+    """A name beside `path` to write to, which takes its place if all goes well, or vanishes."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _asperity_columns(contact: Contact) -> dict[str, NDArray[Any]]:
+    asperities = contact.scene.asperities
+    x, y = asperities.positions.T
+    values = (
+        x,
+        y,
+        asperities.heights,
+        asperities.tip_radii,
+        contact.loads,
+        contact.contact_radii,
+        contact.gaps,
+        contact.status,
+        contact.certificate.load_errors,
+    )
+    return dict(zip(ASPERITY_COLUMNS, values, strict=True))
+
+
+def _shear_columns(states: Sequence[tuple[float, ShearState]]) -> dict[str, NDArray[Any]]:
+    """One row for each fraction and asperity."""
+    count = len(states[0][1].forces)
+    x, y = states[0][1].contact.scene.asperities.positions.T
+    arrays: dict[str, list[NDArray[Any]]] = {
+        "force": [state.forces for _, state in states],
+        "stick_radius": [state.stick_radii for _, state in states],
+        "slip": [state.slips for _, state in states],
+        "displacement": [state.displacements for _, state in states],
+        "status": [state.status for _, state in states],
+    }
+    return {
+        "fraction": np.repeat([fraction for fraction, _ in states], count),
+        "x": np.tile(x, len(states)),
+        "y": np.tile(y, len(states)),
+        **{name: np.concatenate(parts) for name, parts in arrays.items()},
+    }
+
+
+def _cycle_columns(rows: Sequence[tuple[float, float, Cycle]]) -> dict[str, NDArray[Any]]:
+    """One row per cycle; energies are those of both bodies, per steady cycle."""
+    names = ("energy", "energy_normalised", "smooth_normalised", "balance_defect")
+    return {
+        "maximum": np.array([maximum for maximum, _, _ in rows]),
+        "minimum": np.array([minimum for _, minimum, _ in rows]),
+        **{name: np.array([getattr(cycle, name) for *_, cycle in rows]) for name in names},
+        "partial_slip_energy": np.array([c.partial_slip_energies.sum() for *_, c in rows]),
+        "sliding_energy": np.array([c.sliding_energies.sum() for *_, c in rows]),
+        "sliding": np.array([int((c.status == "sliding").sum()) for *_, c in rows]),
+    }
+
+
+def _loop_columns(outcome: Outcome) -> dict[str, NDArray[Any]]:
+    """Force-displacement points of each cycle: macroscopic ("total"), and of some asperities."""
+    chosen = representatives(outcome.contact)
+    parts: dict[str, list[NDArray[Any]]] = {
+        name: [] for name in ("maximum", "minimum", "curve", "force", "displacement")
+    }
+    for maximum, minimum, cycle in outcome.cycles:
+        loop = cycle.loop(200)
+        curves = [("total", loop.forces, loop.displacements)]
+        curves += [
+            (str(i), loop.asperity_forces[:, i], loop.asperity_displacements[:, i]) for i in chosen
+        ]
+        for name, forces, displacements in curves:
+            points = len(forces)
+            parts["maximum"].append(np.full(points, maximum))
+            parts["minimum"].append(np.full(points, minimum))
+            parts["curve"].append(np.full(points, name))
+            parts["force"].append(forces)
+            parts["displacement"].append(displacements)
+    return {name: np.concatenate(part) for name, part in parts.items()}
+
+
+def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
+    """Write CSV whose numbers read back the same, or .npz where there are many rows."""
+    arrays = [np.asarray(values) for values in columns.values()]
+    if len(arrays[0]) > MOST_CSV_ROWS:
+        path = path.with_suffix(".npz")
+        with beside(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, **columns)
+        return path
+    with beside(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(
+            zip(*(array.tolist() for array in arrays), strict=True)
+        )  # repr of each float
+    return path

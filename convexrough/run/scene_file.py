@@ -1,0 +1,175 @@
+"""Scene files: a TOML file in, a Scene and what to do with it out."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+from convexrough.errors import FileError, InputError, SceneFileError
+from convexrough.influence import Kind
+from convexrough.normal.load_control import highest_approach
+from convexrough.run.tables import read_summits, read_text
+from convexrough.scene.patterns import CUT
+from convexrough.scene.scene import Asperities, Material, Scene, largest_tip_radius, reach
+from convexrough.solvers import Solver
+from convexrough.sphere import hertz
+
+if TYPE_CHECKING:
+    from convexrough.run.schema import Document, Lattice
+
+Fractions = tuple[float, ...]
+
+
+class UnitNames(NamedTuple):
+    """How the scene's units are called, "" where the file does not say; never converted."""
+
+    length: str = ""
+    force: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class SceneFile:
+    """What a scene file says. Tables that it leaves out are None.
+
+    approach [length] or load [force] : what is prescribed; the other is None
+    shear   : shear forces, as fractions of f P
+    cycle   : maxima and minima of steady cycles, as fractions of f P
+    history : shear forces one after the other, as fractions of f P
+    influence : how to couple the asperities; None for the cheapest exact way
+    """
+
+    path: Path
+    scene: Scene
+    approach: float | None
+    load: float | None
+    shear: Fractions | None
+    cycle: tuple[Fractions, Fractions] | None
+    history: Fractions | None
+    solver: Solver
+    influence: Kind | None
+    units: UnitNames
+
+
+def read_scene(path: str | os.PathLike[str]) -> SceneFile:
+    """Read and check a scene file.
+
+    Raises FileError where a file cannot be read or is no TOML, SceneFileError with every mistake in
+    the tables, and InputError for mistakes that show only in building the scene.
+    """
+    from convexrough.run.schema import SOLVERS, validate
+
+    path = Path(path)
+    tables, mistakes = validate(_parse(path))
+    if tables is None:
+        raise SceneFileError(str(path), mistakes)
+    shear, cycle, history, units = tables.shear, tables.cycle, tables.history, tables.units
+    return SceneFile(
+        path=path,
+        scene=_scene(path, tables),
+        approach=tables.normal.approach,
+        load=tables.normal.load,
+        shear=tuple(shear.fractions) if shear else None,
+        cycle=(tuple(cycle.maximum), tuple(cycle.lowest)) if cycle else None,
+        history=tuple(history.fractions) if history else None,
+        solver=SOLVERS[tables.solver.name](),
+        influence=cast("Kind | None", tables.solver.influence),
+        units=UnitNames(units.length, units.force),
+    )
+
+
+def _parse(path: Path) -> dict[str, object]:
+    try:
+        contents = tomllib.loads(read_text(path))
+    except (ValueError, RecursionError) as error:  # ValueError: also a number of 5000 digits
+        raise FileError(f"{path}: not a TOML file: {error}") from error
+    if not contents:
+        raise FileError(f"{path}: empty; `convexrough new` writes a scene to start from")
+    return contents
+
+
+def _scene(path: Path, tables: Document) -> Scene:
+    material = tables.material
+    ratio = material.poisson_ratio
+    with _blamed_on(path, "material"):
+        if material.contact_modulus is not None:
+            stuff = Material(material.contact_modulus, ratio)
+        else:
+            assert material.youngs_modulus is not None  # exactly one of the two
+            stuff = Material.from_youngs(material.youngs_modulus, ratio)
+
+    def press_on(asperities: Asperities) -> Scene:
+        return Scene(
+            tables.sphere.radius,
+            asperities,
+            stuff,
+            friction=tables.friction.coefficient if tables.friction else None,
+            geometry=tables.asperities.geometry,
+        )
+
+    layout = tables.asperities
+    with _blamed_on(path, "asperities"):
+        if layout.pattern == "file":
+            summits = read_summits(path.parent / layout.path, tip_radius=layout.tip_radius)
+            return press_on(summits)
+        return _lattice(layout, tables, stuff, press_on)
+
+
+def _lattice(
+    layout: Lattice, tables: Document, material: Material, press_on: Callable[[Asperities], Scene]
+) -> Scene:
+    """The scene as far as `within`, or else as far as any asperity could touch."""
+    pattern = Asperities.hexagonal if layout.pattern == "hexagonal" else Asperities.square
+
+    def scene(within: float) -> Scene:
+        asperities = pattern(
+            spacing=layout.spacing,
+            tip_radius=layout.tip_radius,
+            within=within,
+            height_std=layout.height_std,
+            tip_radius_cv=layout.tip_radius_cv,
+            seed=layout.seed,
+        )
+        return press_on(asperities)
+
+    def farthest(approach: float) -> float:
+        return reach(
+            approach,
+            sphere_radius=tables.sphere.radius,
+            tip_radius=largest_tip_radius(layout.tip_radius, layout.tip_radius_cv),
+            height=CUT * layout.height_std,
+            geometry=layout.geometry,
+        )
+
+    if layout.within is not None:
+        return scene(layout.within)
+    if (approach := tables.normal.approach) is not None:
+        return scene(farthest(approach))
+    load = tables.normal.load
+    assert load is not None  # exactly one of the two
+    # Grow until the approach that this scene can need at most lets nothing outside it touch.
+    radius = tables.sphere.radius
+    within = 1.5 * float(hertz.contact_radius(load, material.contact_modulus, radius))
+    while True:
+        grown = scene(within)
+        needed = farthest(highest_approach(grown, load))
+        if needed <= within:
+            return grown
+        within = needed
+
+
+@contextmanager
+def _blamed_on(path: Path, table: str) -> Iterator[None]:
+    """Mistakes found while building part of the scene, with file and table named."""
+    try:
+        yield
+    except InputError as error:
+        if error.where:  # in another file, already named
+            raise
+        raise InputError(
+            f"[{table}] {error.what}", found=error.found, expected=error.expected, where=str(path)
+        ) from error

@@ -1,0 +1,1 @@
+"""What is pressed on what: material, asperities, the sphere, and the patterns they stand in."""

@@ -1,0 +1,1 @@
+"""Shear along one direction (Ciavarella and Jaeger): states, cycles, histories."""

@@ -1,0 +1,91 @@
+"""First-loading states of one contact, in the scene's units: what cycles and histories look up.
+
+By Masing's rule every state at constant normal load is a sum of these. The energy they cost is
+counted in w(T) = T rise(T) / 2 - Psi(T), with Psi the energy of the increments: the error of the
+trapezoid rule on the curve of rise against T. A cycle of amplitude T costs 8 c_t f^2 w(T).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import checks
+from convexrough.checks import Array, Indices
+from convexrough.contact import Contact
+from convexrough.shearing.certificate import Bounds, judge_in_turn
+from convexrough.shearing.newton import by_matrices
+from convexrough.shearing.problem import States, TangentialProblem
+from convexrough.solvers.solution import Announce
+from convexrough.sphere import hertz, mindlin
+
+
+class Family:
+    """Units, states and losses of one contact with friction."""
+
+    def __init__(self, contact: Contact) -> None:
+        self.contact = contact
+        self.friction = checks.friction(contact.scene.friction)
+        self.problem = TangentialProblem.of(contact)
+        ratio = hertz.mindlin_ratio(contact.scene.material.poisson_ratio)
+        self.force_unit = self.friction * self.problem.units.force
+        self.length_unit = ratio * self.friction * self.problem.units.length
+        self.energy_unit = 8.0 * self.force_unit * self.length_unit
+
+    def states(self, totals: Array, announce: Announce | None = None) -> tuple[States, Indices]:
+        """One state for each distinct T, and which of them each of the totals is."""
+        distinct, back = np.unique(self.problem.limited(totals), return_inverse=True)
+        return self.problem.solve(distinct, announce=announce), back
+
+    def judged(
+        self, states: States, announce: Announce | None = None
+    ) -> Iterator[tuple[States, Bounds]]:
+        """The states in blocks, with what is proved of each."""
+        for block, bounds in judge_in_turn(self.problem, self.contact, states):
+            yield states.take(block), bounds
+            if announce is not None and not by_matrices(self.problem):
+                announce(f"certified {min(block.stop, len(states.totals))} states")
+
+    def spread(self, values: Array, unit: float) -> Array:
+        """(m, n) values of the loaded asperities, among zeros for all others of the scene."""
+        full = np.zeros((len(values), len(self.contact.scene)))
+        full[:, self.problem.touching] = values * unit
+        return full
+
+    def everywhere(self, words: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(n,) what is so of the loaded asperities, and not of the others."""
+        full = np.zeros(len(self.contact.scene), dtype=bool)
+        full[self.problem.touching] = words
+        return full
+
+    def partial_slip(self, states: States) -> Array:
+        """(m, n) share of w(T) lost in partial slip: (3/5) P ceiling e(u / P)."""
+        problem = self.problem
+        shares = mindlin.loss(mindlin.width_under(states.increments / problem.loads))
+        return np.asarray(0.6 * problem.loads * problem.ceilings * shares)
+
+    def sliding(self, states: States) -> Array:
+        """(m, n) share of w(T) lost in sliding: P slip / 2."""
+        return 0.5 * self.problem.loads * np.abs(states.slips)
+
+    def trapezoid_error(self, states: States) -> Array:
+        """(m,) w(T) = T rise / 2 - Psi, from the totals and not asperity by asperity.
+
+        Both terms are of second order and their difference of third. So subtract from each the
+        elastic part, which cancels exactly: with q the elastic shares and u = q T + v,
+
+            rise = rise'(0) T + sum q_i (excess deflection_i + slip_i),
+            Psi  = rise'(0) T^2 / 2 + sum excess potential_i + v'(H + A) v / 2.
+        """
+        problem, q = self.problem, self.problem.elastic
+        P, ceilings, u = problem.loads, problem.ceilings, states.increments
+        x = mindlin.width_under(u / P)
+        total = u.sum(axis=1)
+        excess = np.copysign(ceilings * mindlin.excess_deflection(x), u) + states.slips
+        v = u - total[:, None] * q
+        v -= v.sum(axis=1, keepdims=True) * q
+        bent = problem.couple(v) + v / problem.stiffest
+        potential = mindlin.excess_potential(x) @ (P * ceilings)
+        return np.asarray(0.5 * total * (excess @ q) - potential - 0.5 * (v * bent).sum(axis=1))

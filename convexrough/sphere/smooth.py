@@ -1,0 +1,144 @@
+"""`smooth`: the equivalent smooth sphere, whose closed forms anchor every result of a rough one.
+
+The sphere of a scene on the same material without asperities, under the same load: Hertz's contact,
+and Cattaneo, Mindlin and Deresiewicz's under shear. With t = Q / (f P), P the load, f the friction,
+c_t Mindlin's ratio and delta the approach, all displacements are c_t f delta times functions of t
+alone: those of `convexrough.sphere.hertz`.
+Source: Johnson, Contact Mechanics (1985), chapters 4 and 7; [12]-[16] of the source paper, which
+gives one body's displacements and losses, where these are both bodies'.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.checks import Array
+from convexrough.errors import InputError
+from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz, surface_shear
+
+
+def smooth(scene: Scene, *, load: float) -> SmoothSphere:
+    """The sphere of the scene, without asperities, under a normal load P [force]."""
+    return SmoothSphere(scene, checks.positive("load", load))
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothSphere:
+    """A smooth sphere under a normal load, and under a shear force at that load.
+
+    Distances, forces and results are numbers or arrays alike. Whatever is tangential raises
+    InputError where the scene has no friction or a force exceeds f P in size (gross sliding).
+    """
+
+    scene: Scene
+    load: float
+
+    @cached_property
+    def contact_radius(self) -> float:
+        """a_H = (3 P R / (4 E*))^(1/3)  [length]."""
+        return float(hertz.contact_radius(self.load, self._modulus, self.scene.sphere_radius))
+
+    @cached_property
+    def approach(self) -> float:
+        """delta = a_H^2 / R, of two deep points, one in each body [length]."""
+        radius = self.scene.sphere_radius
+        coefficient = hertz.local_coefficient(self._modulus, radius)
+        return float(hertz.indentation(self.load, coefficient))
+
+    @cached_property
+    def peak_pressure(self) -> float:
+        """p0 = 2 E* a_H / (pi R)  [force / length^2]."""
+        radius = self.scene.sphere_radius
+        return float(hertz.peak_pressure(self.contact_radius, self._modulus, radius))
+
+    def pressure(self, distance: ArrayLike) -> Any:
+        """p(r) = p0 sqrt(1 - r^2 / a_H^2) at a distance from the axis [force / length^2]."""
+        return hertz.pressure(distance, self.contact_radius, self.peak_pressure)
+
+    def normal_displacement(self, distance: ArrayLike) -> Any:
+        """Normal displacement of both surfaces at a distance from the axis [length]."""
+        radius = self.scene.sphere_radius
+        return hertz.surface_displacement(distance, self.contact_radius, radius)
+
+    @property
+    def largest_force(self) -> float:
+        """f P, where gross sliding begins [force]."""
+        return self._friction * self.load
+
+    def stick_radius(self, force: ArrayLike) -> Any:
+        """c = a_H (1 - |Q| / (f P))^(1/3)  [length]."""
+        return self.contact_radius * np.cbrt(1.0 - np.abs(self._share("force", force)))
+
+    def traction(self, distance: ArrayLike, force: ArrayLike) -> Any:
+        """f p0 sqrt(1 - r^2/a^2) less f p0 (c/a) sqrt(1 - r^2/c^2)  [force / length^2].
+
+        At a distance from the axis, along the shear; on first loading.
+        """
+        peak = self._friction * self.peak_pressure
+        return surface_shear.traction(
+            distance, self.contact_radius, self._share("force", force), peak
+        )
+
+    def displacement(self, force: ArrayLike) -> Any:
+        """X = (3 (2-nu) f P / (8 G a_H)) [1 - (1 - Q/(f P))^(2/3)]  [length], on first loading."""
+        return self._largest_displacement * hertz.deflection(self._share("force", force))
+
+    def branch(self, force: ArrayLike, turning_force: float) -> Any:
+        """X on the way back from a turning point of first loading, to its mirror image [length].
+
+        Masing's rule [14]-[15]: X1 - 2 X((Q1 - Q) / 2) for |Q| <= |Q1|, with Q1 the turning force
+        and X(Q) the `displacement` of first loading. A positive Q1 unloads, a negative one reloads.
+        """
+        turning = checks.finite("turning_force", turning_force)
+        first = self.displacement(turning)
+        given = np.asarray(force, dtype=np.float64)
+        if not (np.abs(given) <= abs(turning)).all():
+            raise InputError(
+                "force",
+                found=given.flat[np.abs(given).argmax()],
+                expected=f"at most the turning force {abs(turning):.17g} in size",
+            )
+        return first - 2.0 * self.displacement((turning - given) / 2.0)
+
+    def energy(self, maximum: ArrayLike, minimum: ArrayLike | None = None) -> Any:
+        """Energy lost per steady cycle between two forces, [16] for both bodies [force length].
+
+        W0 e((maximum - minimum) / (2 f P)); the minimum defaults to the negative of the maximum.
+        """
+        upper = self._share("maximum", maximum)
+        lower = -upper if minimum is None else self._share("minimum", minimum)
+        if (lower > upper).any():
+            expected = "at least the minimum, by default the negative of the maximum"
+            raise InputError("maximum", found=maximum, expected=expected)
+        return self.energy_scale * hertz.loss((upper - lower) / 2.0)
+
+    @property
+    def energy_scale(self) -> float:
+        """W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H)  [force length]."""
+        return 4.8 * self._friction * self.load * self._largest_displacement
+
+    @property
+    def _largest_displacement(self) -> float:
+        """c_t f delta = 3 (2 - nu) f P / (8 G a_H), at Q = f P  [length]."""
+        ratio = hertz.mindlin_ratio(self.scene.material.poisson_ratio)
+        return float(ratio * self._friction * self.approach)
+
+    @property
+    def _modulus(self) -> float:
+        return self.scene.material.contact_modulus
+
+    @property
+    def _friction(self) -> float:
+        return checks.friction(self.scene.friction)
+
+    def _share(self, what: str, forces: ArrayLike) -> Array:
+        """t = Q / (f P), in [-1, 1]."""
+        forces = checks.bearable(what, forces, self.largest_force)
+        return np.clip(forces / self.largest_force, -1.0, 1.0)

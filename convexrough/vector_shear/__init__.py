@@ -1,0 +1,1 @@
+"""Shear with the full tangential kernel: forces and slips are vectors."""

@@ -1,0 +1,205 @@
+"""Newton's method for the friction problem with the full tangential kernel.
+
+The unknown is eta_i, the displacement vector that asperity i must take up. With the local law
+inverted, q_i = P_i force(|eta_i| / ceiling_i) along eta_i, the conditions are the normal map
+
+    F = eta + B q(eta) - X = 0,    sum q(eta) = T,
+
+once differentiable, and no set of sliding asperities is guessed: they are those with |eta_i|
+beyond the ceiling. With dq_i/deta_i = W_i W_i' (rank 1 where sliding: the force can still turn) a
+step solves the symmetric system
+
+    (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y,
+
+the Hessian of the energy scaled by its local part: positive definite in the convex range.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from convexrough.checks import Array
+from convexrough.errors import SolverError
+from convexrough.roundoff import SAFETY
+from convexrough.vector_shear.problem import VectorProblem, VectorState, along
+
+
+@dataclass(frozen=True)
+class FrictionNewton:
+    """Settings of Newton's method for `shear_vector`, from the Ciavarella-Jaeger state.
+
+    Stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step no longer halves
+    that. Raises SolverError if `max_iterations` steps do not get there.
+    """
+
+    tolerance: float = 1e-12
+    max_iterations: int = 100
+    name: str = field(default="newton", init=False)
+
+    def solve(self, problem: VectorProblem, total: Array) -> VectorState:
+        """The state of a total increment (2,), |T| < sum P (own units)."""
+        size = float(np.hypot(*total))
+        limit = float(problem.scalar.loads.sum())
+        scalar = problem.scalar.solve(np.array([size]))
+        start = scalar.deflections[0][:, None] * (total / size)
+        iterate = _evaluate(problem, start, total)
+        if iterate is None:
+            raise SolverError("friction (newton): no forces of the prescribed total to start from")
+        for iteration in range(1, self.max_iterations + 1):
+            following = _step(problem, iterate, total)
+            accurate = iterate.residual <= self.tolerance * float(np.hypot(*iterate.rise))
+            if accurate and following.residual >= 0.5 * iterate.residual:
+                best = min(iterate, following, key=lambda each: each.residual)
+                return _state(problem, best, total, iteration)
+            iterate = following
+        worst = iterate.residual / float(np.hypot(*iterate.rise))
+        raise SolverError(
+            f"friction (newton): residual {worst:.3g} of the displacement after "
+            f"{self.max_iterations} steps, at {size / limit:.6g} of gross sliding"
+        )
+
+
+class _Iterate(NamedTuple):
+    deflections: Array  # (n, 2) eta
+    increments: Array  # (n, 2) q(eta)
+    coupling: Array  # (n, 2) B q
+    roots: Array  # (n, 2, 2) W
+    rise: Array  # (2,) the best estimate of X
+    defects: Array  # (n, 2) F
+    residual: float  # max |F_i|
+    energy: float
+
+
+def _state(problem: VectorProblem, iterate: _Iterate, total: Array, iterations: int) -> VectorState:
+    """The answer; slips are what eta has beyond the ceiling."""
+    size = np.hypot(*iterate.deflections.T)
+    beyond = np.maximum(size - problem.scalar.ceilings, 0.0)
+    return VectorState(
+        total=total,
+        increments=iterate.increments,
+        rise=iterate.rise,
+        slips=along(beyond, iterate.deflections, size),
+        iterations=iterations,
+    )
+
+
+def _evaluate(problem: VectorProblem, eta: Array, total: Array) -> _Iterate | None:
+    """The state at eta, shifted so that forces add up to the total; None where that fails."""
+    shifted = _onto_total(problem, eta, total)
+    if shifted is None:
+        return None
+    q = problem.local_forces(shifted)
+    coupling = problem.couple(q)
+    roots = _roots(problem, shifted)
+    slopes = roots @ np.swapaxes(roots, 1, 2)
+    level = shifted + coupling  # X, at every asperity
+    middle = level.mean(axis=0)
+    pull = np.einsum("nij,nj->i", slopes, level - middle)
+    rise = middle + np.linalg.lstsq(slopes.sum(axis=0), pull, rcond=None)[0]
+    defects = level - rise
+    residual = float(np.hypot(*defects.T).max())
+    energy = problem.energy(q, coupling)
+    return _Iterate(shifted, q, coupling, roots, rise, defects, residual, energy)
+
+
+def _step(problem: VectorProblem, iterate: _Iterate, total: Array) -> _Iterate:
+    """One Newton step, halved until the energy falls (Armijo's rule along the arc q(eta))."""
+    direction = _direction(problem, iterate)
+    size = np.hypot(*iterate.deflections.T)
+    bearable = np.minimum(size, problem.scalar.ceilings)
+    gradient = along(bearable, iterate.deflections, size) + iterate.coupling - iterate.rise
+    # Near gross sliding X is large, and then so is what rounding of the total does to the energy.
+    rounding = SAFETY * iterate.energy + 1e-14 * float(np.hypot(*total) * np.hypot(*iterate.rise))
+    length = 1.0
+    while length > 1e-12:
+        trial = _evaluate(problem, iterate.deflections + length * direction, total)
+        if trial is not None:
+            slope = float((gradient * (trial.increments - iterate.increments)).sum())
+            if trial.energy - iterate.energy <= 1e-4 * min(slope, 0.0) + rounding:
+                return trial
+        length /= 2.0
+    raise SolverError("friction (newton): no step along its direction lowers the energy")
+
+
+def _direction(problem: VectorProblem, iterate: _Iterate) -> Array:
+    """d(eta); with the shift of the kernel added where the matrix is not positive definite."""
+    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
+
+    n = len(problem)
+    roots = iterate.roots
+    scaled = problem.kernel
+    for _ in range(2):  # B W, then W'B W
+        scaled = np.einsum("rjc,jcb->rjb", scaled.reshape(2 * n, n, 2), roots)
+        scaled = scaled.reshape(2 * n, 2 * n).T
+    pushed = np.einsum("nij,ni->nj", roots, -iterate.defects)
+    turned = np.swapaxes(roots, 1, 2)  # W' for dX along x and along y
+    right = np.concatenate((pushed[:, :, None], turned), axis=2).reshape(2 * n, 3)
+    for shifted in (False, True):
+        matrix = scaled + np.eye(2 * n)
+        if shifted:
+            share = np.repeat(problem.shift.values, 2)
+            slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
+            matrix[np.diag_indices(2 * n)] += share * slopes
+        factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+        if info == 0:
+            break
+    else:
+        raise SolverError("friction (newton): the shifted matrix is not positive definite")
+    solved = dpotrs(factor, right, lower=1)[0].reshape(n, 2, 3)
+    forces = np.einsum("nij,njk->nik", roots, solved)  # dq = W y
+    sums = forces.sum(axis=0)
+    change = np.linalg.lstsq(sums[:, 1:], -sums[:, 0], rcond=None)[0]  # dX, so that sum dq = 0
+    moved = problem.couple(forces[:, :, 0] + forces[:, :, 1:] @ change)
+    return np.asarray(change - iterate.defects - moved)
+
+
+def _roots(problem: VectorProblem, eta: Array) -> Array:
+    """(n, 2, 2) W: the frame along and across eta_i times the roots of the slopes there."""
+    size = np.hypot(*eta.T)
+    radial = problem.scalar.slopes(size)
+    across = np.where(
+        size > 0, problem.scalar.increments(size) / np.where(size > 0, size, 1.0), radial
+    )
+    direction = along(np.ones(len(size)), eta, size)
+    direction[size == 0] = (1.0, 0.0)
+    x, y = direction.T
+    radial, across = np.sqrt(radial), np.sqrt(across)
+    return np.stack((x * radial, -y * across, y * radial, x * across), axis=1).reshape(-1, 2, 2)
+
+
+def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | None:
+    """eta + s, with the s in the plane that makes the forces add up to the total; or None.
+
+    s minimises a convex function with the gradient sum q(eta + s) - T: Newton's method, halved
+    while a step overshoots.
+    """
+    shift = np.zeros(2)
+    excess = problem.local_forces(eta).sum(axis=0) - total
+    size = float(np.hypot(*total))
+    for _ in range(100):
+        roots = _roots(problem, eta + shift)
+        slopes = np.einsum("nij,nkj->ik", roots, roots)
+        try:
+            step = -np.linalg.solve(slopes, excess)
+        except np.linalg.LinAlgError:
+            return None
+        fall = float(excess @ step)
+        if not np.isfinite(fall):
+            return None
+        for _ in range(60):
+            following = problem.local_forces(eta + shift + step).sum(axis=0) - total
+            if float(following @ step) <= -0.5 * fall:
+                break
+            step, fall = step / 2.0, fall / 2.0
+        else:
+            return None
+        shift = shift + step
+        before, excess = excess, following
+        if np.hypot(*excess) <= 1e-15 * size or (
+            np.hypot(*excess) <= 1e-13 * size and np.hypot(*excess) >= 0.5 * np.hypot(*before)
+        ):
+            return np.asarray(eta + shift)
+    return None

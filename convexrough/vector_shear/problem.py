@@ -1,0 +1,265 @@
+"""The friction problem with the full tangential kernel, as one convex program. Own units.
+
+A shear force Q on the pressed contact is carried as Q_i = f q_i with vectors |q_i| <= P_i in the
+plane. A tangential point force moves the surface by Cerruti's tensor, here for both bodies,
+
+    T_ij = 1 / (pi G r) [(1 - nu) I + nu d d'],    d the unit vector from j to i, r the distance.
+
+With c_t Mindlin's ratio, A the normal coupling and bias = nu / (2 - nu), that is c_t B_ij with
+
+    B_ij = A_ij [(1 - bias) I + 2 bias d d'].
+
+The forces minimise a convex energy (times c_t f^2; displacements are times c_t f),
+
+    sum_i P_i ceiling_i potential(|q_i| / P_i) + (1/2) q'Bq   over |q_i| <= P_i, sum q = T = Q / f,
+
+and at the least energy there are a rigid displacement X, the multiplier of the total, and slips,
+the multipliers of |q_i| <= P_i times the direction of q_i, with
+
+    X = own(q_i) + (B q)_i + slip_i,    own(q) = ceiling_i deflection(|q| / P_i) q / |q|.
+
+Averaging d d' over all directions leaves B = A: that is Ciavarella and Jaeger's problem.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from convexrough import checks
+from convexrough.checks import Array
+from convexrough.contact import Contact
+from convexrough.errors import SolverError
+from convexrough.normal.certificate import SUM_ROUNDOFFS
+from convexrough.roundoff import ROUNDOFF
+from convexrough.shearing.problem import TangentialProblem
+from convexrough.sphere import hertz
+
+
+class VectorState(NamedTuple):
+    """A friction state of the n loaded asperities; own units.
+
+    total : (2,) T;  increments : (n, 2) q;  rise : (2,) X;  slips : (n, 2)
+    """
+
+    total: Array
+    increments: Array
+    rise: Array
+    slips: Array
+    iterations: int
+
+
+class Shift(NamedTuple):
+    """What makes the kernel semidefinite: B + diag(shift_i I) >= 0.
+
+    shares : (n,) S_i, the shift over the least local stiffness; convex where all S_i <= 1
+    """
+
+    values: Array
+    shares: Array
+
+
+@dataclass(frozen=True, eq=False)
+class VectorProblem:
+    """The loaded asperities of a contact, and how tangential forces couple them.
+
+    scalar : the same with the angular mean of the kernel (Ciavarella-Jaeger)
+    bias   : nu / (2 - nu)
+    kernel : (2n, 2n) B, in the order x_1, y_1, x_2, y_2, ...
+    """
+
+    scalar: TangentialProblem
+    bias: float
+    kernel: Array
+
+    @classmethod
+    @lru_cache(maxsize=4)
+    def of(cls, contact: Contact) -> VectorProblem:
+        n = int(np.count_nonzero(contact.loads))
+        checks.fits_in_memory("loaded asperities", n, 5 * 4 * 8, power=2)
+        scalar = TangentialProblem.of(contact)
+        nu = contact.scene.material.poisson_ratio
+        bias = nu / (2.0 - nu)
+        x, y = contact.scene.contact_points[scalar.touching].T
+        dx, dy = np.subtract.outer(x, x), np.subtract.outer(y, y)
+        squares = dx**2 + dy**2
+        squares[np.diag_indices(n)] = 1.0
+        kernel = np.empty((n, 2, n, 2))
+        A = scalar.influence.matrix
+        turned = bias * A * (dx - dy) * (dx + dy) / squares  # 2 d d' - I = [[cos, sin], [., -cos]]
+        kernel[:, 0, :, 0], kernel[:, 1, :, 1] = A + turned, A - turned
+        kernel[:, 0, :, 1] = kernel[:, 1, :, 0] = bias * A * 2.0 * dx * dy / squares
+        return cls(scalar, bias, kernel.reshape(2 * n, 2 * n))
+
+    def __len__(self) -> int:
+        return len(self.scalar.loads)
+
+    @property
+    def stiffness(self) -> Array:
+        """(n,) h_i = (2/3) ceiling_i / P_i = 1 / (2 E* a_i): the local Hessian is at least h_i I.
+
+        Its eigenvalues, along q and across, are ceiling/P times deflection'(t) and deflection(t)/t.
+        """
+        h: Array = (2.0 / 3.0) * self.scalar.ceilings / self.scalar.loads
+        return h
+
+    @property
+    def crowding(self) -> Array:
+        """(n,) contact radii over (pi/2) s_i: the convexity numbers of the pressed state."""
+        ratio: Array = self.scalar.shells / self.stiffness
+        return ratio
+
+    @property
+    def product_error(self) -> float:
+        """(B q)_i as computed is off by at most this times sum_j A_ij |q_j|."""
+        entries = self.scalar.influence.entry_error
+        return 4.0 * (entries + (2 * len(self) + SUM_ROUNDOFFS) * ROUNDOFF)
+
+    def couple(self, increments: Array) -> Array:
+        """(n, 2) B q."""
+        product: Array = self.kernel @ increments.reshape(-1)
+        return product.reshape(-1, 2)
+
+    def own(self, increments: Array) -> Array:
+        """(n, 2) how far each asperity's own force moves it, |q_i| <= P_i."""
+        size = self.sizes(increments)
+        return along(self.scalar.deflections(size), increments, size)
+
+    def sizes(self, increments: Array) -> Array:
+        """(n,) |q_i|, and exactly P_i where it is that to rounding, or beyond.
+
+        The local law is steep there: one roundoff less than P_i would seem 2e-11 off the ceiling.
+        """
+        size, P = np.hypot(*increments.T), self.scalar.loads
+        full: Array = np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
+        return full
+
+    def local_forces(self, deflections: Array) -> Array:
+        """(n, 2) q(eta), the inverse of `own`, along eta; |q_i| = P_i where it slides."""
+        size = np.hypot(*deflections.T)
+        return along(self.scalar.increments(size), deflections, size)
+
+    def energy(self, increments: Array, coupling: Array) -> float:
+        """`coupling` is B q."""
+        P, ceilings = self.scalar.loads, self.scalar.ceilings
+        local = hertz.potential(np.hypot(*increments.T) / P) @ (P * ceilings)
+        return float(local + 0.5 * (increments * coupling).sum())
+
+    def residual(self, state: VectorState) -> float:
+        """How far the conditions of the least energy are from holding; dimensionless.
+
+        The largest of: what displacements fail to balance by at an asperity, the part of a slip
+        that is not along the force, the slip where friction is not used up times the share of it
+        that is left (all over |X|); the force beyond P_i over P_i; the missing total over |T|.
+        """
+        if not np.isfinite(state.rise).all():
+            return np.inf
+        q, slips, P = state.increments, state.slips, self.scalar.loads
+        size = self.sizes(q)
+        slip_size = np.hypot(*slips.T)
+        imbalance = np.hypot(*(state.rise - self.own(q) - self.couple(q) - slips).T)
+        across = np.hypot(*(slips - along(slip_size, q, size)).T)
+        unused = slip_size * np.maximum(1.0 - size / P, 0.0)
+        missing = float(np.hypot(*(q.sum(axis=0) - state.total)))
+        travel, total = float(np.hypot(*state.rise)), float(np.hypot(*state.total))
+        parts = (
+            float(np.max([imbalance, across, unused])) / (travel or 1.0),
+            float((np.hypot(*q.T) / P - 1.0).max()),
+            missing / (total or 1.0),
+        )
+        return max(parts)
+
+    @cached_property
+    def shift(self) -> Shift:
+        """A shift for the cones and the dual bound, confirmed by Cholesky.
+
+        By the neighbours' distances, as proved in docs/theory/friction.md, 2 / (2 - nu) times
+
+            1 / (pi E* s_i) at nu = 0,    (9/4) (1 - 2 nu / 3) / (pi E* s_i) for 0 < nu <= 1/2.
+
+        Where a share exceeds 21/25, the least with equal shares, from the smallest eigenvalue.
+        """
+        nu = 2.0 * self.bias / (1.0 + self.bias)
+        factor = 1.0 if nu == 0 else 4.5 * (1.0 - 2.0 * nu / 3.0) / (2.0 - nu)
+        by_distance = factor * self.scalar.shells
+        shares = by_distance / self.stiffness
+        if shares.max() <= 21 / 25 and self._semidefinite(shares):
+            return Shift(by_distance, shares)
+        equal = np.full(len(self), self.least_share + self._rounding)
+        if not self._semidefinite(equal):
+            raise SolverError("friction: no shift makes the tangential kernel semidefinite")
+        return Shift(equal * self.stiffness, equal)
+
+    @cached_property
+    def least_share(self) -> float:
+        """The least S with B + S diag(h_i I) >= 0: the energy is convex where it is below 1."""
+        return max(float(-np.linalg.eigvalsh(self._scaled)[0]), 0.0)
+
+    @property
+    def _scaled(self) -> Array:
+        """(2n, 2n) B with rows and columns over the roots of the stiffness."""
+        root = np.repeat(1.0 / np.sqrt(self.stiffness), 2)
+        scaled: Array = self.kernel * root * root[:, None]
+        return scaled
+
+    @property
+    def _rounding(self) -> float:
+        """What rounding can hide of an eigenvalue of `_scaled`, which are of the order of 1."""
+        return 1e-14 * (1 + len(self))
+
+    def _semidefinite(self, shares: Array) -> bool:
+        """Whether a shift of these shares makes B semidefinite, up to rounding."""
+        matrix = self._scaled
+        matrix[np.diag_indices(len(matrix))] = np.repeat(shares, 2) + self._rounding
+        try:
+            np.linalg.cholesky(matrix)
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+    def duality_gap(self, state: VectorState) -> float:
+        """Upper bound on the energy of the forces above the least, from q and X alone.
+
+        With M = B + shift, semidefinite, and h_i(q) = the local energy - shift |q|^2 / 2, convex,
+
+            least energy >= X'T - q'Mq / 2 + sum_i min over |x| <= P_i of [h_i(x) + (M q - X)_i x],
+
+        and the energy less that is a sum of terms that are not negative. Infinite where a share
+        of the shift exceeds 1, or X is.
+        """
+        shift, shares = self.shift
+        if shares.max() > 1 or not np.isfinite(state.rise).all():
+            return np.inf
+        P, ceilings, q = self.scalar.loads, self.scalar.ceilings, state.increments
+        size = np.hypot(*q.T)
+        asked = state.rise - self.couple(q) - shift[:, None] * q
+        slope = np.hypot(*asked.T)
+        # The minimum is along `asked`, where x = deflection(|x| / P) solves
+        # ceiling [x - (2/3) S force(x)] = slope: a convex, growing function; Newton from the right.
+        most = ceilings * (1.0 - 2.0 / 3.0 * shares)
+        left = np.maximum(1.0 - shares, 1e-300)
+        x = np.minimum(np.minimum(slope, most) / (ceilings * left), 1.0)
+        for _ in range(60):
+            value = ceilings * (x - 2.0 / 3.0 * shares * hertz.force(x)) - np.minimum(slope, most)
+            rate = ceilings * (1.0 - shares * np.sqrt(1.0 - x))
+            step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
+            x = np.clip(x - step, 0.0, 1.0)
+            if (np.abs(step) <= 1e-15 * x).all():
+                break
+        best = P * hertz.force(x)
+
+        def convex_part(size: Array) -> Array:
+            return np.asarray(P * ceilings * hertz.potential(size / P) - shift * size**2 / 2.0)
+
+        terms = convex_part(size) - (asked * q).sum(axis=1) - convex_part(best) + slope * best
+        missing = abs(float(state.rise @ (q.sum(axis=0) - state.total)))
+        return float(np.maximum(terms, 0.0).sum()) + missing
+
+
+def along(lengths: Array, vectors: Array, sizes: Array) -> Array:
+    """(n, 2) of the given lengths, in the directions of the vectors; 0 where those are 0."""
+    scale: Array = lengths / np.where(sizes > 0, sizes, 1.0)
+    return vectors * scale[:, None]

@@ -1,0 +1,226 @@
+"""`shear_vector`: the friction state of a pressed contact with the full tangential kernel.
+
+One step beyond Ciavarella and Jaeger (`shear`): tangential point forces move the surface by
+Cerruti's tensor, so forces and slips are vectors and turn a little out of the direction of the
+shear force. The state is the least of a convex energy (`convexrough.vector_shear.problem`), found
+by Newton's method or as a second-order cone program. Derived in docs/theory/friction.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks
+from convexrough.checks import Array, frozen
+from convexrough.contact import Contact
+from convexrough.errors import InputError
+from convexrough.roundoff import ROUNDOFF
+from convexrough.shearing.state import ShearCertificate
+from convexrough.sphere import hertz
+from convexrough.vector_shear.certificate import judge_vectors
+from convexrough.vector_shear.cones import FrictionConic
+from convexrough.vector_shear.newton import FrictionNewton
+from convexrough.vector_shear.problem import VectorProblem, VectorState
+
+__all__ = ["FrictionConic", "FrictionNewton", "VectorShearState", "shear_vector"]
+
+
+class FrictionSolver(Protocol):
+    """A frozen settings object. Raises SolverError rather than return a poor answer."""
+
+    @property
+    def name(self) -> str: ...
+
+    def solve(self, problem: VectorProblem, total: Array) -> VectorState: ...
+
+
+@dataclass(frozen=True, eq=False)
+class VectorShearState:
+    """A vector friction state. Arrays are in the order of the scene's asperities.
+
+    force        : (2,) [force];  displacement : (2,) X of the deep points, both bodies [length]
+    forces       : (n, 2) [force], sum `force`
+    slips        : (n, 2) [length] gross slip along the force, 0 where not sliding
+    stick_radii  : (n,) c_i [length], 0 where sliding
+    disagreement : with Ciavarella and Jaeger: the 2-norm of the difference of all asperity forces
+        from those of `shear`, taken along the shear force, over the 2-norm of those
+    residual     : how far the conditions of the least energy are from holding, dimensionless,
+        recomputed from this answer: `VectorProblem.residual`
+    duality_gap  : [force length] bound on the energy of these forces above the least, by a dual
+        point made from the answer alone; infinite where no shift shows the problem to be convex
+    certificate  : what is proved, as in `shear`; errors of vectors are bounds on their lengths
+
+    At |Q| = f P exactly, forces are f P_i along Q. A state of several asperities then exists, in
+    general, only in the limit of an infinite displacement: that and the slips, `residual` and
+    `duality_gap` are infinite.
+    """
+
+    contact: Contact
+    force: Array
+    displacement: Array
+    forces: Array
+    slips: Array
+    stick_radii: Array
+    disagreement: float
+    residual: float
+    duality_gap: float
+    certificate: ShearCertificate
+    solver: str
+    iterations: int
+
+    @property
+    def status(self) -> NDArray[np.str_]:
+        """(n,) "sliding", "partial", "open" or "undecided"; each of the first three is proved."""
+        return self.certificate.status
+
+
+def shear_vector(
+    contact: Contact, *, force: ArrayLike, solver: FrictionSolver | None = None
+) -> VectorShearState:
+    """Apply a shear force to a pressed contact, first loading, at constant normal load.
+
+    force  : a number, along x, or the pair (Qx, Qy) [force]
+    solver : default `FrictionNewton()`; or `FrictionConic()`, a cone program through Clarabel
+
+    Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding), and
+    SolverError where the solver stops without an answer, is missing, or finds asperities so dense
+    that the program is not convex.
+    """
+    solver = FrictionNewton() if solver is None else solver
+    scene = contact.scene
+    friction = checks.friction(scene.friction)
+    Q = _vector(force)
+    size = float(checks.bearable("force", np.hypot(*Q), friction * contact.load))
+    if contact.load == 0.0:
+        return _unmoved(contact, solver.name)
+    problem = VectorProblem.of(contact)
+    scalar = problem.scalar
+    total = Q / friction / scalar.units.force
+    amount = scalar.limited(np.array([float(np.hypot(*total))]))
+    gross = bool(scalar.at_limit(amount)[0])
+    if size == 0.0:
+        state = _at_rest(problem)
+    elif gross:
+        state = _gross(problem, total)
+    else:
+        state = solver.solve(problem, total)
+
+    travel = hertz.mindlin_ratio(scene.material.poisson_ratio) * friction * scalar.units.length
+    unit = friction * scalar.units.force
+
+    def everywhere(values: Array, unit: float) -> Array:
+        full = np.zeros((len(scene), *values.shape[1:]))
+        full[scalar.touching] = values * unit
+        return frozen(full)
+
+    left = np.maximum(1.0 - problem.sizes(state.increments) / scalar.loads, 0.0)
+    return VectorShearState(
+        contact=contact,
+        force=frozen(Q),
+        displacement=frozen(_times(state.rise, travel)),
+        forces=everywhere(state.increments, unit),
+        slips=everywhere(state.slips, travel),
+        stick_radii=everywhere(contact.contact_radii[scalar.touching] * np.cbrt(left), 1.0),
+        disagreement=_disagreement(problem, state, amount),
+        residual=problem.residual(state),
+        duality_gap=problem.duality_gap(state) * unit * travel,
+        certificate=_certified(problem, contact, state, gross, unit, travel),
+        solver=solver.name,
+        iterations=state.iterations,
+    )
+
+
+def _vector(force: ArrayLike) -> Array:
+    """(2,) of a number, along x, or of a pair."""
+    if np.ndim(force) == 0:
+        return np.array([checks.array("force", force, length=1)[0], 0.0])
+    pair = checks.array("force", force)
+    if pair.shape != (2,):
+        expected = "a number, along x, or a pair (Qx, Qy)"
+        raise InputError("force", found=f"{pair.size} numbers", expected=expected)
+    return pair.copy()
+
+
+def _at_rest(problem: VectorProblem) -> VectorState:
+    nothing = np.zeros((len(problem), 2))
+    return VectorState(np.zeros(2), nothing, np.zeros(2), nothing, 0)
+
+
+def _gross(problem: VectorProblem, total: Array) -> VectorState:
+    """|T| = sum P: one state of forces, all along T. Slips are along T too.
+
+    So the displacements of the others, B q, must be alike across T. Where they are not, that is
+    only approached: asperities turn to T as X grows beyond all bounds.
+    """
+    along_total = total / np.hypot(*total)
+    across_total = np.array([-along_total[1], along_total[0]])
+    P, ceilings = problem.scalar.loads, problem.scalar.ceilings
+    q = P[:, None] * along_total
+    coupling = problem.couple(q)
+    least = ceilings + coupling @ along_total  # X at which each starts to slide
+    side = coupling @ across_total
+    alike = float(np.ptp(side)) <= 64 * ROUNDOFF * len(P) * float(least.max())
+    size = float(least.max()) if alike else np.inf
+    across = float(side.mean()) if alike else 0.0
+    rise = _times(along_total, size) + across * across_total
+    slips = _times(np.broadcast_to(along_total, q.shape), (size - least)[:, None])
+    return VectorState(total, q, rise, slips, 0)
+
+
+def _times(vectors: Array, size: Array | float) -> Array:
+    """Their product, and 0 where the vector is: also times infinity."""
+    product = np.zeros(np.broadcast_shapes(vectors.shape, np.shape(size)))
+    np.multiply(vectors, size, out=product, where=vectors != 0)
+    return product
+
+
+def _disagreement(problem: VectorProblem, state: VectorState, amount: Array) -> float:
+    """With Ciavarella-Jaeger forces along the total; 0 at rest."""
+    if amount[0] == 0.0:
+        return 0.0
+    other = problem.scalar.solve(amount).increments[0]
+    difference = state.increments - other[:, None] * (state.total / np.hypot(*state.total))
+    return float(np.linalg.norm(difference / amount[0]) / np.linalg.norm(other / amount[0]))
+
+
+def _certified(
+    problem: VectorProblem,
+    contact: Contact,
+    state: VectorState,
+    gross: bool,
+    unit: float,
+    travel: float,
+) -> ShearCertificate:
+    """In the units and the order of the scene."""
+    touching = problem.scalar.touching
+    bounds = judge_vectors(problem, contact, state, gross=gross)
+    friction = checks.friction(contact.scene.friction)
+    force_errors = np.where(contact.loads > 0, 0.0, friction * contact.certificate.load_errors)
+    force_errors[touching] = bounds.increments[0] * unit
+    slip_errors = np.where((contact.loads > 0) | (contact.status == "open"), 0.0, np.inf)
+    slip_errors[touching] = bounds.slips[0] * travel
+    words = np.full(len(contact.scene), "undecided", dtype="<U9")
+    words[contact.status == "open"] = "open"
+    words[touching[bounds.partial[0]]] = "partial"
+    words[touching[bounds.sliding[0]]] = "sliding"
+    return ShearCertificate(
+        scope=contact.certificate.scope if bounds.proved[0] else "none",
+        status=frozen(words),
+        force_errors=frozen(force_errors),
+        slip_errors=frozen(slip_errors),
+        displacement_error=float(bounds.rises[0]) * travel,
+    )
+
+
+def _unmoved(contact: Contact, solver: str) -> VectorShearState:
+    """Nothing is loaded."""
+    n = len(contact.scene)
+    zero, none, pairs = frozen(np.zeros(n)), frozen(np.zeros(2)), frozen(np.zeros((n, 2)))
+    certificate = ShearCertificate(contact.certificate.scope, contact.status, zero, zero, 0.0)
+    return VectorShearState(
+        contact, none, none, pairs, pairs, zero, 0.0, 0.0, 0.0, certificate, solver, 0
+    )
