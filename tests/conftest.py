@@ -1,9 +1,37 @@
-"""Random scenes are new on every run by hand, and the same ones in continuous integration."""
+"""What every test may ask for, and how random scenes are drawn.
+
+Random scenes are new on every run by hand, and the same ones in continuous integration.
+"""
 
 import os
+from pathlib import Path
+from typing import Any, NamedTuple
 
+import pytest
 from hypothesis import settings
+
+from convexrough import cli
 
 settings.register_profile("ci", derandomize=True)
 if os.environ.get("CI"):
     settings.load_profile("ci")
+
+
+class Outcome(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Any:
+    """Run the command line in an empty folder, in this process."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> Outcome:
+        status = cli.main(arguments)
+        return Outcome(status, *capsys.readouterr())
+
+    return call

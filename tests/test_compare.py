@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scene_files import scene_text
 from scenes import NAMED, PAPER_APPROACH, paper, random_scenes, scattered
-from test_cli import Outcome
-from test_io import scene_text
 
 import convexrough as cr
-from convexrough import cli
 from convexrough import compare as comparing
 from convexrough.compare import Answer, compare, contradictions, every_solver
 from convexrough.normal.problem import NormalProblem
@@ -248,20 +246,6 @@ def test_contradictions_of_a_scene() -> None:
 
 
 # The command.
-
-
-@pytest.fixture
-def command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Any:
-    """Run the command line in an empty folder, in this process."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str) -> Outcome:
-        status = cli.main(arguments)
-        return Outcome(status, *capsys.readouterr())
-
-    return call
 
 
 def test_command(command: Any, tmp_path: Path) -> None:

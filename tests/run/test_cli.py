@@ -9,35 +9,15 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
-from test_io import HEXAGONAL, scene_text, write_loads
+from scene_files import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
 from convexrough import cli
 from convexrough.run.scene_file import read_scene
-
-
-class Outcome(NamedTuple):
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Any:
-    """Run the command line in an empty folder, in this process."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str) -> Outcome:
-        status = cli.main(arguments)
-        return Outcome(status, *capsys.readouterr())
-
-    return call
 
 
 def shell(

@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from flint import arb, ctx
+from friction_scenes import DIGITS, FRACTIONS, FRICTION, KINDS, NAMES, pressed, with_friction
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, solve_exactly
+from scenes import MATERIAL, PAPER_APPROACH, paper, random_scenes, solve_exactly
 
 import convexrough as cr
 from convexrough.influence import inverse_distances
@@ -18,26 +19,6 @@ from convexrough.shearing.certificate import judge_states
 from convexrough.shearing.load_errors import Known
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.sphere import hertz
-
-FRICTION = 0.5
-DIGITS = 80
-FRACTIONS = [1e-9, 1e-6, 1e-3, 0.1, 0.35, 0.37, 0.5, 0.7, 0.9, 0.999]
-NAMES = ["paper", "rough"]
-KINDS = ["dense", "lattice"]
-
-
-@cache
-def pressed(name: str, influence: Any = "dense", control: str = "approach") -> cr.Contact:
-    scene, approach = NAMED[name]
-    contact = cr.press(with_friction(scene), approach=approach, influence=influence)
-    if control == "load":
-        return cr.press(contact.scene, load=contact.load, influence=influence)
-    return contact
-
-
-def with_friction(scene: cr.Scene, friction: float = FRICTION, nu: float = 0.3) -> cr.Scene:
-    material = cr.Material(scene.material.contact_modulus, nu)
-    return cr.Scene(scene.sphere_radius, scene.asperities, material, friction, scene.geometry)
 
 
 class Exact(NamedTuple):

@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from friction_scenes import FRICTION, KINDS, pressed, with_friction
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, paper, random_scenes
-from test_shear import FRICTION, KINDS, pressed, with_friction
 
 import convexrough as cr
 from convexrough.influence import inverse_distances

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scene_files import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
 from convexrough.run import results
@@ -14,27 +15,6 @@ from convexrough.run.results import beside, claim_folder, write_results
 from convexrough.run.scene_file import UnitNames, read_scene
 from convexrough.run.stages import Outcome
 from convexrough.run.tables import ASPERITY_COLUMNS, read_loads, read_summits, read_table
-
-HEXAGONAL = """
-pattern = "hexagonal"
-spacing = 0.0025
-tip_radius = 0.02
-"""
-
-
-def scene_text(asperities: str = HEXAGONAL, normal: str = "approach = 5e-5", more: str = "") -> str:
-    return f"""
-[sphere]
-radius = 1.0
-[material]
-contact_modulus = 1.0
-poisson_ratio = 0.3
-[asperities]
-{asperities}
-[normal]
-{normal}
-{more}
-"""
 
 
 def read(tmp_path: Path, *parts: str, **tables: str) -> Any:
@@ -360,13 +340,6 @@ def test_summits_need_a_tip_radius(tmp_path: Path) -> None:
     path.write_text("x,y\n0,0\n")
     with pytest.raises(cr.InputError, match="tip radii: found neither"):
         read_summits(path, tip_radius=None)
-
-
-def write_loads(path: Path, scene: cr.Scene, loads: Any, order: Any) -> Path:
-    points = scene.asperities.positions
-    rows = [f"{float(points[i, 0])},{float(loads[i])},{float(points[i, 1])}" for i in order]
-    path.write_text("\n".join(["x,load,y", *rows]))
-    return path
 
 
 def test_loads_are_matched_by_position(tmp_path: Path, contact: cr.Contact) -> None:

@@ -13,11 +13,9 @@ import pytest
 from drawn import words
 from flint import arb, ctx
 from matplotlib.text import Text
-from test_cli import Outcome
 
 import convexrough as cr
 from convexrough import bench as benching
-from convexrough import cli
 from convexrough.bench import measure, reference, summary
 from convexrough.bench.figures import bench_figures
 from convexrough.bench.frontier import better_than_default, exponent, mark_frontier
@@ -29,7 +27,7 @@ from convexrough.influence import DenseInfluence, LatticeInfluence
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, Conic, Newton
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent.parent
 TINY = replace(
     quick_plan(),
     work=(("lattice", 61),),
@@ -256,18 +254,11 @@ def test_settings_that_make_no_difference_are_one_line() -> None:
 
 
 @pytest.fixture
-def command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Any:
-    """Run the command line in an empty folder, with a run that was made before."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(benching, "run", lambda plan, announce: tiny())
-
-    def call(*arguments: str) -> Outcome:
-        status = cli.main(arguments)
-        return Outcome(status, *capsys.readouterr())
-
-    return call
+def command(command: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The command line, which finds a run that was made before."""
+    made = tiny()
+    monkeypatch.setattr(benching, "run", lambda plan, announce: made)
+    return command
 
 
 def test_command(command: Any, tmp_path: Path) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, ctx
+from friction_scenes import FRICTION, NAMES, pressed
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH
-from test_shear import FRICTION, NAMES, pressed
 
 import convexrough as cr
 from convexrough.influence import LatticeInfluence
