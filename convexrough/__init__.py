@@ -5,7 +5,9 @@ from convexrough.contact import Contact, press
 from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
 from convexrough.normal.certificate import Certificate, certify
 from convexrough.run.scene_file import SceneFile, read_scene
-from convexrough.scene.scene import Asperities, Material, Scene
+from convexrough.scene.asperities import Asperities
+from convexrough.scene.material import Material
+from convexrough.scene.scene import Scene
 from convexrough.shearing.cycle import Cycle, Loop, cycle, cycles
 from convexrough.shearing.history import History, history
 from convexrough.shearing.state import ShearCertificate, ShearState, onset_of_sliding, shear

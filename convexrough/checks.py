@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from convexrough.arrays import Array
 from convexrough.errors import InputError
-
-Array: TypeAlias = NDArray[np.float64]
-Indices: TypeAlias = NDArray[np.intp]
-
 
 #: Sizes of numbers, in a scene's own units, whose products and powers float64 can hold.
 SMALLEST, LARGEST = 1e-60, 1e60
@@ -74,12 +70,6 @@ def array(what: str, values: ArrayLike, *, length: int | None = None, sign: str 
         raise InputError(f"{what}[{first}]", found=vector[first], expected=f"a {kind} number")
     vector.flags.writeable = False
     return vector
-
-
-def frozen(values: NDArray[Any]) -> NDArray[Any]:
-    """The array itself, made read-only."""
-    values.flags.writeable = False
-    return values
 
 
 def friction(coefficient: float | None) -> float:

@@ -18,12 +18,14 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from convexrough import solvers
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.contact import Contact, press
 from convexrough.errors import ConvexroughError, InputError, SolverError
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
-from convexrough.scene.scene import Asperities, Material, Scene
+from convexrough.scene.asperities import Asperities
+from convexrough.scene.material import Material
+from convexrough.scene.scene import Scene
 
 #: How many asperities a message names before it says "and so many more".
 MOST_NAMED = 5

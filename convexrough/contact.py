@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.checks import Array, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.influence import Influence, Kind
 from convexrough.normal.certificate import Certificate, judge
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import Announce
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton, Solution, Solver
-from convexrough.solvers.solution import Announce
 from convexrough.sphere import hertz
 
 

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 class ConvexroughError(Exception):
@@ -45,4 +50,23 @@ class FileError(ConvexroughError):
 
 
 class SolverError(ConvexroughError):
-    """A solver stopped without an answer; the message names it and its last residual."""
+    """A solver stopped without an answer.
+
+    what    : what was wrong, with the number that was too large
+    solver  : its name
+    advice  : what to try; "" where nothing is known to help
+    iterate : the last loads (n,) or forces, (n,) or (n, 2), [force] in the scene's order; None
+        where there are none
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        solver: str = "",
+        advice: str = "",
+        iterate: NDArray[np.float64] | None = None,
+    ) -> None:
+        self.what, self.solver, self.advice, self.iterate = what, solver, advice, iterate
+        place = f"{solver}: " if solver else ""
+        super().__init__(place + what + (f"; {advice}" if advice else ""))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.shearing.state import ShearState

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.compare import Answer, contradictions, listed
 from convexrough.contact import Contact
 from convexrough.errors import InputError

@@ -11,9 +11,9 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
+from convexrough.arrays import Array
 from convexrough.bench.reference import Reference
 from convexrough.bench.scenes import APPROACH
-from convexrough.checks import Array
 from convexrough.contact import press
 from convexrough.errors import InputError, SolverError
 from convexrough.influence import Influence, Kind

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import correct
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
@@ -95,7 +95,7 @@ def refine(problem: NormalProblem, loads: Array) -> Reference:
     assert best is not None
     residual, P, change = best
     if not residual <= 1e-14:
-        raise SolverError(f"reference: residual {residual:.2g} of the approach")
+        raise SolverError(f"residual {residual:.2g} of the approach", solver="reference")
     slope = 1.5 * np.cbrt(P) / k
     return Reference(
         loads=P,

@@ -6,7 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from convexrough.scene.scene import Asperities, Material, Scene
+from convexrough.scene.asperities import Asperities
+from convexrough.scene.material import Material
+from convexrough.scene.scene import Scene
 
 Family = Literal["lattice", "rough", "scattered"]
 

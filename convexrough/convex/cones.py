@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

@@ -14,6 +14,7 @@ def load_library(package: str, solver: str) -> Any:
         return import_module(package)
     except ImportError as error:
         raise SolverError(
-            f"{solver}: needs the package {package}, which cannot be imported ({error}); "
-            f"pip install {package}"
+            f"needs the package {package}, which cannot be imported ({error}); "
+            f"pip install {package}",
+            solver=solver,
         ) from error

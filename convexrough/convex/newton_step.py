@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.errors import SolverError
 from convexrough.influence import DenseInfluence, Influence, Smoother
 from convexrough.influence.dense import dense_matrix
@@ -76,7 +76,7 @@ def correct(
             return _iterate(influence, extra, root, defect, balanced, tolerance)
         except _IndefiniteError:
             continue
-    raise SolverError("newton: the shell-shifted matrix is not positive definite")
+    raise SolverError("the shell-shifted matrix is not positive definite", solver="newton")
 
 
 class _IndefiniteError(Exception):

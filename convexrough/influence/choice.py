@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from convexrough.checks import Indices
+from convexrough.arrays import Indices
 from convexrough.errors import InputError
 from convexrough.influence.coupling import Influence, Kind
 from convexrough.influence.dense import DenseInfluence

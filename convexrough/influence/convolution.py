@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.influence.lattice_smoother import differences
 
 #: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.2 for the

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.roundoff import SAFETY
 
 #: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points: differences 1,

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from convexrough import checks
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import (
     ENTRY_ROUNDOFFS,
     Kind,

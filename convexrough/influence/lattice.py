@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel, neighbours
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error

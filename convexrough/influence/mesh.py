@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel
 from convexrough.influence.coupling import Rounding
 from convexrough.influence.near_pairs import Near, Order

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.influence.splitting import Plan
 
 #: Pairs looked at together, and how many such pieces are held at once.

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.mesh import Product

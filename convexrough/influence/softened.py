@@ -15,7 +15,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 
 #: Near pairs whose part would be less than so much of the error of interpolation are left out.
 CUT = 0.1

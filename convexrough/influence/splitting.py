@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.influence.softened import Softened
 
 #: Numbers of nodes to interpolate from, in each direction.

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.checks import Array, Indices, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.influence import Coupling, DenseInfluence, Influence, Kind, spread
 from convexrough.normal.problem import NormalProblem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
 from convexrough.roundoff import ROUNDOFF, SAFETY

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.influence import Influence, Kind, couple, fitted_shells, shells
 from convexrough.normal.load_control import approach_bound, highest_approach, shifted_to_load
 from convexrough.roundoff import ROUNDOFF, SAFETY

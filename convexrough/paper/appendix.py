@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks, fields
-from convexrough.checks import Array, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.shearing.state import ShearState, shear
-from convexrough.sphere import hertz
+from convexrough.sphere import mindlin
 
 
 def displacements(state: ShearState) -> Array:
@@ -70,10 +70,10 @@ def energies(state: ShearState) -> Array:
     friction = checks.friction(scene.friction)
     limits = friction * contact.loads
     indentations = contact.contact_radii**2 / scene.relative_radii
-    scales = 4.8 * hertz.mindlin_ratio(scene.material.poisson_ratio) * friction * indentations
+    scales = 4.8 * mindlin.ratio(scene.material.poisson_ratio) * friction * indentations
     shares = np.minimum(np.abs(state.forces) / np.where(limits > 0, limits, 1.0), 1.0)
     forwards = np.sign(state.force) * slips(state)
-    return frozen(limits * (scales * hertz.loss(shares) + 4.0 * forwards))
+    return frozen(limits * (scales * mindlin.loss(shares) + 4.0 * forwards))
 
 
 def cycle_energy(contact: Contact, maximum: float, minimum: float | None = None) -> float:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.run.stages import Outcome, compute
 
 APPROACH = 5e-5

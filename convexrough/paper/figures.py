@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from convexrough import checks, fields
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.paper.curves import forces_figure, loss_figure
 from convexrough.plots.cycle import MOST_ASPERITIES, loops_figure

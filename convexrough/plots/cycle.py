@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots.style import (
     DASHED,
@@ -29,7 +29,7 @@ from convexrough.plots.style import (
 )
 from convexrough.shearing.cycle import Cycle, Loop
 from convexrough.shearing.history import history
-from convexrough.sphere import hertz
+from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
 
 MOST_LOOPS, MOST_ASPERITIES = 4, 6
@@ -237,7 +237,7 @@ def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
     marks |= {"marker": "o", "ls": ""} if len(some) < 100 else {"ls": "-"}
 
     t = np.geomspace(min(0.7 * amplitude[0], 0.3), 1.0, 300)
-    loss.plot(t, hertz.loss(t), ls=DASHED, lw=1.1, color=SMOOTH, label="smooth sphere")
+    loss.plot(t, mindlin.loss(t), ls=DASHED, lw=1.1, color=SMOOTH, label="smooth sphere")
     loss.plot(amplitude, rough, label="asperities", **marks)
     loss.set(xscale="log", yscale="log", xlim=(t[0], 1.0))
     _few_ticks(loss)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.plots.style import (
     DOUBLE,
     SMOOTH,

@@ -9,7 +9,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from convexrough import fields
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots.style import (
     COLOURS,

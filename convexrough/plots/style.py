@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.sphere import hertz
 from convexrough.sphere.smooth import SmoothSphere, smooth

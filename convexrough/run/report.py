@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.compare import Comparison, Entry
 from convexrough.contact import Contact
 from convexrough.normal.certificate import Certificate

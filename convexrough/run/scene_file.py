@@ -14,8 +14,10 @@ from convexrough.errors import FileError, InputError, SceneFileError
 from convexrough.influence import Kind
 from convexrough.normal.load_control import highest_approach
 from convexrough.run.tables import read_summits, read_text
+from convexrough.scene.asperities import Asperities, largest_tip_radius
+from convexrough.scene.material import Material
 from convexrough.scene.patterns import CUT
-from convexrough.scene.scene import Asperities, Material, Scene, largest_tip_radius, reach
+from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver
 from convexrough.sphere import hertz
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from convexrough import checks
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
+from convexrough.progress import Announce
 from convexrough.shearing.cycle import Cycle, cycles
 from convexrough.shearing.history import History, history
 from convexrough.shearing.state import ShearState, shear
-from convexrough.solvers.solution import Announce
 
 
 @dataclass(frozen=True, eq=False)

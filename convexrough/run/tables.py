@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.checks import Array, Indices, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import FileError, InputError
-from convexrough.scene.scene import Asperities, Scene, nearest_distances
+from convexrough.scene.asperities import Asperities
+from convexrough.scene.neighbours import nearest_distances
+from convexrough.scene.scene import Scene
 
 #: Columns that are read, and the check that each cell must pass.
 CHECKS: dict[str, Callable[[str, Any], float]] = {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 
 Sites = NDArray[np.int64]
 

@@ -1,11 +1,11 @@
-"""Nearest neighbours of scattered points, by a k-d tree."""
+"""Nearest neighbours of points anywhere, by a k-d tree."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from convexrough.checks import Array
-from convexrough.scene.scene import nearest_distances
+from convexrough.arrays import Array
+from convexrough.errors import InputError
 
 #: Asperities looked at together: between two batches fewer pairs come to be worth a look.
 BATCH = 256
@@ -43,3 +43,27 @@ def crowding(points: Array, radii: Array) -> float:
             apart = np.hypot(*(points[j] - points[i]).T)
             worst = max(worst, float(((radii[i] + radii[j]) / apart).max(initial=0.0)))
     return worst
+
+
+def refuse_coincident(points: Array) -> None:
+    """Two asperities at one place have no finite interaction."""
+    if len(points) < 2:
+        return
+    distances = nearest_distances(points)
+    blur = 16 * np.finfo(float).eps * np.abs(points).max()  # well beyond the points' rounding
+    if (worst := float(distances.min())) <= blur:
+        first = int(np.argmin(distances))
+        others = np.hypot(*(points[first + 1 :] - points[first]).T)
+        second = first + 1 + int(np.argmin(others))
+        raise InputError(
+            "positions",
+            found=f"asperities {first} and {second} (from 0) at a distance of {worst:g}",
+            expected="distinct positions",
+        )
+
+
+def nearest_distances(points: Array) -> Array:
+    """(n,) [length] distance of each point to its nearest neighbour; by a k-d tree."""
+    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+
+    return np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]

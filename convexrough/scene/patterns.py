@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 
 #: Random heights and log radii are normal, cut at this many standard deviations (a chance of

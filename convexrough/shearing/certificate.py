@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.normal.certificate import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY

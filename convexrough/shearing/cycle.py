@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.checks import Array, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.progress import Announce
 from convexrough.shearing.certificate import Bounds
 from convexrough.shearing.first_loading import Family
 from convexrough.shearing.history import history
 from convexrough.shearing.problem import States
-from convexrough.solvers.solution import Announce
-from convexrough.sphere import hertz
+from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
 
 
@@ -166,7 +166,7 @@ def cycles(
             sliding_energies=each.sliding_slip,
             balance_defect=each.defect,
             energy_normalised=each.energy / whole,
-            smooth_normalised=float(hertz.loss(each.total / problem.limit)),
+            smooth_normalised=float(mindlin.loss(each.total / problem.limit)),
             sliding=each.sliding,
             partial=each.partial,
         )

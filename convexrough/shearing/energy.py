@@ -23,11 +23,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.convex.newton_step import FACTORISED, correct
 from convexrough.errors import SolverError
 from convexrough.influence import DenseInfluence, Influence
-from convexrough.sphere import mindlin
+from convexrough.sphere import annulus
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class TangentialEnergy:
     def increments(self, deflections: Array) -> Array:
         """u(eta), saturated at +-P."""
         u: Array = self.loads * np.copysign(
-            mindlin.force(mindlin.width_at(deflections / self.ceilings)), deflections
+            annulus.force(annulus.width_at(deflections / self.ceilings)), deflections
         )
         return u
 
@@ -59,19 +59,19 @@ class TangentialEnergy:
         """The local deflection of an asperity that does not slide."""
         share = increments / self.loads
         eta: Array = self.ceilings * np.copysign(
-            mindlin.deflection(mindlin.width_under(share)), share
+            annulus.deflection(annulus.width_under(share)), share
         )
         return eta
 
     def slopes(self, deflections: Array) -> Array:
         """c = du/deta, 0 where sliding."""
-        c: Array = self.stiffest * (1.0 - mindlin.width_at(deflections / self.ceilings))
+        c: Array = self.stiffest * (1.0 - annulus.width_at(deflections / self.ceilings))
         return c
 
     def respond(self, deflections: Array) -> tuple[Array, Array]:
         """`increments` and `slopes` at once."""
-        x = mindlin.width_at(deflections / self.ceilings)
-        u: Array = self.loads * np.copysign(mindlin.force(x), deflections)
+        x = annulus.width_at(deflections / self.ceilings)
+        u: Array = self.loads * np.copysign(annulus.force(x), deflections)
         return u, self.stiffest * (1.0 - x)
 
     def couple(self, increments: Array) -> Array:
@@ -87,7 +87,7 @@ class TangentialEnergy:
 
     def energies(self, deflections: Array, increments: Array, coupling: Array) -> Array:
         """(m,) the energy of m states."""
-        local = mindlin.potential(mindlin.width_at(deflections / self.ceilings))
+        local = annulus.potential(annulus.width_at(deflections / self.ceilings))
         coupled = 0.5 * (increments * coupling).sum(axis=1)
         return np.asarray(local @ (self.loads * self.ceilings) + coupled)
 
@@ -135,4 +135,4 @@ class TangentialEnergy:
             step = correct(self.influence, self.shells, root, defect, balanced=True, tolerance=1e-5)
             eta = eta + step.change
             eta /= float(c @ eta)
-        raise SolverError("shear: the elastic state does not converge")
+        raise SolverError("the elastic state does not converge", solver="shear")

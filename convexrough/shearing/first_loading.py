@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
+from convexrough.progress import Announce
 from convexrough.shearing.certificate import Bounds, judge_in_turn
 from convexrough.shearing.newton import by_matrices
 from convexrough.shearing.problem import States, TangentialProblem
-from convexrough.solvers.solution import Announce
-from convexrough.sphere import hertz, mindlin
+from convexrough.sphere import annulus, mindlin
 
 
 class Family:
@@ -29,7 +29,7 @@ class Family:
         self.contact = contact
         self.friction = checks.friction(contact.scene.friction)
         self.problem = TangentialProblem.of(contact)
-        ratio = hertz.mindlin_ratio(contact.scene.material.poisson_ratio)
+        ratio = mindlin.ratio(contact.scene.material.poisson_ratio)
         self.force_unit = self.friction * self.problem.units.force
         self.length_unit = ratio * self.friction * self.problem.units.length
         self.energy_unit = 8.0 * self.force_unit * self.length_unit
@@ -63,7 +63,7 @@ class Family:
     def partial_slip(self, states: States) -> Array:
         """(m, n) share of w(T) lost in partial slip: (3/5) P ceiling e(u / P)."""
         problem = self.problem
-        shares = mindlin.loss(mindlin.width_under(states.increments / problem.loads))
+        shares = annulus.loss(annulus.width_under(states.increments / problem.loads))
         return np.asarray(0.6 * problem.loads * problem.ceilings * shares)
 
     def sliding(self, states: States) -> Array:
@@ -81,11 +81,11 @@ class Family:
         """
         problem, q = self.problem, self.problem.elastic
         P, ceilings, u = problem.loads, problem.ceilings, states.increments
-        x = mindlin.width_under(u / P)
+        x = annulus.width_under(u / P)
         total = u.sum(axis=1)
-        excess = np.copysign(ceilings * mindlin.excess_deflection(x), u) + states.slips
+        excess = np.copysign(ceilings * annulus.excess_deflection(x), u) + states.slips
         v = u - total[:, None] * q
         v -= v.sum(axis=1, keepdims=True) * q
         bent = problem.couple(v) + v / problem.stiffest
-        potential = mindlin.excess_potential(x) @ (P * ceilings)
+        potential = annulus.excess_potential(x) @ (P * ceilings)
         return np.asarray(0.5 * total * (excess @ q) - potential - 0.5 * (v * bent).sum(axis=1))

@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.checks import Array, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
+from convexrough.progress import Announce
 from convexrough.roundoff import SAFETY
 from convexrough.shearing.first_loading import Family
 from convexrough.shearing.problem import States
-from convexrough.solvers.solution import Announce
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.influence import couple, fitted_shells, spread
 from convexrough.normal.certificate import FIT_FROM, SUM_ROUNDOFFS

@@ -14,14 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import FACTORISED, correct
 from convexrough.errors import SolverError
 from convexrough.influence import DenseInfluence
+from convexrough.progress import Announce
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.energy import TangentialEnergy
 from convexrough.solvers.newton import MOST_LEFT
-from convexrough.solvers.solution import Announce
 
 #: Evenly spaced states from which many others are interpolated to start with.
 FAMILY = 128
@@ -213,8 +213,9 @@ def _gross(energy: TangentialEnergy) -> tuple[Array, Array, float, float]:
 
 def _stalled(energy: TangentialEnergy, total: float, residual: float) -> SolverError:
     return SolverError(
-        f"shear: residual {residual:.3g} of the displacement after {MOST_STEPS} Newton steps, at "
-        f"{total / energy.limit:.6g} of gross sliding"
+        f"residual {residual:.3g} of the displacement after {MOST_STEPS} Newton steps, at "
+        f"{total / energy.limit:.6g} of gross sliding",
+        solver="shear",
     )
 
 
@@ -251,7 +252,7 @@ def _descend(energy: TangentialEnergy, state: Iterate, directions: Array, totals
         again = evaluate(energy, trial, totals[rejected])
         for field, new in zip(after, again, strict=True):
             field[rejected] = new
-    raise SolverError("shear: no step along Newton's direction lowers the energy")
+    raise SolverError("no step along Newton's direction lowers the energy", solver="shear")
 
 
 def _balanced(energy: TangentialEnergy, eta: Array, totals: Array) -> tuple[Array, Array, Array]:

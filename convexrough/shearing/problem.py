@@ -14,13 +14,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.influence import couple, shells
 from convexrough.normal.problem import Units
+from convexrough.progress import Announce
 from convexrough.shearing.energy import TangentialEnergy
 from convexrough.shearing.newton import States, by_matrices, solve_in_turn, solve_together
-from convexrough.solvers.solution import Announce
 from convexrough.sphere import hertz
 
 __all__ = ["States", "TangentialProblem"]

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.checks import Array, Indices, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.normal.certificate import Scope
+from convexrough.progress import Announce
 from convexrough.shearing.certificate import judge_states
 from convexrough.shearing.newton import by_matrices
 from convexrough.shearing.problem import States, TangentialProblem
-from convexrough.solvers.solution import Announce
-from convexrough.sphere import hertz
+from convexrough.sphere import mindlin
 
 #: Of more loaded asperities than this, coupled by an operator, the onset of some only is found.
 MOST_ONSETS = 256
@@ -101,7 +101,7 @@ def shear(contact: Contact, *, force: float, announce: Announce | None = None) -
     bounds = judge_states(problem, contact, states)
 
     touching, force_unit, length_unit = problem.touching, problem.units.force, problem.units.length
-    travel = hertz.mindlin_ratio(scene.material.poisson_ratio) * friction * length_unit
+    travel = mindlin.ratio(scene.material.poisson_ratio) * friction * length_unit
 
     def everywhere(values: Array, unit: float) -> Array:
         full = np.zeros(len(scene))

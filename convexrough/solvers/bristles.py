@@ -39,13 +39,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.convex.libraries import load_library
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import Announce
 from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.newton import newton_step
-from convexrough.solvers.solution import Announce, Solution
+from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
 if TYPE_CHECKING:
@@ -169,7 +170,9 @@ def _convex_box(problem: NormalProblem) -> tuple[Array, NDArray[np.bool_], Array
     box = np.minimum(box, faces)
     if (hessian := _positive_definite(problem, box)) is not None:
         return box, cut, hessian
-    raise SolverError("bristles: the matrix is not positive definite within the convex range")
+    raise SolverError(
+        "the matrix is not positive definite within the convex range", solver="bristles"
+    )
 
 
 def _positive_definite(problem: NormalProblem, box: Array) -> Array | None:
@@ -208,17 +211,21 @@ def _run_osqp(program: _Program, settings: BristleQP) -> tuple[Array, Array, int
         reason = reasons.get(error.args[0] if error.args else 0, f"error {error}")
         if reason == "OSQP_SIGINT":  # OSQP takes the signal for itself
             raise KeyboardInterrupt from error
-        raise SolverError(f"{settings.name}: OSQP did not solve the program: {reason}") from error
+        raise SolverError(
+            f"OSQP did not solve the program: {reason}", solver=settings.name
+        ) from error
     x, multipliers = np.asarray(result.x), np.asarray(result.y)
     if not (np.isfinite(x).all() and np.isfinite(multipliers).all()):
-        raise SolverError(f"{settings.name}: OSQP returned numbers that are not finite")
+        raise SolverError("OSQP returned numbers that are not finite", solver=settings.name)
     return x, multipliers, int(result.info.iter)
 
 
 def _import_osqp(solver: str) -> Any:
     osqp = load_library("osqp", solver)
     if int(osqp.__version__.split(".")[0]) < 1:
-        raise SolverError(f'{solver}: OSQP {osqp.__version__} is too old; pip install "osqp>=1.0"')
+        raise SolverError(
+            f'OSQP {osqp.__version__} is too old; pip install "osqp>=1.0"', solver=solver
+        )
     return osqp
 
 

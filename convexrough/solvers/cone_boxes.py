@@ -15,7 +15,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array, Indices
+from convexrough.arrays import Array, Indices
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
@@ -148,7 +148,7 @@ def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: Boxes) -> Soluti
 def accept(solver: ConeSolver, problem: NormalProblem, boxes: Boxes, answer: Answer) -> Solution:
     """The answer as the solution of the contact law, if it is that; else the errors above."""
     if not np.isfinite(answer.loads).all():
-        raise SolverError(f"{solver.name}: loads that are not numbers")
+        raise SolverError("loads that are not numbers", solver=solver.name)
     loads = np.zeros(len(problem))
     loads[boxes.members] = np.clip(answer.loads, 0.0, boxes.loads)
     pressed = _pressed_on(problem, boxes, loads, answer.approach)
@@ -190,7 +190,7 @@ def _judged(
         missed = float(np.abs(loads - alone).max() / max(loads.max(), np.finfo(float).tiny))
         if not missed <= ROOTS * np.sqrt(solver.tolerance):
             raise SolverError(
-                f"{solver.name}: loads miss the contact law by {missed:.3g} of the largest"
+                f"loads miss the contact law by {missed:.3g} of the largest", solver=solver.name
             )
         residual = problem.residual(loads, answer.approach)
         return Solution(loads, answer.approach, answer.iterations, residual)
@@ -203,7 +203,7 @@ def _judged(
         step, iterations = newton_step(problem, step.loads), iterations + 1
     if not (missed := _missed(problem, step)) <= ACCURATE:
         raise SolverError(
-            f"{solver.name}: residual of {missed:.3g} of the approach after two Newton steps"
+            f"residual of {missed:.3g} of the approach after two Newton steps", solver=solver.name
         )
     theta = problem.shells / problem.stiffness(step.loads)
     if (theta >= FIVE_CONES_LIMIT).any():

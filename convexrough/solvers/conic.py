@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from convexrough import checks
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.convex.cones import power_cones
 from convexrough.convex.libraries import load_library
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import Announce
 from convexrough.solvers.cone_boxes import Answer, Boxes, solve_in_boxes
-from convexrough.solvers.solution import Announce, Solution
+from convexrough.solvers.solution import Solution
 
 #: From this many asperities on Clarabel's supernodal factorisation is the faster one.
 SUPERNODAL = 300
@@ -80,8 +81,8 @@ class Conic:
         solution = clarabel.DefaultSolver(*_program(clarabel, problem, boxes), settings).solve()
         if str(solution.status) not in STOPPED:
             raise SolverError(
-                f"{self.name}: clarabel stopped after {solution.iterations} steps with "
-                f"{solution.status}"
+                f"clarabel stopped after {solution.iterations} steps with {solution.status}",
+                solver=self.name,
             )
         approach = problem.approach
         if approach is None:  # the program counts it from the ceiling; V'(L) = -multiplier

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from convexrough import checks
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.convex.libraries import load_library
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import Announce
 from convexrough.solvers.cone_boxes import Answer, Boxes, accept, solve_in_boxes
-from convexrough.solvers.solution import Announce, Solution
+from convexrough.solvers.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -144,9 +145,9 @@ class LiftedModel:
         except cp.error.SolverError as error:
             if cp.CLARABEL not in cp.installed_solvers():
                 load_library("clarabel", settings.name)
-            raise SolverError(f"{settings.name}: {error}") from error
+            raise SolverError(f"{error}", solver=settings.name) from error
         if self.program.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-            raise SolverError(f"{settings.name}: clarabel stopped with {self.program.status}")
+            raise SolverError(f"clarabel stopped with {self.program.status}", solver=settings.name)
         iterations = int(self.program.solver_stats.num_iters or 0)
         return Answer(self.loads, self.approach, iterations)
 

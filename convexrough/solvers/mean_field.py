@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 

@@ -19,14 +19,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import Announce
 from convexrough.roundoff import SAFETY
 from convexrough.solvers.mean_field import mean_field_indentation
-from convexrough.solvers.solution import Announce, Solution
+from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
 #: Of more candidates than this, only those near the contact are iterated on.
@@ -131,8 +132,9 @@ class Newton:
                 return min(state, following, key=lambda s: s.residual), iteration
             state, before = following, size
         raise SolverError(
-            f"newton: residual {state.residual:.3g} in units of the approach after "
-            f"{self.max_iterations} steps, {max(self.tolerance, ACCURATE) * scale:.3g} needed"
+            f"residual {state.residual:.3g} in units of the approach after "
+            f"{self.max_iterations} steps, {max(self.tolerance, ACCURATE) * scale:.3g} needed",
+            solver="newton",
         )
 
 
@@ -202,4 +204,4 @@ def _step(problem: NormalProblem, state: _State, forcing: float) -> _State:
         if trial.energy - state.energy <= 1e-4 * min(slope, 0.0) + rounding:
             return trial
         length /= 2.0
-    raise SolverError("newton: no step along its direction lowers the energy")
+    raise SolverError("no step along its direction lowers the energy", solver="newton")

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
-
-#: Told in a line how far long work has come.
-Announce = Callable[[str], object]
+from convexrough.progress import Announce
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,10 @@ Source: Johnson, Contact Mechanics (1985), chapters 3 and 4.
 from __future__ import annotations
 
 from math import factorial
-from typing import Any
 
 import numpy as np
 
-from convexrough.sphere import mindlin
-
-Number = Any  # float or float64 array; the result has the shape of the arguments
+from convexrough.arrays import Number
 
 
 def local_coefficient(contact_modulus: Number, radius: Number) -> Number:
@@ -69,39 +66,3 @@ def less_sine(angle: Number) -> Number:
     for m in range(19, 1, -2):
         series = 1.0 / factorial(m) - small * series
     return np.where(angle < 1.0, series * angle**3, angle - np.sin(angle))
-
-
-# The tangential law of one sphere (Cattaneo-Mindlin) at constant normal load P. With t = Q / (f P)
-# and the largest deflection ceiling = k P^(2/3), everything is a function of t alone, times
-# c_t f ceiling (displacements) or c_t f^2 P ceiling (energies); c_t is `mindlin_ratio`. Each
-# function below is accurate relative to its own value, also where that is of third order in t:
-# they are the positive polynomials of `annulus`.
-
-
-def mindlin_ratio(poisson_ratio: Number) -> Number:
-    """c_t = (2 - nu) / (2 (1 - nu)): tangential over normal compliance."""
-    return (2.0 - poisson_ratio) / (2.0 * (1.0 - poisson_ratio))
-
-
-def deflection(t: Number) -> Number:
-    """phi(t) = 1 - (1 - t)^(2/3), of either sign: phi(-t) = -phi(t)."""
-    return np.copysign(mindlin.deflection(mindlin.width_under(t)), t)
-
-
-def force(deflection: Number) -> Number:
-    """t = 1 - (1 - phi)^(3/2), the inverse of `deflection`; all that friction can bear beyond 1."""
-    return np.copysign(mindlin.force(mindlin.width_at(deflection)), deflection)
-
-
-def potential(t: Number) -> Number:
-    """Integral of phi from 0 to t:  t - (3/5) [1 - (1 - t)^(5/3)]."""
-    return mindlin.potential(mindlin.width_under(t))
-
-
-def loss(t: Number) -> Number:
-    """e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], of third order in t.
-
-    A cycle between +-Q costs (9 (2 - nu) f^2 P^2 / (5 G a)) e(Q / (f P)), which is
-    (24/5) c_t f^2 P ceiling e: equation (16) of the source, for both bodies.
-    """
-    return mindlin.loss(mindlin.width_under(t))

@@ -1,65 +1,44 @@
-"""The tangential law of one sphere, as polynomials of the width of its slip annulus.
+"""The tangential law of one sphere at constant normal load (Cattaneo and Mindlin).
 
-With s = c / a the stick radius over the contact radius and x = 1 - s, partial slip under the share
-t = |Q| / (f P) of friction and at the share phi of the largest deflection is
-
-    t = 1 - s^3,    phi = 1 - s^2,
-
-and the energies of `convexrough.sphere.hertz` are polynomials. They are written so that no term is
-subtracted from another: each keeps its relative accuracy down to x = 0. Sliding is x = 1.
+With t = Q / (f P) and the largest deflection ceiling = k P^(2/3), everything is a function of t
+alone, times c_t f ceiling (displacements) or c_t f^2 P ceiling (energies); c_t is `ratio`. Each
+function is accurate relative to its own value, also where that is of third order in t: they are the
+positive polynomials of `annulus`.
+Source: Johnson, Contact Mechanics (1985), chapter 7.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-Number = Any  # float or float64 array; the result has the shape of the arguments
+from convexrough.arrays import Number
+from convexrough.sphere import annulus
 
 
-def width_at(deflection: Number) -> Number:
-    """x at a deflection phi of either sign, 1 from |phi| = 1 on."""
-    size = np.minimum(np.abs(deflection), 1.0)
-    return size / (1.0 + np.sqrt(1.0 - size))
+def ratio(poisson_ratio: Number) -> Number:
+    """c_t = (2 - nu) / (2 (1 - nu)): tangential over normal compliance."""
+    return (2.0 - poisson_ratio) / (2.0 * (1.0 - poisson_ratio))
 
 
-def width_under(force: Number) -> Number:
-    """x under a share t of friction, of either sign."""
-    size = np.minimum(np.abs(force), 1.0)
-    s = np.cbrt(1.0 - size)
-    return size / (1.0 + s + s * s)
+def deflection(t: Number) -> Number:
+    """phi(t) = 1 - (1 - t)^(2/3), of either sign: phi(-t) = -phi(t)."""
+    return np.copysign(annulus.deflection(annulus.width_under(t)), t)
 
 
-def force(x: Number) -> Number:
-    """t = 1 - s^3."""
-    s = 1.0 - x
-    return x * (1.0 + s * (1.0 + s))
+def force(deflection: Number) -> Number:
+    """t = 1 - (1 - phi)^(3/2), the inverse of `deflection`; all that friction can bear beyond 1."""
+    return np.copysign(annulus.force(annulus.width_at(deflection)), deflection)
 
 
-def deflection(x: Number) -> Number:
-    """phi = 1 - s^2."""
-    return x * (2.0 - x)
+def potential(t: Number) -> Number:
+    """Integral of phi from 0 to t:  t - (3/5) [1 - (1 - t)^(5/3)]."""
+    return annulus.potential(annulus.width_under(t))
 
 
-def excess_deflection(x: Number) -> Number:
-    """phi - (2/3) t."""
-    return x * x * (3.0 - 2.0 * x) / 3.0
+def loss(t: Number) -> Number:
+    """e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], of third order in t.
 
-
-def potential(x: Number) -> Number:
-    """Integral of phi over t."""
-    s = 1.0 - x
-    return x * x * (0.4 + s * (0.8 + s * (1.2 + s * 0.6)))
-
-
-def excess_potential(x: Number) -> Number:
-    """Integral of phi - (2/3) t over t."""
-    s = 1.0 - x
-    return x * x * x * (1.0 + s * (3.0 + s * (6.0 + s * 5.0))) / 15.0
-
-
-def loss(x: Number) -> Number:
-    """e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], as in `hertz.loss`."""
-    s = 1.0 - x
-    return x * x * x * (1.0 + s * (3.0 + s)) / 6.0
+    A cycle between +-Q costs (9 (2 - nu) f^2 P^2 / (5 G a)) e(Q / (f P)), which is
+    (24/5) c_t f^2 P ceiling e: equation (16) of the source, for both bodies.
+    """
+    return annulus.loss(annulus.width_under(t))

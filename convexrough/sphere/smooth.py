@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.scene.scene import Scene
-from convexrough.sphere import hertz, surface_shear
+from convexrough.sphere import hertz, mindlin, surface_shear
 
 
 def smooth(scene: Scene, *, load: float) -> SmoothSphere:
@@ -88,7 +88,7 @@ class SmoothSphere:
 
     def displacement(self, force: ArrayLike) -> Any:
         """X = (3 (2-nu) f P / (8 G a_H)) [1 - (1 - Q/(f P))^(2/3)]  [length], on first loading."""
-        return self._largest_displacement * hertz.deflection(self._share("force", force))
+        return self._largest_displacement * mindlin.deflection(self._share("force", force))
 
     def branch(self, force: ArrayLike, turning_force: float) -> Any:
         """X on the way back from a turning point of first loading, to its mirror image [length].
@@ -117,7 +117,7 @@ class SmoothSphere:
         if (lower > upper).any():
             expected = "at least the minimum, by default the negative of the maximum"
             raise InputError("maximum", found=maximum, expected=expected)
-        return self.energy_scale * hertz.loss((upper - lower) / 2.0)
+        return self.energy_scale * mindlin.loss((upper - lower) / 2.0)
 
     @property
     def energy_scale(self) -> float:
@@ -127,7 +127,7 @@ class SmoothSphere:
     @property
     def _largest_displacement(self) -> float:
         """c_t f delta = 3 (2 - nu) f P / (8 G a_H), at Q = f P  [length]."""
-        ratio = hertz.mindlin_ratio(self.scene.material.poisson_ratio)
+        ratio = mindlin.ratio(self.scene.material.poisson_ratio)
         return float(ratio * self._friction * self.approach)
 
     @property

@@ -7,7 +7,7 @@ is used,
     q(r) = f p0 [sqrt(1 - r^2/a^2) - (c/a) sqrt(1 - r^2/c^2)].
 
 Both terms tend to each other as t -> 0. So neither function below subtracts them: each is built on
-1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), which is `hertz.deflection`, and keeps its relative accuracy.
+1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), which is `mindlin.deflection`, and keeps its relative accuracy.
 Source: Johnson, Contact Mechanics (1985), chapters 3 and 7.
 """
 
@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from convexrough.sphere import hertz
-from convexrough.sphere.hertz import Number
+from convexrough.arrays import Number
+from convexrough.sphere import hertz, mindlin
 
 
 def traction(distance: Number, contact_radius: Number, share: Number, peak: Number) -> Number:
@@ -27,7 +27,7 @@ def traction(distance: Number, contact_radius: Number, share: Number, peak: Numb
     With A = sqrt(1 - r^2/a^2) and C = sqrt(c^2/a^2 - r^2/a^2), or 0 in the slip annulus:
     A - C = (A^2 - C^2) / (A + C).
     """
-    left_by_stick = np.abs(hertz.deflection(share))  # 1 - c^2/a^2
+    left_by_stick = np.abs(mindlin.deflection(share))  # 1 - c^2/a^2
     ratio = np.divide(distance, contact_radius)
     whole = np.maximum((1.0 - ratio) * (1.0 + ratio), 0.0)  # A^2
     roots = np.sqrt(whole) + np.sqrt(np.maximum(whole - left_by_stick, 0.0))
@@ -58,7 +58,9 @@ def surface_displacement(
     of sine and cosine from the angle between, phi_a - phi_c, which is known accurately.
     """
     a_squared, r_squared = np.square(contact_radius), np.square(x) + np.square(y)
-    slip_area = a_squared * np.abs(hertz.deflection(share))  # a^2 - c^2; over pi, as all areas here
+    slip_area = a_squared * np.abs(
+        mindlin.deflection(share)
+    )  # a^2 - c^2; over pi, as all areas here
     b_area = np.maximum(slip_area - np.maximum(a_squared - r_squared, 0.0), 0.0)  # b_a^2 - b_c^2
 
     sine_a = np.sqrt(np.minimum(a_squared, r_squared))  # r sin(phi_a), and so on

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.normal.certificate import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.convex.libraries import load_library
 from convexrough.errors import SolverError
@@ -117,7 +117,9 @@ class FrictionConic:
             solution = clarabel.DefaultSolver(*data, settings).solve()
             answer, multipliers = np.array(solution.x), np.array(solution.z)
             if not (np.isfinite(answer).all() and np.isfinite(multipliers).all()):
-                raise SolverError(f"friction ({self.name}): the answer of clarabel is not a number")
+                raise SolverError(
+                    "the answer of clarabel is not a number", solver=f"friction ({self.name})"
+                )
             q, rise, slips = program.read(answer, multipliers)
             state = VectorState(total / scale, q, rise, slips, int(solution.iterations))
             energy = problem.energy(q, problem.couple(q))
@@ -125,10 +127,11 @@ class FrictionConic:
             if gap <= self.accepted and residual <= 1e4 * self.accepted:
                 return VectorState(total, scale * q, scale * rise, scale * slips, state.iterations)
         raise SolverError(
-            f"friction ({self.name}): clarabel stopped after {solution.iterations} steps with "
+            f"clarabel stopped after {solution.iterations} steps with "
             f"{solution.status}, at an energy proved to be within {gap:.3g} of the least, "
             f"relatively, and a residual of {residual:.3g}; accepted are {self.accepted:g} and "
-            f"{1e4 * self.accepted:g}"
+            f"{1e4 * self.accepted:g}",
+            solver=f"friction ({self.name})",
         )
 
 
@@ -141,11 +144,12 @@ def _shares(problem: VectorProblem) -> Array:
     worst = np.argsort(-problem.crowding)[:5]
     named = ", ".join(f"{touching[i]} ({problem.crowding[i]:.4g})" for i in worst)
     raise SolverError(
-        f"friction (conic): too dense for a convex program: the least shift of the tangential "
+        f"too dense for a convex program: the least shift of the tangential "
         f"kernel is {shares.max():.4g} of the local stiffness, and at most 1 is convex. Most "
         f"crowded, by their indices, with their contact radii over (pi/4) times the distance to "
         f"the nearest neighbour: {named}. Use a smaller load, sharper tips, or asperities further "
-        f"apart"
+        f"apart",
+        solver="friction (conic)",
     )
 
 

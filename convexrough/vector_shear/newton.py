@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.errors import SolverError
 from convexrough.roundoff import SAFETY
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
@@ -47,7 +47,9 @@ class FrictionNewton:
         start = scalar.deflections[0][:, None] * (total / size)
         iterate = _evaluate(problem, start, total)
         if iterate is None:
-            raise SolverError("friction (newton): no forces of the prescribed total to start from")
+            raise SolverError(
+                "no forces of the prescribed total to start from", solver="friction (newton)"
+            )
         for iteration in range(1, self.max_iterations + 1):
             following = _step(problem, iterate, total)
             accurate = iterate.residual <= self.tolerance * float(np.hypot(*iterate.rise))
@@ -57,8 +59,9 @@ class FrictionNewton:
             iterate = following
         worst = iterate.residual / float(np.hypot(*iterate.rise))
         raise SolverError(
-            f"friction (newton): residual {worst:.3g} of the displacement after "
-            f"{self.max_iterations} steps, at {size / limit:.6g} of gross sliding"
+            f"residual {worst:.3g} of the displacement after "
+            f"{self.max_iterations} steps, at {size / limit:.6g} of gross sliding",
+            solver="friction (newton)",
         )
 
 
@@ -121,7 +124,7 @@ def _step(problem: VectorProblem, iterate: _Iterate, total: Array) -> _Iterate:
             if trial.energy - iterate.energy <= 1e-4 * min(slope, 0.0) + rounding:
                 return trial
         length /= 2.0
-    raise SolverError("friction (newton): no step along its direction lowers the energy")
+    raise SolverError("no step along its direction lowers the energy", solver="friction (newton)")
 
 
 def _direction(problem: VectorProblem, iterate: _Iterate) -> Array:
@@ -147,7 +150,7 @@ def _direction(problem: VectorProblem, iterate: _Iterate) -> Array:
         if info == 0:
             break
     else:
-        raise SolverError("friction (newton): the shifted matrix is not positive definite")
+        raise SolverError("the shifted matrix is not positive definite", solver="friction (newton)")
     solved = dpotrs(factor, right, lower=1)[0].reshape(n, 2, 3)
     forces = np.einsum("nij,njk->nik", roots, solved)  # dq = W y
     sums = forces.sum(axis=0)

@@ -30,13 +30,13 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough import checks
-from convexrough.checks import Array
+from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
 from convexrough.normal.certificate import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF
 from convexrough.shearing.problem import TangentialProblem
-from convexrough.sphere import hertz
+from convexrough.sphere import mindlin
 
 
 class VectorState(NamedTuple):
@@ -145,7 +145,7 @@ class VectorProblem:
     def energy(self, increments: Array, coupling: Array) -> float:
         """`coupling` is B q."""
         P, ceilings = self.scalar.loads, self.scalar.ceilings
-        local = hertz.potential(np.hypot(*increments.T) / P) @ (P * ceilings)
+        local = mindlin.potential(np.hypot(*increments.T) / P) @ (P * ceilings)
         return float(local + 0.5 * (increments * coupling).sum())
 
     def residual(self, state: VectorState) -> float:
@@ -190,7 +190,9 @@ class VectorProblem:
             return Shift(by_distance, shares)
         equal = np.full(len(self), self.least_share + self._rounding)
         if not self._semidefinite(equal):
-            raise SolverError("friction: no shift makes the tangential kernel semidefinite")
+            raise SolverError(
+                "no shift makes the tangential kernel semidefinite", solver="friction"
+            )
         return Shift(equal * self.stiffness, equal)
 
     @cached_property
@@ -243,16 +245,16 @@ class VectorProblem:
         left = np.maximum(1.0 - shares, 1e-300)
         x = np.minimum(np.minimum(slope, most) / (ceilings * left), 1.0)
         for _ in range(60):
-            value = ceilings * (x - 2.0 / 3.0 * shares * hertz.force(x)) - np.minimum(slope, most)
+            value = ceilings * (x - 2.0 / 3.0 * shares * mindlin.force(x)) - np.minimum(slope, most)
             rate = ceilings * (1.0 - shares * np.sqrt(1.0 - x))
             step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
             x = np.clip(x - step, 0.0, 1.0)
             if (np.abs(step) <= 1e-15 * x).all():
                 break
-        best = P * hertz.force(x)
+        best = P * mindlin.force(x)
 
         def convex_part(size: Array) -> Array:
-            return np.asarray(P * ceilings * hertz.potential(size / P) - shift * size**2 / 2.0)
+            return np.asarray(P * ceilings * mindlin.potential(size / P) - shift * size**2 / 2.0)
 
         terms = convex_part(size) - (asked * q).sum(axis=1) - convex_part(best) + slope * best
         missing = abs(float(state.rise @ (q.sum(axis=0) - state.total)))

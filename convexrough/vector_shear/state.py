@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.checks import Array, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.roundoff import ROUNDOFF
 from convexrough.shearing.state import ShearCertificate
-from convexrough.sphere import hertz
+from convexrough.sphere import mindlin
 from convexrough.vector_shear.certificate import judge_vectors
 from convexrough.vector_shear.cones import FrictionConic
 from convexrough.vector_shear.newton import FrictionNewton
@@ -109,7 +109,7 @@ def shear_vector(
     else:
         state = solver.solve(problem, total)
 
-    travel = hertz.mindlin_ratio(scene.material.poisson_ratio) * friction * scalar.units.length
+    travel = mindlin.ratio(scene.material.poisson_ratio) * friction * scalar.units.length
     unit = friction * scalar.units.force
 
     def everywhere(values: Array, unit: float) -> Array:

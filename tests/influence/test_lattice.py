@@ -23,7 +23,7 @@ from convexrough.influence import (
 from convexrough.influence.convolution import Box, _pass_roundoffs, neighbours
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import BLUR, Lattice
-from convexrough.scene.scene import nearest_distances
+from convexrough.scene.neighbours import nearest_distances
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 import convexrough as cr
 from convexrough.paper import appendix
-from convexrough.sphere.hertz import mindlin_ratio
+from convexrough.sphere.mindlin import ratio as mindlin_ratio
 from convexrough.sphere.smooth import smooth
 
 RATIOS = [0.0, 0.3, 0.5]

@@ -19,7 +19,7 @@ from convexrough.paper.figures import paper_figures
 from convexrough.plots import cycle as loops
 from convexrough.plots import style
 from convexrough.plots.shear import SLIDING
-from convexrough.sphere import hertz
+from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
 
 UNITS: Any = dict(length_unit="µm", force_unit="mN")
@@ -226,12 +226,12 @@ def test_the_loss_is_that_of_the_cycles() -> None:
     loss, ratio = plots.cycle_figures(cycles)["loss"].axes
     sphere, points = loss.lines
     t, e = np.asarray(sphere.get_data(), dtype=float)
-    assert_allclose(e, hertz.loss(t), rtol=1e-12)
+    assert_allclose(e, mindlin.loss(t), rtol=1e-12)
     x, w = np.asarray(points.get_data(), dtype=float)
     assert_allclose(x, [0.1, 0.37, 0.5], rtol=1e-12)  # no loss at 0
     assert_allclose(w, [cycles[i].energy_normalised for i in (1, 3, 0)], rtol=1e-12)
     y = np.asarray(ratio.lines[1].get_ydata(), dtype=float)
-    assert_allclose(y, w / hertz.loss(x), rtol=1e-12)
+    assert_allclose(y, w / mindlin.loss(x), rtol=1e-12)
     assert "loss" not in plots.cycle_figures(cycles[:1])
 
 

@@ -13,7 +13,9 @@ from scenes import MATERIAL, paper
 from scipy.optimize import minimize
 
 import convexrough as cr
-from convexrough.scene.scene import CUT, largest_tip_radius, reach
+from convexrough.scene.asperities import largest_tip_radius
+from convexrough.scene.patterns import CUT
+from convexrough.scene.scene import reach
 
 
 def test_material() -> None:

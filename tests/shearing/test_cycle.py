@@ -13,7 +13,7 @@ from scenes import NAMED, PAPER_APPROACH, paper, random_scenes
 import convexrough as cr
 from convexrough.influence import inverse_distances
 from convexrough.shearing.history import _remember
-from convexrough.sphere import hertz
+from convexrough.sphere import hertz, mindlin
 
 NU = 0.3
 
@@ -51,7 +51,7 @@ def test_three_ways_to_the_energy(name: str) -> None:
     scene, approach = NAMED[name]
     contact = cr.press(with_friction(scene), approach=approach)
     limit = limit_of(contact)
-    ratio = hertz.mindlin_ratio(NU)
+    ratio = mindlin.ratio(NU)
     for fraction in (0.2, 0.5, 0.9):
         cycle = cr.cycle(contact, maximum=fraction * limit)
         assert cycle.balance_defect < 1e-12

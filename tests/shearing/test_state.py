@@ -18,7 +18,7 @@ from convexrough.influence import inverse_distances
 from convexrough.shearing.certificate import judge_states
 from convexrough.shearing.load_errors import Known
 from convexrough.shearing.problem import TangentialProblem
-from convexrough.sphere import hertz
+from convexrough.sphere import hertz, mindlin
 
 
 class Exact(NamedTuple):
@@ -117,7 +117,7 @@ def test_the_displacements_balance(influence: str, name: str, fraction: float) -
     scene = contact.scene
     state = cr.shear(contact, force=fraction * FRICTION * contact.load)
     assert state.forces.sum() == pytest.approx(state.force, rel=1e-14)
-    ratio = hertz.mindlin_ratio(0.3)
+    ratio = mindlin.ratio(0.3)
     coupling = inverse_distances(scene.contact_points, scene.contact_points) / np.pi
     there = state.displacements + ratio * coupling @ state.forces / scene.material.contact_modulus
     assert_allclose(there[contact.loads > 0], state.displacement, rtol=1e-12)

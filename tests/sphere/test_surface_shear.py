@@ -10,7 +10,7 @@ from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.sphere import hertz, surface_shear
+from convexrough.sphere import mindlin, surface_shear
 
 A, PEAK, G = 0.7, 2.0, 3.0
 RATIOS = [0.0, 0.3, 0.5]
@@ -82,7 +82,7 @@ def test_the_stick_disc_moves_as_one(share: float, nu: float) -> None:
     """By the displacement of Cattaneo and Mindlin; the annulus less, so it slips forwards."""
     c = A * np.cbrt(1 - share)
     P, E = 2 / 3 * np.pi * A**2 * PEAK, G / (1 - nu)  # of f P
-    X = hertz.mindlin_ratio(nu) * 3 * P / (4 * E * A) * hertz.deflection(share)  # delta = 3P/(4Ea)
+    X = mindlin.ratio(nu) * 3 * P / (4 * E * A) * mindlin.deflection(share)  # delta = 3P/(4Ea)
     sticking = displacement(np.array([0.0, 0.5, 1 - 1e-9])[:, None] * c, DIRECTIONS, nu, share)
     assert_allclose(sticking, X, rtol=1e-12)
     slipping = displacement(np.linspace(c, A, 6)[1:, None], DIRECTIONS, nu, share)

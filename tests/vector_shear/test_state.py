@@ -14,7 +14,7 @@ from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, scatte
 
 import convexrough as cr
 from convexrough.convex import cones
-from convexrough.sphere import hertz
+from convexrough.sphere import hertz, mindlin
 from convexrough.vector_shear import cones as friction_cones
 from convexrough.vector_shear.certificate import judge_vectors
 from convexrough.vector_shear.problem import VectorProblem, VectorState
@@ -148,7 +148,7 @@ def test_the_error_of_the_papers_assumption(
     assert np.abs(state.forces[:, 1]).max() / largest == pytest.approx(transverse, rel=0.02)
     reference = cr.shear(pressed("paper", 0.0), force=fraction * FRICTION * contact.load)
     assert state.displacement[0] / reference.displacement == pytest.approx(travel, abs=6e-6)
-    assert abs(state.displacement[0] / reference.displacement - hertz.mindlin_ratio(nu)) < 3e-3
+    assert abs(state.displacement[0] / reference.displacement - mindlin.ratio(nu)) < 3e-3
     assert (state.status == "sliding").sum() == sliding
     assert state.certificate.holds
     assert state.iterations <= 6
@@ -325,7 +325,7 @@ def test_random_scenes(
             trial /= np.maximum(lengths(trial) / P, 1.0)[:, None]
             excess = trial.sum(axis=0) - q.sum(axis=0)
         rise = np.hypot(*state.displacement) / problem.scalar.units.length / FRICTION
-        slack = np.hypot(*excess) * rise / hertz.mindlin_ratio(nu) + 1e-12 * least
+        slack = np.hypot(*excess) * rise / mindlin.ratio(nu) + 1e-12 * least
         assert problem.energy(trial, problem.couple(trial)) >= least - slack
 
 

@@ -1,0 +1,157 @@
+"""Where the asperities stand, how tall and how sharp they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.errors import InputError
+from convexrough.scene.lattice import Lattice
+from convexrough.scene.neighbours import refuse_coincident
+from convexrough.scene.patterns import CUT, checked_seed, cut_normal, hexagonal_sites, square_sites
+
+#: Of more asperities than this, a lattice is looked for before the nearest neighbours of all.
+MANY = 5000
+
+
+@dataclass(frozen=True, eq=False)
+class Asperities:
+    """Spherical asperities on the half-space, in the caller's order.
+
+    positions : (n, 2) [length]  summits; the axis of the sphere is the origin
+    tip_radii : (n,) [length]    one number stands for all
+    heights   : (n,) [length]    offset of each summit, positive is taller; one number for all
+    """
+
+    positions: Array
+    tip_radii: Array
+    heights: Array
+
+    def __init__(
+        self, positions: ArrayLike, tip_radii: ArrayLike, heights: ArrayLike = 0.0
+    ) -> None:
+        points = _points(positions)
+        object.__setattr__(self, "positions", points)
+        n = len(points)
+        radii = checks.array("tip_radii", tip_radii, length=n, sign="positive")
+        object.__setattr__(self, "tip_radii", radii)
+        object.__setattr__(self, "heights", checks.array("heights", heights, length=n))
+        if n <= MANY or self.lattice is None:
+            refuse_coincident(points)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    @cached_property
+    def lattice(self) -> Lattice | None:
+        """What the summits lie on, each on a site of its own, if that is a lattice."""
+        return Lattice.through(self.positions)
+
+    @cached_property
+    def distances(self) -> Array:
+        """(n,) [length] distance of each summit from the axis."""
+        x, y = self.positions.T
+        return frozen(np.hypot(x, y))
+
+    @classmethod
+    def hexagonal(
+        cls,
+        *,
+        spacing: float,
+        tip_radius: ArrayLike,
+        within: float,
+        height_std: float = 0.0,
+        tip_radius_cv: float = 0.0,
+        seed: int | None = None,
+    ) -> Asperities:
+        """A triangular lattice of six nearest neighbours, one asperity on the axis.
+
+        spacing       : distance of nearest neighbours [length]
+        tip_radius    : a number, or one per asperity in the order of the result [length]
+        within        : keep the asperities at most this far from the axis [length]
+        height_std    : standard deviation of normal random heights [length]
+        tip_radius_cv : coefficient of variation of lognormal tip radii of mean `tip_radius`
+        seed          : required when heights or radii are random
+
+        Asperities are ordered by distance from the axis, then by angle. A larger `within`
+        adds asperities behind the others and leaves those, with their random heights and
+        radii, as they were.
+        """
+        rough = (height_std, tip_radius_cv, seed)
+        return cls._lattice(hexagonal_sites, 2 / np.sqrt(3), spacing, tip_radius, within, *rough)
+
+    @classmethod
+    def square(
+        cls,
+        *,
+        spacing: float,
+        tip_radius: ArrayLike,
+        within: float,
+        height_std: float = 0.0,
+        tip_radius_cv: float = 0.0,
+        seed: int | None = None,
+    ) -> Asperities:
+        """A square lattice, one asperity on the axis; arguments as for `hexagonal`."""
+        rough = (height_std, tip_radius_cv, seed)
+        return cls._lattice(square_sites, 1.0, spacing, tip_radius, within, *rough)
+
+    @classmethod
+    def _lattice(
+        cls,
+        sites: Callable[[float], tuple[Array, Indices]],
+        density: float,
+        spacing: float,
+        tip_radius: ArrayLike,
+        within: float,
+        height_std: float,
+        tip_radius_cv: float,
+        seed: int | None,
+    ) -> Asperities:
+        spacing = checks.positive("spacing", spacing)
+        within = checks.non_negative("within", within)
+        height_std = checks.non_negative("height_std", height_std)
+        tip_radius_cv = checks.non_negative("tip_radius_cv", tip_radius_cv)
+        checks.fits_in_memory("spacing", np.pi * density * (within / spacing) ** 2 + 1, 300)
+
+        unit, norms = sites((within / spacing) ** 2 * (1 + 1e-12))
+        angles = np.arctan2(unit[:, 1], unit[:, 0]) % (2 * np.pi)
+        unit = unit[np.lexsort((angles, norms))]
+        n = len(unit)
+        radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
+        heights = np.zeros(n)
+        if height_std > 0 or tip_radius_cv > 0:
+            seed = checked_seed(seed)
+            heights = height_std * cut_normal(n, seed, stream=0)
+            width = np.sqrt(np.log1p(tip_radius_cv**2))
+            radii = radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
+        return cls(spacing * unit, radii, heights)
+
+
+def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
+    """The largest tip radius that `hexagonal` and `square` can draw [length]."""
+    width = np.sqrt(np.log1p(tip_radius_cv**2))
+    return float(np.max(tip_radius) * np.exp(CUT * width - width**2 / 2))
+
+
+def _points(positions: ArrayLike) -> Array:
+    try:
+        points = np.array(positions, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError("positions", found=repr(positions)[:60], expected="numbers") from error
+    if points.size == 0:
+        raise InputError("positions", found="no asperity", expected="at least one")
+    if points.ndim != 2 or points.shape[1] != 2:
+        found = f"shape {points.shape}"
+        raise InputError("positions", found=found, expected="shape (n, 2): x and y of each")
+    if not (good := (np.abs(points) <= checks.LARGEST).all(axis=1)).all():
+        first = int(np.argmin(good))
+        found = str(points[first])
+        raise InputError(f"positions[{first}]", found=found, expected="finite numbers")
+    points.flags.writeable = False
+    return points

@@ -1,0 +1,43 @@
+"""What both bodies are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from convexrough import checks
+
+
+@dataclass(frozen=True)
+class Material:
+    """Two elastically similar bodies.
+
+    contact_modulus : E* = E / (2 (1 - nu^2))  [force / length^2]
+    poisson_ratio   : nu, from 0 to 0.5
+    """
+
+    contact_modulus: float
+    poisson_ratio: float
+
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("contact_modulus", checks.positive("contact_modulus", self.contact_modulus)),
+            ("poisson_ratio", checks.between("poisson_ratio", self.poisson_ratio, 0.0, 0.5)),
+        ):
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_youngs(cls, modulus: float, poisson_ratio: float) -> Material:
+        """Both bodies of Young's modulus E: E* = E / (2 (1 - nu^2))."""
+        modulus = checks.positive("youngs_modulus", modulus)
+        ratio = checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5)
+        return cls(modulus / (2.0 * (1.0 - ratio**2)), ratio)
+
+    @property
+    def youngs_modulus(self) -> float:
+        """E = 2 (1 - nu^2) E*  [force / length^2]."""
+        return 2.0 * (1.0 - self.poisson_ratio**2) * self.contact_modulus
+
+    @property
+    def shear_modulus(self) -> float:
+        """G = E / (2 (1 + nu)) = (1 - nu) E*  [force / length^2]."""
+        return (1.0 - self.poisson_ratio) * self.contact_modulus
