@@ -8,9 +8,10 @@ from convexrough.run.scene_file import SceneFile, read_scene
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
+from convexrough.shearing.certificate import ShearCertificate
 from convexrough.shearing.cycle import Cycle, Loop, cycle, cycles
 from convexrough.shearing.history import History, history
-from convexrough.shearing.state import ShearCertificate, ShearState, onset_of_sliding, shear
+from convexrough.shearing.state import ShearState, onset_of_sliding, shear
 from convexrough.sphere.smooth import SmoothSphere, smooth
 from convexrough.vector_shear.cones import FrictionConic
 from convexrough.vector_shear.newton import FrictionNewton

@@ -20,8 +20,12 @@ def frozen(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
-def among_zeros(values: NDArray[Any], places: Indices, count: int) -> NDArray[Any]:
-    """(count, ...) values set at their places, and zeros (or False) everywhere else."""
-    full = np.zeros((count, *values.shape[1:]), dtype=values.dtype)
-    full[places] = values
+def among_zeros(
+    values: NDArray[Any], places: Indices, count: int, *, axis: int = 0
+) -> NDArray[Any]:
+    """Values set at their places of `count` along an axis, among zeros (or False)."""
+    shape = list(values.shape)
+    shape[axis] = count
+    full = np.zeros(shape, dtype=values.dtype)
+    np.moveaxis(full, axis, 0)[places] = np.moveaxis(values, axis, 0)
     return full

@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
+from convexrough.errors import SolverError
 from convexrough.influence import Influence, Kind
+from convexrough.kept import Keeper
 from convexrough.normal.certificate import Certificate, judge
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import Announce
@@ -20,7 +22,7 @@ from convexrough.sphere import hertz
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class Contact(Keeper):
     """A solved normal contact. Arrays are (n,), in the order of the scene's asperities.
 
     loads         : [force]
@@ -91,7 +93,7 @@ def press(
     if len(problem) == 0:  # too small an approach for anything to touch
         solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
     else:
-        solution = solver.solve(problem, first, announce)
+        solution = _solved(solver, problem, first, announce)
     loads = frozen(problem.to_scene(solution.loads * force))
     radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
     if announce is not None:
@@ -113,6 +115,18 @@ def press(
         iterations=solution.iterations,
         seconds=time.perf_counter() - began,
     )
+
+
+def _solved(
+    solver: Solver, problem: NormalProblem, start: Array | None, announce: Announce | None
+) -> Solution:
+    """The solver's answer; the last loads of an error in the scene's units and order."""
+    try:
+        return solver.solve(problem, start, announce)
+    except SolverError as error:
+        if error.iterate is not None:
+            error.iterate = problem.to_scene(error.iterate * problem.units.force)
+        raise
 
 
 def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> tuple[float, float]:

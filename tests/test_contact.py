@@ -1,5 +1,6 @@
 """The solved contact: reference values, closed forms, symmetries, and 50-digit solutions."""
 
+import re
 from typing import Any
 
 import multiprecision
@@ -18,6 +19,7 @@ from scenes import (
     random_cases,
     reference,
     rough,
+    scattered,
 )
 from scipy.optimize import brentq
 
@@ -322,3 +324,34 @@ def test_newton_says_so_where_it_does_not_converge(kind: Kind) -> None:
     hasty = cr.solvers.Newton(max_iterations=2)
     with pytest.raises(cr.SolverError, match=r"newton: residual .* after 2 steps"):
         cr.press(paper(), approach=PAPER_APPROACH, solver=hasty, influence=kind)
+
+
+@pytest.mark.parametrize("influence", operators(paper()))
+def test_a_solver_that_stops_says_what_where_and_what_to_try(influence: Any) -> None:
+    """Its last loads come in the scene's units and order, and are a start for the next attempt."""
+    scene = rough()
+    with pytest.raises(cr.SolverError) as caught:
+        cr.press(
+            scene,
+            approach=PAPER_APPROACH,
+            solver=cr.solvers.Newton(max_iterations=2),
+            influence=influence,
+        )
+    error = caught.value
+    assert error.solver == "newton"
+    assert re.fullmatch(r"residual \S+ of the approach after 2 steps, 1e-12 needed", error.what)
+    assert "convexity number 0." in error.advice
+    assert str(error) == f"newton: {error.what}; {error.advice}"
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    assert error.iterate is not None
+    assert error.iterate.shape == contact.loads.shape
+    assert np.abs(error.iterate - contact.loads).max() < 0.01 * contact.loads.max()
+    again = cr.press(scene, approach=PAPER_APPROACH, start=error.iterate)
+    assert again.iterations < contact.iterations
+
+
+def test_a_crowded_contact_is_named_as_the_reason() -> None:
+    """Newton's method that fails beyond the convex range says so."""
+    scene, approach = scattered(1, 20, 4.0, 0.5)
+    with pytest.raises(cr.SolverError, match=r"so crowded .* \(convexity number \d"):
+        cr.press(scene, approach=approach, solver=cr.solvers.Newton(max_iterations=2))

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.influence import Influence, Kind, couple, fitted_shells, shells
 from convexrough.normal.load_control import approach_bound, highest_approach, shifted_to_load
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -267,6 +267,4 @@ class NormalProblem:
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """Values of the candidates, set among zeros for all other asperities of the scene."""
-        full = np.zeros(len(self.scene))
-        full[self.candidates] = values
-        return full
+        return among_zeros(values, self.candidates, len(self.scene))

@@ -20,10 +20,11 @@ from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.progress import Announce
-from convexrough.shearing.certificate import Bounds
-from convexrough.shearing.first_loading import Family
+from convexrough.shearing.certificate import friction_words
+from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.history import history
-from convexrough.shearing.problem import States
+from convexrough.shearing.judgement import Bounds
+from convexrough.shearing.normal_map import States
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
 
@@ -77,11 +78,7 @@ class Cycle:
     @cached_property
     def status(self) -> NDArray[np.str_]:
         """(n,) "sliding" in each half of the cycle, "partial", "open" or "undecided"."""
-        words = np.full(len(self.sliding), "undecided", dtype="<U9")
-        words[self.contact.status == "open"] = "open"
-        words[self.partial] = "partial"
-        words[self.sliding] = "sliding"
-        return frozen(words)
+        return friction_words(self.contact.status, self.sliding, self.partial)
 
     @property
     def energies(self) -> Array:
@@ -151,10 +148,11 @@ def cycles(
     if contact.load == 0.0 or len(upper) == 0:
         return [_empty(contact, high, low) for high, low in zip(upper, lower, strict=True)]
 
-    family = Family(contact)
-    problem = family.problem
-    states, back = family.states((upper - lower) / (2.0 * family.force_unit), announce)
-    losses = [loss for block in family.judged(states, announce) for loss in _losses(family, *block)]
+    loading = FirstLoading(contact)
+    problem = loading.problem
+    states, back = loading.states((upper - lower) / (2.0 * problem.force_unit), announce)
+    judged = loading.judged(states, announce)
+    losses = [loss for block in judged for loss in _losses(loading, *block)]
     whole = smooth(contact.scene, load=contact.load).energy_scale  # W0
     return [
         Cycle(
@@ -186,11 +184,12 @@ class _Loss(NamedTuple):
     partial: NDArray[np.bool_]
 
 
-def _losses(family: Family, states: States, bounds: Bounds) -> Iterator[_Loss]:
-    slip = family.spread(family.partial_slip(states), family.energy_unit)
-    slide = family.spread(family.sliding(states), family.energy_unit)
+def _losses(loading: FirstLoading, states: States, bounds: Bounds) -> Iterator[_Loss]:
+    problem, unit = loading.problem, loading.energy_unit
+    slip = problem.to_scene(loading.partial_slip(states) * unit)
+    slide = problem.to_scene(loading.sliding(states) * unit)
     energies = slip.sum(axis=1) + slide.sum(axis=1)
-    others = family.energy_unit * family.trapezoid_error(states)
+    others = unit * loading.trapezoid_error(states)
     defects = np.abs(others - energies) / np.where(energies > 0, energies, 1.0)
     for i, total in enumerate(states.totals):
         yield _Loss(
@@ -199,8 +198,8 @@ def _losses(family: Family, states: States, bounds: Bounds) -> Iterator[_Loss]:
             frozen(slip[i]),
             frozen(slide[i]),
             float(defects[i]),
-            frozen(family.everywhere(bounds.sliding[i])),
-            frozen(family.everywhere(bounds.partial[i])),
+            frozen(problem.to_scene(bounds.sliding[i])),
+            frozen(problem.to_scene(bounds.partial[i])),
         )
 
 

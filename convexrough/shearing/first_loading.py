@@ -1,8 +1,9 @@
-"""First-loading states of one contact, in the scene's units: what cycles and histories look up.
+"""First-loading states of one contact: what cycles and histories look up, and what they cost.
 
 By Masing's rule every state at constant normal load is a sum of these. The energy they cost is
 counted in w(T) = T rise(T) / 2 - Psi(T), with Psi the energy of the increments: the error of the
-trapezoid rule on the curve of rise against T. A cycle of amplitude T costs 8 c_t f^2 w(T).
+trapezoid rule on the curve of rise against T. A cycle of amplitude T costs 8 c_t f^2 w(T)
+(docs/theory/shear.md, "Cycles and energy").
 """
 
 from __future__ import annotations
@@ -10,29 +11,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.progress import Announce
-from convexrough.shearing.certificate import Bounds, judge_in_turn
-from convexrough.shearing.newton import by_matrices
-from convexrough.shearing.problem import States, TangentialProblem
-from convexrough.sphere import annulus, mindlin
+from convexrough.shearing.judgement import Bounds, judge_in_turn
+from convexrough.shearing.many_states import by_matrices
+from convexrough.shearing.normal_map import States
+from convexrough.shearing.problem import TangentialProblem
+from convexrough.sphere import annulus
 
 
-class Family:
-    """Units, states and losses of one contact with friction."""
+class FirstLoading:
+    """The states of one contact with friction, and their losses.
+
+    problem : its friction problem;  energy_unit : what 8 w(T) is counted in [force length]
+    """
 
     def __init__(self, contact: Contact) -> None:
-        self.contact = contact
-        self.friction = checks.friction(contact.scene.friction)
         self.problem = TangentialProblem.of(contact)
-        ratio = mindlin.ratio(contact.scene.material.poisson_ratio)
-        self.force_unit = self.friction * self.problem.units.force
-        self.length_unit = ratio * self.friction * self.problem.units.length
-        self.energy_unit = 8.0 * self.force_unit * self.length_unit
+        self.energy_unit = 8.0 * self.problem.force_unit * self.problem.travel_unit
 
     def states(self, totals: Array, announce: Announce | None = None) -> tuple[States, Indices]:
         """One state for each distinct T, and which of them each of the totals is."""
@@ -43,22 +41,10 @@ class Family:
         self, states: States, announce: Announce | None = None
     ) -> Iterator[tuple[States, Bounds]]:
         """The states in blocks, with what is proved of each."""
-        for block, bounds in judge_in_turn(self.problem, self.contact, states):
+        for block, bounds in judge_in_turn(self.problem, states):
             yield states.take(block), bounds
             if announce is not None and not by_matrices(self.problem):
                 announce(f"certified {min(block.stop, len(states.totals))} states")
-
-    def spread(self, values: Array, unit: float) -> Array:
-        """(m, n) values of the loaded asperities, among zeros for all others of the scene."""
-        full = np.zeros((len(values), len(self.contact.scene)))
-        full[:, self.problem.touching] = values * unit
-        return full
-
-    def everywhere(self, words: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(n,) what is so of the loaded asperities, and not of the others."""
-        full = np.zeros(len(self.contact.scene), dtype=bool)
-        full[self.problem.touching] = words
-        return full
 
     def partial_slip(self, states: States) -> Array:
         """(m, n) share of w(T) lost in partial slip: (3/5) P ceiling e(u / P)."""

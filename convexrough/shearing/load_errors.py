@@ -12,14 +12,12 @@ an error only (load control), that adds  |dD0| || 1 ||_{N^-1}  to || d ||_N.
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.contact import Contact
 from convexrough.influence import couple, fitted_shells, spread
 from convexrough.normal.certificate import FIT_FROM, SUM_ROUNDOFFS
 from convexrough.normal.problem import FITTED
@@ -27,7 +25,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.problem import TangentialProblem
 
 
-class Known(NamedTuple):
+class LoadErrors(NamedTuple):
     """What the normal certificate says of the loads P, in own units."""
 
     errors: Array  # (n,) b
@@ -43,15 +41,19 @@ class Known(NamedTuple):
     distance: float  # || P - P* ||_H of those that are sure
 
     @classmethod
-    @lru_cache(maxsize=4)
-    def of(cls, problem: TangentialProblem, contact: Contact) -> Known:
-        certificate, P, A = contact.certificate, problem.loads, problem.influence
+    def of(cls, problem: TangentialProblem) -> LoadErrors:
+        """Those of a problem, which keeps them."""
+        return problem.keep(cls._judge)
+
+    @classmethod
+    def _judge(cls, problem: TangentialProblem) -> LoadErrors:
+        certificate, P, A = problem.certificate, problem.loads, problem.influence
         errors = certificate.load_errors[problem.touching] / problem.units.force
         sure = certificate.status[problem.touching] == "contact"
         sure &= errors < 0.1 * P
-        strays = np.flatnonzero((contact.loads == 0) & (certificate.status != "open"))
+        strays = _strays(problem)
         most = certificate.load_errors[strays] / problem.units.force
-        effect = _effect(problem, contact, strays, most)
+        effect = _effect(problem, strays, most)
         h = np.where(sure, 2.0 / 3.0 * problem.ceilings / (P + errors), np.inf)
         loose = np.where(sure, 0.0, 2.0 * P + errors)
         by_component = float(np.sqrt(np.sum(np.where(sure, h, 0.0) * errors**2)))
@@ -67,7 +69,7 @@ class Known(NamedTuple):
             # Collatz and Wielandt: by the trial vector H^-1/2.
             coupling=float(couple_above(problem, 1.0 / h).max(where=sure, initial=0.0)),
             reach=spread(A, A.scale, 1.0 / h),
-            distance=min(by_component, _distance(problem, contact, errors, effect)) * (1 + SAFETY),
+            distance=min(by_component, _distance(problem, errors, effect)) * (1 + SAFETY),
         )
 
     def moved(self, loads: Array, increments: Array) -> Array:
@@ -103,20 +105,25 @@ def _convexity_number(problem: TangentialProblem, stiffness: Array) -> float:
     return theta * (1 + SAFETY)
 
 
-def _effect(problem: TangentialProblem, contact: Contact, strays: Indices, most: Array) -> Array:
+def _strays(problem: TangentialProblem) -> Indices:
+    """Asperities of the scene without load here that are not proved to be open."""
+    possible = problem.certificate.status != "open"
+    possible[problem.touching] = False
+    return np.flatnonzero(possible)
+
+
+def _effect(problem: TangentialProblem, strays: Indices, most: Array) -> Array:
     """(n,) bounds on what loads of up to `most` elsewhere do to the loaded asperities."""
     if len(strays) == 0:
         return np.zeros(len(problem))
-    scene = contact.scene
-    apart = couple(scene, strays, problem.influence.scale, contact.influence)
+    scene = problem.scene
+    apart = couple(scene, strays, problem.influence.scale, problem.influence.name)
     coupling = apart.onto(scene.contact_points[problem.touching])
     effect = np.maximum(coupling.apply(most), 0.0)
     return effect + coupling.rounding(most).of(effect)
 
 
-def _distance(
-    problem: TangentialProblem, contact: Contact, errors: Array, stray_effect: Array
-) -> float:
+def _distance(problem: TangentialProblem, errors: Array, stray_effect: Array) -> float:
     """|| P - P* ||_H; infinite where convexity does not show it."""
     P, ceilings, length = problem.loads, problem.ceilings, problem.units.length
     bent = np.cbrt(P / (P + errors))
@@ -125,7 +132,7 @@ def _distance(
     if not theta < 1:
         return np.inf
     displacement, noise = problem.couple(P), problem.influence.rounding(P)
-    scene, approach = contact.scene, contact.certificate.approach / length
+    scene, approach = problem.scene, problem.certificate.approach / length
     gap = ceilings + displacement - scene.offsets[problem.touching] / length - approach
     rounding = noise.relative * (np.maximum(displacement, 0.0) + noise.norm)
     rounding += scene.offset_errors[problem.touching] / length
@@ -133,12 +140,12 @@ def _distance(
     residual = np.abs(gap) + rounding + stray_effect
     norm = float(np.sqrt(np.sum(residual**2 / h))) + noise.norm / np.sqrt(float(h.min()))
     norm /= np.sqrt(1.0 - theta)  # || d ||_N
-    if contact.certificate.approach_error > 0:
+    if problem.certificate.approach_error > 0:
         bend = (1.0 - float(bent.min())) / (1.0 - theta)  # N >= (1 - bend) N at P itself
         if not bend < 1:
             return np.inf
         flat = np.sqrt(_flatness(problem, theta) / (1.0 - bend))
-        norm += contact.certificate.approach_error / length * flat
+        norm += problem.certificate.approach_error / length * flat
     return float(norm / np.sqrt(1.0 - theta))
 
 

@@ -1,84 +1,42 @@
-"""Newton's method for states of friction on the normal map, safeguarded by the energy.
+"""Friction states of many asperities, one after the other, by Newton's method.
 
-The unknown is eta, what each asperity takes up in local deflection and in slip. A step is that of
-`convexrough.convex.newton_step`, and keeps the sum of the increments. Of few asperities, many
-states are solved at once by their matrices. Of many, one state after the other, each started from
-those already known, as the curves eta(T) are smooth.
+Each is started from those already known, as the curves eta(T) are smooth, and found by
+`convex.newton` with the steps of `convex.newton_step`, which keep the sum of the increments.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from convexrough.arrays import Array, Indices
-from convexrough.convex.newton_step import FACTORISED, correct
-from convexrough.errors import SolverError
-from convexrough.influence import DenseInfluence
+from convexrough.arrays import Array
+from convexrough.convex import newton
+from convexrough.convex.newton_step import correct
 from convexrough.progress import Announce
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import SAFETY
 from convexrough.shearing.energy import TangentialEnergy
-from convexrough.solvers.newton import MOST_LEFT
-
-#: Evenly spaced states from which many others are interpolated to start with.
-FAMILY = 128
+from convexrough.shearing.normal_map import (
+    Iterates,
+    States,
+    elastic_deflections,
+    evaluate,
+    gradients,
+    gross_sliding,
+    slips,
+)
 
 #: A state is accurate where its residual is below this part of the rise.
-TOLERANCE = 1e-12
+ACCURATE = 1e-12
 
 MOST_STEPS = 100
 
 #: States nearer to each other than this part of T are one for the curve through them, which is
-#: followed no farther than to so many times the largest T: it magnifies their errors.
+#: followed no farther than to so many times the largest T: it magnifies their errors. Heuristic.
 NEAR, FAR = 1e-4, 3.0
-
-
-class States(NamedTuple):
-    """Friction states at m total increments of the n touching asperities; own units.
-
-    totals : (m,) T;  deflections : (m, n) eta;  increments : (m, n) u;  rises : (m,)
-    slips  : (m, n) what eta exceeds the ceiling by, 0 where not sliding
-    """
-
-    totals: Array
-    deflections: Array
-    increments: Array
-    rises: Array
-    slips: Array
-
-    def take(self, rows: slice | Indices) -> States:
-        """Some of the states."""
-        return States(*(field[rows] for field in self))
-
-
-class Iterate(NamedTuple):
-    """Newton's method at m states; `rises` is the best estimate, `defects` F = eta + A u - rise."""
-
-    deflections: Array
-    increments: Array
-    coupling: Array
-    slopes: Array
-    defects: Array
-    rises: Array
-    energies: Array
-    residuals: Array
-
-
-def by_matrices(energy: TangentialEnergy) -> bool:
-    """Whether states are solved by factorisations, many at once."""
-    return isinstance(energy.influence, DenseInfluence) and len(energy) <= FACTORISED
-
-
-def solve_together(energy: TangentialEnergy, totals: Array) -> States:
-    """States at 0 <= T <= sum P of few asperities, in blocks of matrices that fit in memory."""
-    size = max(1, 2**20 // len(energy) ** 2)  # matrices that stay in a cache, or just one
-    starts = _starts(energy, totals)
-    blocks = [slice(i, i + size) for i in range(0, len(totals), size)]
-    parts = [_solve_block(energy, totals[block], starts[block]) for block in blocks]
-    return States(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
 def solve_in_turn(
@@ -96,23 +54,13 @@ def solve_in_turn(
     m, n = len(totals), len(energy)
     states = States(totals, np.zeros((m, n)), np.zeros((m, n)), np.zeros(m), np.zeros((m, n)))
     curve = _Curve(known)
-    limit, elastic = energy.at_limit(totals), energy.elastically(totals)
     for done, i in enumerate(np.argsort(totals, kind="stable")):
         total = float(totals[i])
         if total == 0.0:
             continue
-        if limit[i]:
-            eta, u, rise, residual = _gross(energy)
-        elif elastic[i]:
-            state = evaluate(energy, _elastic(energy, totals[i : i + 1]), totals[i : i + 1])
-            eta, u, rise, residual = _single(state)
-        else:
-            start = curve.at(total)
-            eta, u, rise, residual = _converge(
-                energy, first(total) if start is None else start, total
-            )
+        eta, u, rise, residual = _state_at(energy, totals[i : i + 1], curve, first)
         states.deflections[i], states.increments[i], states.rises[i] = eta, u, rise
-        states.slips[i] = eta - np.clip(eta, -energy.ceilings, energy.ceilings)
+        states.slips[i] = slips(energy, eta)
         curve.add(total, states.deflections[i])
         if announce is not None:
             sliding = int(np.count_nonzero(states.slips[i]))
@@ -122,6 +70,103 @@ def solve_in_turn(
                 f"{sliding:,} sliding"
             )
     return states
+
+
+def _state_at(
+    energy: TangentialEnergy, total: Array, curve: _Curve, first: Callable[[float], Array]
+) -> tuple[Array, Array, float, float]:
+    """eta, u, the rise and the residual at one T (1,), not 0."""
+    if energy.at_limit(total)[0]:
+        return *gross_sliding(energy), 0.0
+    if energy.elastically(total)[0]:
+        found = _State(evaluate(energy, elastic_deflections(energy, total), total))
+    else:
+        law = _Shearing(energy, total)
+        start = curve.at(float(total[0]))
+        state = law.evaluate(first(float(total[0])) if start is None else start)
+        stopping = newton.Stopping(ACCURATE, 0.0, MOST_STEPS)
+        before = state.scale * float(np.sqrt(len(energy)))
+        found, _ = newton.solve(law, state, stopping, before=before)
+    return found.unknown, found.forces, found.scale, found.residual
+
+
+class _State(NamedTuple):
+    """One state, as `convex.newton` sees it."""
+
+    all: Iterates  # of m = 1
+
+    @property
+    def unknown(self) -> Array:
+        return np.asarray(self.all.deflections[0])
+
+    @property
+    def forces(self) -> Array:
+        return np.asarray(self.all.increments[0])
+
+    @property
+    def defect(self) -> Array:
+        return np.asarray(self.all.defects[0])
+
+    @property
+    def energy(self) -> float:
+        return float(self.all.energies[0])
+
+    @property
+    def residual(self) -> float:
+        return float(self.all.residuals[0])
+
+    @property
+    def scale(self) -> float:
+        """The rise."""
+        return float(self.all.rises[0])
+
+
+@dataclass(frozen=True)
+class _Shearing:
+    """The law of friction at one total, for `convex.newton`; total : (1,) T."""
+
+    problem: TangentialEnergy
+    total: Array
+
+    solver: ClassVar[str] = "shear"
+    unit: ClassVar[str] = "the displacement"
+
+    def evaluate(self, unknown: Array) -> _State:
+        return _State(evaluate(self.problem, unknown[None], self.total))
+
+    def direction(self, state: _State, left: float) -> Array:
+        return correct(
+            self.problem.influence,
+            self.problem.shells,
+            np.sqrt(state.all.slopes[0]),
+            state.defect,
+            balanced=True,
+            tolerance=left,
+        ).change
+
+    def gradient(self, state: _State) -> Array:
+        return np.asarray(gradients(self.problem, state.all)[0])
+
+    def energy_rounding(self, state: _State) -> float:
+        return SAFETY * state.energy
+
+    def noise(self, state: _State) -> float:
+        return self.problem.influence.rounding(state.forces).negligible(state.all.coupling[0])
+
+    def advice(self, state: _State) -> str:
+        return advice(self.problem, float(self.total[0]))
+
+
+def advice(energy: TangentialEnergy, total: float) -> str:
+    """What a user might try where no state is found at a total increment."""
+    place = f"this was at {total / energy.limit:.6g} of gross sliding"
+    number = float((energy.shells * energy.stiffest).max())
+    if number < 1:
+        return f"{place}; try a shear force a little smaller"
+    return (
+        f"{place}, of a contact so crowded that the energy need not be convex (convexity number "
+        f"{number:.3g}, convex below 1): press less hard, or on sharper tips"
+    )
 
 
 class _Curve:
@@ -155,192 +200,3 @@ class _Curve:
             others = np.array([there for there, _ in points if there != here] + zeros)
             eta += float(np.prod((total - others) / (here - others))) * values
         return eta
-
-
-def _converge(
-    energy: TangentialEnergy, start: Array, total: float
-) -> tuple[Array, Array, float, float]:
-    """Steps until the state is as good as it gets: eta, u, the rise and the residual.
-
-    As in the normal problem, that is where the defect is small beside what rounding can make of
-    A u, which the certificate has to allow for anyway, or a further step no longer halves it.
-    """
-    totals = np.array([total])
-    state = evaluate(energy, start[None], totals)
-    before = float(state.rises[0]) * np.sqrt(len(energy))
-    for _ in range(MOST_STEPS):
-        accurate = state.residuals[0] <= TOLERANCE * state.rises[0]
-        noise = energy.influence.rounding(state.increments[0])
-        size = float(np.linalg.norm(state.defects))
-        target = noise.negligible(state.coupling)
-        if accurate and size <= target:
-            break
-        forcing = min(MOST_LEFT, (size / before) ** 2)
-        following = _advance(energy, state, totals, max(forcing, 0.3 * target / size))
-        if accurate and following.residuals[0] >= 0.5 * state.residuals[0]:
-            state = min(state, following, key=lambda each: float(each.residuals[0]))
-            break
-        state, before = following, size
-    else:
-        raise _stalled(energy, total, float(state.residuals[0] / state.rises[0]))
-    return _single(state)
-
-
-def _single(state: Iterate) -> tuple[Array, Array, float, float]:
-    eta, u = state.deflections[0], state.increments[0]
-    return eta, u, float(state.rises[0]), float(state.residuals[0])
-
-
-def _advance(energy: TangentialEnergy, state: Iterate, totals: Array, tolerance: float) -> Iterate:
-    """One Newton step of a single state."""
-    correction = correct(
-        energy.influence,
-        energy.shells,
-        np.sqrt(state.slopes[0]),
-        state.defects[0],
-        balanced=True,
-        tolerance=tolerance,
-    )
-    return _descend(energy, state, correction.change[None], totals)
-
-
-def _gross(energy: TangentialEnergy) -> tuple[Array, Array, float, float]:
-    """At T = sum P: the last asperity to slide fixes the rise."""
-    coupling = energy.couple(energy.loads)
-    rise = float((energy.ceilings + coupling).max())
-    return rise - coupling, energy.loads, rise, 0.0
-
-
-def _stalled(energy: TangentialEnergy, total: float, residual: float) -> SolverError:
-    return SolverError(
-        f"residual {residual:.3g} of the displacement after {MOST_STEPS} Newton steps, at "
-        f"{total / energy.limit:.6g} of gross sliding",
-        solver="shear",
-    )
-
-
-def evaluate(energy: TangentialEnergy, eta: Array, totals: Array) -> Iterate:
-    """Every number of m states, shifted to their totals."""
-    eta, u, slopes = _balanced(energy, eta, totals)
-    coupling = energy.couple(u)
-    weight = slopes.sum(axis=1)
-    rises = (slopes * (eta + coupling)).sum(axis=1) / np.where(weight > 0, weight, 1.0)
-    # How far a sliding asperity slides does not matter: take what the rise asks, if that slides.
-    asked = rises[:, None] - coupling
-    sign = np.sign(eta)
-    eta = np.where(slopes > 0, eta, sign * np.maximum(sign * asked, energy.ceilings))
-    defects = eta - asked
-    energies = energy.energies(eta, u, coupling)
-    residuals = np.abs(defects).max(axis=1)
-    return Iterate(eta, u, coupling, slopes, defects, rises, energies, residuals)
-
-
-def _descend(energy: TangentialEnergy, state: Iterate, directions: Array, totals: Array) -> Iterate:
-    """One step for each state, halved until its energy falls."""
-    after = evaluate(energy, state.deflections + directions, totals)
-    gradients = np.clip(state.deflections, -energy.ceilings, energy.ceilings) + state.coupling
-    gradients -= state.rises[:, None]
-    lengths = np.ones(len(totals))
-    for _ in range(50):
-        changes = after.energies - state.energies
-        slopes = (gradients * (after.increments - state.increments)).sum(axis=1)
-        rejected = np.flatnonzero(changes > 1e-4 * np.minimum(slopes, 0) + SAFETY * state.energies)
-        if len(rejected) == 0:
-            return after
-        lengths[rejected] /= 2
-        trial = state.deflections[rejected] + lengths[rejected, None] * directions[rejected]
-        again = evaluate(energy, trial, totals[rejected])
-        for field, new in zip(after, again, strict=True):
-            field[rejected] = new
-    raise SolverError("no step along Newton's direction lowers the energy", solver="shear")
-
-
-def _balanced(energy: TangentialEnergy, eta: Array, totals: Array) -> tuple[Array, Array, Array]:
-    """eta shifted so that the increments add up to T, with those and their slopes.
-
-    Newton's method inside a bracket: the sum grows with the shift, from -sum P to sum P.
-    """
-    low = (-energy.ceilings - eta).min(axis=1)
-    high = (energy.ceilings - eta).max(axis=1)
-    shifts = np.zeros(len(totals))
-    for _ in range(100):
-        moved = eta + shifts[:, None]
-        u, slopes = energy.respond(moved)
-        excess = u.sum(axis=1) - totals
-        low, high = np.where(excess < 0, shifts, low), np.where(excess > 0, shifts, high)
-        slope = slopes.sum(axis=1)
-        following = shifts - excess / np.where(slope > 0, slope, np.inf)
-        outside = ~((following > low) & (following < high)) & (excess != 0)
-        following = np.where(outside, (low + high) / 2, following)
-        settled = np.abs(following - shifts) <= 1e-15 * np.abs(moved).max(axis=1)
-        if (settled | (np.abs(excess) <= 2 * ROUNDOFF * totals)).all():
-            break
-        shifts = following
-    return moved, u, slopes
-
-
-def _starts(energy: TangentialEnergy, totals: Array) -> Array:
-    """(m, n) deflections to start from: elastic, or interpolated where m is large."""
-    starts = _elastic(energy, totals)
-    if len(totals) < 4 * FAMILY:
-        return starts
-    coarse = np.linspace(0.0, energy.limit, FAMILY)
-    known = solve_together(energy, coarse).deflections
-    cell = np.minimum(np.searchsorted(coarse, totals, side="right"), FAMILY - 1) - 1
-    part: Array = ((totals - coarse[cell]) / coarse[1])[:, None]
-    between = known[cell] * (1 - part) + known[cell + 1] * part
-    return np.where(energy.elastically(totals)[:, None], starts, between)
-
-
-def _elastic(energy: TangentialEnergy, totals: Array) -> Array:
-    """(m, n) deflections under the elastic shares of m totals."""
-    return energy.deflections(np.minimum(totals[:, None] * energy.elastic, energy.loads))
-
-
-def _solve_block(energy: TangentialEnergy, totals: Array, starts: Array) -> States:
-    iterate = evaluate(energy, starts, totals)
-    limit = energy.at_limit(totals)
-    active = np.flatnonzero(~energy.elastically(totals) & ~limit)
-    for _ in range(MOST_STEPS):
-        if len(active) == 0:
-            break
-        before = Iterate(*(field[active] for field in iterate))
-        after = _descend(energy, before, _directions(energy, before), totals[active])
-        accurate = before.residuals <= TOLERANCE * before.rises
-        take = ~accurate | (after.residuals < before.residuals)
-        for field, new in zip(iterate, after, strict=True):
-            field[active[take]] = new[take]
-        active = active[~accurate]  # so an accurate state has had one step more
-    else:
-        worst = float((iterate.residuals / iterate.rises)[active].max())
-        raise _stalled(energy, float(totals[active[0]]), worst)
-    eta, u, rises = iterate.deflections, iterate.increments, iterate.rises
-    if limit.any():
-        eta[limit], u[limit], rises[limit], _ = _gross(energy)
-    slips = eta - np.clip(eta, -energy.ceilings, energy.ceilings)
-    return States(totals, eta, u, rises, slips)
-
-
-def _directions(energy: TangentialEnergy, state: Iterate) -> Array:
-    """d(eta) = -F - A W y + beta, with (I + W A W) y = -W F + beta W and sum du = 0."""
-    root = np.sqrt(state.slopes)  # W, 0 where sliding
-    matrices = root[:, :, None] * energy.influence.matrix * root[:, None, :]
-    matrices[:, range(len(energy)), range(len(energy))] = 1.0
-    right = np.stack((-root * state.defects, root), axis=2)
-    y, border = np.moveaxis(_solve(matrices, right), 2, 0)
-    beta = -(root * y).sum(axis=1) / (root * border).sum(axis=1)
-    y = y + beta[:, None] * border
-    return np.asarray(beta[:, None] - state.defects - energy.couple(root * y))
-
-
-def _solve(matrices: Array, right: Array) -> Array:
-    """(m, n, 2) solutions of m symmetric systems, each with two right sides."""
-    if matrices.shape[1] < 128:
-        return np.asarray(np.linalg.solve(matrices, right), dtype=np.float64)
-    from scipy.linalg.lapack import dposv  # half the work, but one call for each matrix
-
-    solutions = np.empty_like(right)
-    for m, matrix in enumerate(matrices):
-        _, solution, info = dposv(matrix.T, right[m], lower=1)  # symmetric, and in LAPACK's order
-        solutions[m] = solution if info == 0 else np.linalg.solve(matrix, right[m])
-    return solutions

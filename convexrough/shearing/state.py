@@ -1,6 +1,6 @@
 """`shear`: the friction state of a pressed contact (Ciavarella-Jaeger), from a certified Contact.
 
-With u the increments of `convexrough.shearing.problem`, f the friction and c_t Mindlin's ratio: the
+With u the increments of `shearing.problem`, f the friction and c_t Mindlin's ratio: the
 asperity forces are Q_i = f u_i, displacements are c_t f times those of the normal problem. At
 every loaded asperity the displacement of the deep points is, [A16] of the source doubled,
 
@@ -18,38 +18,15 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.normal.certificate import Scope
 from convexrough.progress import Announce
-from convexrough.shearing.certificate import judge_states
-from convexrough.shearing.newton import by_matrices
-from convexrough.shearing.problem import States, TangentialProblem
-from convexrough.sphere import mindlin
+from convexrough.shearing.certificate import ShearCertificate
+from convexrough.shearing.judgement import judge_states
+from convexrough.shearing.many_states import by_matrices
+from convexrough.shearing.normal_map import States
+from convexrough.shearing.problem import TangentialProblem
 
 #: Of more loaded asperities than this, coupled by an operator, the onset of some only is found.
 MOST_ONSETS = 256
-
-
-@dataclass(frozen=True, eq=False)
-class ShearCertificate:
-    """What is proved of a friction state. Arrays are (n,), in the caller's order.
-
-    scope : that of the contact it starts from, or "none" where nothing is proved
-    status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
-        "open" (proved to carry no load) or "undecided"
-    force_errors : [force];  slip_errors : [length] bounds on the distance to the solution
-    displacement_error : [length] likewise
-    """
-
-    scope: Scope
-    status: NDArray[np.str_]
-    force_errors: Array
-    slip_errors: Array
-    displacement_error: float
-
-    @property
-    def holds(self) -> bool:
-        """Every asperity is proved to slide, to stick in part, or to be open."""
-        return self.scope != "none" and not bool((self.status == "undecided").any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,54 +63,33 @@ def shear(contact: Contact, *, force: float, announce: Announce | None = None) -
     Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding), and
     SolverError where Newton's method stops without an answer.
     """
-    scene = contact.scene
-    friction = checks.friction(scene.friction)
+    friction = checks.friction(contact.scene.friction)
     given = checks.bearable("force", force, friction * contact.load)
     if given.ndim:
         raise InputError("force", found=f"shape {given.shape}", expected="one number")
     force = float(given)
-    sign = float(np.sign(force))
     if contact.load == 0.0:
         return _nothing_loaded(contact)
     problem = TangentialProblem.of(contact)
     total = abs(force) / friction / problem.units.force
     states = problem.solve(problem.limited(np.array([total])), announce=announce)
-    bounds = judge_states(problem, contact, states)
+    bounds = judge_states(problem, states)
 
-    touching, force_unit, length_unit = problem.touching, problem.units.force, problem.units.length
-    travel = mindlin.ratio(scene.material.poisson_ratio) * friction * length_unit
+    def in_scene(values: Array, unit: float) -> Array:
+        return frozen(problem.to_scene(values * unit))
 
-    def everywhere(values: Array, unit: float) -> Array:
-        full = np.zeros(len(scene))
-        full[touching] = values * unit
-        return full
-
-    increments, slips = states.increments[0], states.slips[0]
+    sign = float(np.sign(force))
+    increments, touching = states.increments[0], problem.touching
     left = np.maximum(1.0 - np.abs(increments) / problem.loads, 0.0)
-    errors = np.where(contact.loads > 0, 0.0, contact.certificate.load_errors)
-    slip_errors = np.where((contact.loads > 0) | (contact.status == "open"), 0.0, np.inf)
-    words = np.full(len(scene), "undecided", dtype="<U9")
-    words[contact.status == "open"] = "open"
-    words[touching[bounds.partial[0]]] = "partial"
-    words[touching[bounds.sliding[0]]] = "sliding"
-    certificate = ShearCertificate(
-        scope=contact.certificate.scope if bounds.proved[0] else "none",
-        status=frozen(words),
-        force_errors=frozen(
-            friction * errors + everywhere(bounds.increments[0], friction * force_unit)
-        ),
-        slip_errors=frozen(slip_errors + everywhere(bounds.slips[0], travel)),
-        displacement_error=float(bounds.rises[0]) * travel,
-    )
     return ShearState(
         contact=contact,
         force=force,
-        displacement=sign * float(states.rises[0]) * travel,
-        forces=frozen(everywhere(sign * increments, friction * force_unit)),
-        displacements=frozen(everywhere(sign * states.deflections[0], travel)),
-        slips=frozen(everywhere(sign * slips, travel)),
-        stick_radii=frozen(everywhere(contact.contact_radii[touching] * np.cbrt(left), 1.0)),
-        certificate=certificate,
+        displacement=sign * float(states.rises[0]) * problem.travel_unit,
+        forces=in_scene(sign * increments, problem.force_unit),
+        displacements=in_scene(sign * states.deflections[0], problem.travel_unit),
+        slips=in_scene(sign * states.slips[0], problem.travel_unit),
+        stick_radii=in_scene(contact.contact_radii[touching] * np.cbrt(left), 1.0),
+        certificate=ShearCertificate.of(problem, bounds),
     )
 
 
@@ -148,7 +104,7 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     """
     from scipy.optimize.elementwise import find_root  # 0.1 s to import: only when asked
 
-    friction = checks.friction(contact.scene.friction)
+    checks.friction(contact.scene.friction)
     asked = _asperities(contact, which)
     onsets = np.full(len(asked), np.nan)
     loaded = np.flatnonzero(contact.loads[asked])
@@ -177,7 +133,7 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
         args=(places,),
         tolerances={"xrtol": 1e-15, "xatol": 0.0, "frtol": 0.0, "fatol": 0.0},
     )
-    onsets[loaded] = found.x * friction * problem.units.force
+    onsets[loaded] = found.x * problem.force_unit
     return frozen(onsets)
 
 
@@ -196,5 +152,5 @@ def _asperities(contact: Contact, which: ArrayLike | None) -> Indices:
 
 def _nothing_loaded(contact: Contact) -> ShearState:
     zero = frozen(np.zeros(len(contact.scene)))
-    certificate = ShearCertificate(contact.certificate.scope, contact.status, zero, zero, 0.0)
+    certificate = ShearCertificate.of_no_load(contact.certificate)
     return ShearState(contact, 0.0, 0.0, zero, zero, zero, zero, certificate)

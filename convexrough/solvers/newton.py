@@ -1,12 +1,12 @@
-"""Newton's method on the normal map, safeguarded by the energy.
+"""Newton's method for pressing, on the normal map.
 
 The unknown is delta: the indentation of a touching asperity, minus the gap of an open one. With
 P_i = (max(delta_i, 0) / k_i)^(3/2) the whole contact law is the square system
 
     F(delta) = delta + A P(delta) - D = 0,
 
-once differentiable, and no active set is guessed: it is the sign of the answer. A step is that of
-`convexrough.convex.newton_step`; in the convex range it descends the energy Phi(P(delta)).
+which `convex.newton` solves: the active set is the sign of the answer (docs/theory/newton.md). In
+the convex range a step descends the energy Phi(P(delta)).
 
 Of many asperities only those near the contact take part in the iteration. What the others feel is
 looked at once it has ended; where one of them would touch, it goes on with more.
@@ -15,11 +15,12 @@ looked at once it has ended; where one of them would touch, it goes on with more
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices, among_zeros
+from convexrough.convex import newton
 from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.normal.load_control import shifted_to_load
@@ -30,27 +31,16 @@ from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: Of more candidates than this, only those near the contact are iterated on.
-FEW = 1000
+#: Of more candidates than this, only those near the contact are iterated on. Heuristic: any number
+#: leads to the same answer.
+ALL_ITERATED = 1000
 
 #: The residual, over |D0| + max |d_i|, that an answer must reach unless it is asked for less.
 ACCURATE = 1e-12
 
-#: Near the contact: with a gap of at most this part of the largest prescribed approach.
+#: Near the contact: with a gap of at most this part of the largest prescribed approach. Heuristic,
+#: as who is left out is looked at in the end.
 MARGIN = 0.1
-
-#: Most of the residual that the linear solver may leave in a step.
-MOST_LEFT = 0.1
-
-
-class _State(NamedTuple):
-    indentation: Array  # delta
-    loads: Array  # P(delta)
-    displacement: Array  # A P
-    defect: Array  # F
-    approach: float  # D0, under load control its latest estimate
-    energy: float
-    residual: float  # max |F|
 
 
 @dataclass(frozen=True)
@@ -76,19 +66,17 @@ class Newton:
         announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates, from any start that is not negative (own units)."""
-        indentation = _start(problem, start)
+        indentation = _on_constraint(problem, _start(problem, start))
         highest = float(np.maximum(problem.ceiling + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
-        if len(problem) > FEW and start is None:
+        if len(problem) > ALL_ITERATED and start is None:
             near = np.flatnonzero(indentation > -MARGIN * highest)
         iterations = 0
         while True:
-            part = problem if len(near) == len(problem) else problem.among(near)
-            state, steps = self._iterate(problem, part, indentation[near], announce)
+            state, steps = self._iterate(problem, near, indentation[near], announce)
             iterations += steps
             # What do the others feel?
-            loads = np.zeros(len(problem))
-            loads[near] = state.loads
+            loads = among_zeros(state.forces, near, len(problem))
             displacement = problem.influence.apply(loads)
             gap = displacement - problem.offsets - state.approach
             touched = gap < 0
@@ -97,45 +85,33 @@ class Newton:
                 residual = problem.residual(loads, state.approach, displacement)
                 return Solution(loads, state.approach, iterations, residual)
             indentation = -gap
-            indentation[near] = state.indentation
+            indentation[near] = state.unknown
             touched[near] = True  # none leaves, so that this ends
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
     def _iterate(
         self,
-        whole: NormalProblem,
         problem: NormalProblem,
+        near: Indices,
         indentation: Array,
         announce: Announce | None,
     ) -> tuple[_State, int]:
-        """Steps on (part of) a problem until the solution is as good as it gets."""
-        state = _evaluate(problem, _on_constraint(problem, indentation))
-        farthest = float(np.abs(whole.offsets).max())
-        before = np.inf
-        for iteration in range(1, self.max_iterations + 1):
-            scale = abs(state.approach) + farthest
+        """The solution of some of the candidates: all others carry nothing."""
+        part = problem if len(near) == len(problem) else problem.among(near)
+        law = _Pressing(part, float(np.abs(problem.offsets).max()))
+
+        def tell(step: int, state: _State) -> None:
             if announce is not None:
-                touching = int(np.count_nonzero(state.loads))
-                announce(
-                    f"step {iteration}, residual {state.residual / scale:.1e}, "
-                    f"{touching:,} touching"
-                )
-            accurate = state.residual <= ACCURATE * scale
-            size = float(np.linalg.norm(state.defect))
-            target = problem.influence.rounding(state.loads).negligible(state.displacement)
-            if state.residual <= self.tolerance * scale or (accurate and size <= target):
-                return state, iteration - 1
-            forcing = min(MOST_LEFT, (size / before) ** 2) if before < np.inf else MOST_LEFT
-            enough = max(target / size, self.tolerance * scale / state.residual)
-            following = _step(problem, state, max(forcing, 0.3 * enough))
-            if accurate and following.residual >= 0.5 * state.residual:
-                return min(state, following, key=lambda s: s.residual), iteration
-            state, before = following, size
-        raise SolverError(
-            f"residual {state.residual:.3g} in units of the approach after "
-            f"{self.max_iterations} steps, {max(self.tolerance, ACCURATE) * scale:.3g} needed",
-            solver="newton",
-        )
+                residual, touching = state.residual / state.scale, np.count_nonzero(state.forces)
+                announce(f"step {step}, residual {residual:.1e}, {touching:,} touching")
+
+        stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
+        try:
+            return newton.solve(law, law.evaluate(indentation), stopping, tell=tell)
+        except SolverError as error:
+            if error.iterate is not None:
+                error.iterate = among_zeros(error.iterate, near, len(problem))
+            raise
 
 
 def newton_step(problem: NormalProblem, loads: Array) -> Solution:
@@ -143,19 +119,98 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
     From an error e it leaves about e^2, and it tells open asperities from lightly loaded ones.
     """
-    state = _step(problem, _evaluate(problem, _start(problem, loads)), 0.0)
-    residual = problem.residual(state.loads, state.approach, state.displacement)
-    return Solution(state.loads, state.approach, 1, residual)
+    law = _Pressing(problem, float(np.abs(problem.offsets).max()))
+    before = law.evaluate(_start(problem, loads))
+    state = newton.descend(law, before, law.direction(before, 0.0))
+    residual = problem.residual(state.forces, state.approach, state.displacement)
+    return Solution(state.forces, state.approach, 1, residual)
+
+
+class _State(NamedTuple):
+    unknown: Array  # delta
+    forces: Array  # P(delta)
+    displacement: Array  # A P
+    defect: Array  # F
+    approach: float  # D0, under load control its latest estimate
+    energy: float
+    residual: float  # max |F|
+    scale: float  # |D0| + max |d_i|
+
+
+@dataclass(frozen=True)
+class _Pressing:
+    """The law of contact, for `convex.newton`.
+
+    farthest : max |d_i| over all candidates, of which these may be some
+    """
+
+    problem: NormalProblem
+    farthest: float
+
+    solver: ClassVar[str] = "newton"
+    unit: ClassVar[str] = "the approach"
+
+    def evaluate(self, unknown: Array) -> _State:
+        problem = self.problem
+        indentation = _on_constraint(problem, unknown)
+        loads = hertz.load(indentation, problem.coefficients)
+        displacement = problem.influence.apply(loads)
+        level = indentation + displacement - problem.offsets  # D0 at every touching asperity
+        if problem.approach is not None:
+            approach = problem.approach
+        else:
+            weights = np.cbrt(loads)
+            approach = float(weights @ level / weights.sum())
+        # What delta is at an open asperity does not matter: its gap, or 0 where that is negative.
+        gap = displacement - problem.offsets - approach
+        indentation = np.where(loads > 0, indentation, np.minimum(-gap, 0.0))
+        defect = indentation + gap
+        energy = problem.energy(loads, displacement)
+        residual, scale = float(np.abs(defect).max()), abs(approach) + self.farthest
+        return _State(indentation, loads, displacement, defect, approach, energy, residual, scale)
+
+    def direction(self, state: _State, left: float) -> Array:
+        return correct(
+            self.problem.influence,
+            self.problem.shells,
+            np.sqrt(1.0 / self.problem.stiffness(state.forces)),  # W
+            state.defect,
+            balanced=self.problem.load is not None,
+            tolerance=left,
+        ).change
+
+    def gradient(self, state: _State) -> Array:
+        """The gap."""
+        return self.problem.gap(state.forces, state.displacement, state.approach)
+
+    def energy_rounding(self, state: _State) -> float:
+        prescribed = np.abs(self.problem.offsets) + abs(state.approach)
+        return SAFETY * float(state.forces @ prescribed)
+
+    def noise(self, state: _State) -> float:
+        return self.problem.influence.rounding(state.forces).negligible(state.displacement)
+
+    def advice(self, state: _State) -> str:
+        """By how crowded the contact is where it stopped."""
+        number = self.problem.convexity_number(state.forces)
+        if number < 1:
+            return (
+                f"the energy is convex there (convexity number {number:.3g}): allow more steps, or "
+                "start from loads of a neighbouring problem"
+            )
+        return (
+            f"contacts are so crowded there that the energy need not be convex (convexity number "
+            f"{number:.3g}, convex below 1): use a smaller approach or load, sharper tips, or "
+            "asperities further apart"
+        )
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
     """An indentation to start from: of the given loads, or of heights riding on a smooth sphere."""
     if loads is None:
-        few = len(problem) <= FEW
-        indentation = problem.smooth_indentation() if few else mean_field_indentation(problem)
-    else:
-        indentation = np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
-    return _on_constraint(problem, indentation)
+        few = len(problem) <= ALL_ITERATED
+        return problem.smooth_indentation() if few else mean_field_indentation(problem)
+    return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
 
 
 def _on_constraint(problem: NormalProblem, indentation: Array) -> Array:
@@ -163,45 +218,3 @@ def _on_constraint(problem: NormalProblem, indentation: Array) -> Array:
     if problem.load is not None:
         return shifted_to_load(indentation, problem.coefficients, problem.load)
     return np.minimum(indentation, problem.ceiling + problem.offsets)
-
-
-def _evaluate(problem: NormalProblem, indentation: Array) -> _State:
-    loads = hertz.load(indentation, problem.coefficients)
-    displacement = problem.influence.apply(loads)
-    level = indentation + displacement - problem.offsets  # D0 at every touching asperity
-    if problem.approach is not None:
-        approach = problem.approach
-    else:
-        weights = np.cbrt(loads)
-        approach = float(weights @ level / weights.sum())
-    # What delta is at an open asperity does not matter: take its gap, or 0 where that is negative.
-    gap = displacement - problem.offsets - approach
-    indentation = np.where(loads > 0, indentation, np.minimum(-gap, 0.0))
-    defect = indentation + gap
-    energy = problem.energy(loads, displacement)
-    residual = float(np.abs(defect).max())
-    return _State(indentation, loads, displacement, defect, approach, energy, residual)
-
-
-def _step(problem: NormalProblem, state: _State, forcing: float) -> _State:
-    """One Newton step, halved until the energy falls (Armijo's rule along the arc P(delta))."""
-    root = np.sqrt(1.0 / problem.stiffness(state.loads))  # W
-    correction = correct(
-        problem.influence,
-        problem.shells,
-        root,
-        state.defect,
-        balanced=problem.load is not None,
-        tolerance=forcing,
-    )
-    gap = problem.gap(state.loads, state.displacement, state.approach)
-    rounding = SAFETY * float(state.loads @ (np.abs(problem.offsets) + abs(state.approach)))
-    length = 1.0
-    while length > 1e-12:
-        moved = state.indentation + length * correction.change
-        trial = _evaluate(problem, _on_constraint(problem, moved))
-        slope = float(gap @ (trial.loads - state.loads))
-        if trial.energy - state.energy <= 1e-4 * min(slope, 0.0) + rounding:
-            return trial
-        length /= 2.0
-    raise SolverError("no step along its direction lowers the energy", solver="newton")

@@ -5,7 +5,7 @@ inverted, q_i = P_i force(|eta_i| / ceiling_i) along eta_i, the conditions are t
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T,
 
-once differentiable, and no set of sliding asperities is guessed: they are those with |eta_i|
+which `convex.newton` solves: no set of sliding asperities is guessed, they are those with |eta_i|
 beyond the ceiling. With dq_i/deta_i = W_i W_i' (rank 1 where sliding: the force can still turn) a
 step solves the symmetric system
 
@@ -17,13 +17,15 @@ the Hessian of the energy scaled by its local part: positive definite in the con
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from convexrough.arrays import Array
+from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.roundoff import SAFETY
+from convexrough.shearing.newton import advice
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
 
@@ -41,103 +43,101 @@ class FrictionNewton:
 
     def solve(self, problem: VectorProblem, total: Array) -> VectorState:
         """The state of a total increment (2,), |T| < sum P (own units)."""
+        law = _Friction(problem, total)
         size = float(np.hypot(*total))
-        limit = float(problem.scalar.loads.sum())
         scalar = problem.scalar.solve(np.array([size]))
-        start = scalar.deflections[0][:, None] * (total / size)
-        iterate = _evaluate(problem, start, total)
-        if iterate is None:
+        start = law.evaluate(scalar.deflections[0][:, None] * (total / size))
+        if start is None:
             raise SolverError(
-                "no forces of the prescribed total to start from", solver="friction (newton)"
+                "no forces of the prescribed total to start from",
+                solver=law.solver,
+                advice=advice(problem.scalar, size),
             )
-        for iteration in range(1, self.max_iterations + 1):
-            following = _step(problem, iterate, total)
-            accurate = iterate.residual <= self.tolerance * float(np.hypot(*iterate.rise))
-            if accurate and following.residual >= 0.5 * iterate.residual:
-                best = min(iterate, following, key=lambda each: each.residual)
-                return _state(problem, best, total, iteration)
-            iterate = following
-        worst = iterate.residual / float(np.hypot(*iterate.rise))
-        raise SolverError(
-            f"residual {worst:.3g} of the displacement after "
-            f"{self.max_iterations} steps, at {size / limit:.6g} of gross sliding",
-            solver="friction (newton)",
-        )
+        stopping = newton.Stopping(self.tolerance, 0.0, self.max_iterations)
+        state, iterations = newton.solve(law, start, stopping)
+        size_of = np.hypot(*state.unknown.T)
+        beyond = np.maximum(size_of - problem.scalar.ceilings, 0.0)
+        slips = along(beyond, state.unknown, size_of)
+        return VectorState(total, state.forces, state.rise, slips, iterations)
 
 
-class _Iterate(NamedTuple):
-    deflections: Array  # (n, 2) eta
-    increments: Array  # (n, 2) q(eta)
+class _State(NamedTuple):
+    unknown: Array  # (n, 2) eta
+    forces: Array  # (n, 2) q(eta)
     coupling: Array  # (n, 2) B q
     roots: Array  # (n, 2, 2) W
     rise: Array  # (2,) the best estimate of X
-    defects: Array  # (n, 2) F
+    defect: Array  # (n, 2) F
     residual: float  # max |F_i|
     energy: float
 
-
-def _state(problem: VectorProblem, iterate: _Iterate, total: Array, iterations: int) -> VectorState:
-    """The answer; slips are what eta has beyond the ceiling."""
-    size = np.hypot(*iterate.deflections.T)
-    beyond = np.maximum(size - problem.scalar.ceilings, 0.0)
-    return VectorState(
-        total=total,
-        increments=iterate.increments,
-        rise=iterate.rise,
-        slips=along(beyond, iterate.deflections, size),
-        iterations=iterations,
-    )
+    @property
+    def scale(self) -> float:
+        """|X|."""
+        return float(np.hypot(*self.rise))
 
 
-def _evaluate(problem: VectorProblem, eta: Array, total: Array) -> _Iterate | None:
-    """The state at eta, shifted so that forces add up to the total; None where that fails."""
-    shifted = _onto_total(problem, eta, total)
-    if shifted is None:
-        return None
-    q = problem.local_forces(shifted)
-    coupling = problem.couple(q)
-    roots = _roots(problem, shifted)
-    slopes = roots @ np.swapaxes(roots, 1, 2)
-    level = shifted + coupling  # X, at every asperity
-    middle = level.mean(axis=0)
-    pull = np.einsum("nij,nj->i", slopes, level - middle)
-    rise = middle + np.linalg.lstsq(slopes.sum(axis=0), pull, rcond=None)[0]
-    defects = level - rise
-    residual = float(np.hypot(*defects.T).max())
-    energy = problem.energy(q, coupling)
-    return _Iterate(shifted, q, coupling, roots, rise, defects, residual, energy)
+@dataclass(frozen=True)
+class _Friction:
+    """The law of vector friction at one total, for `convex.newton`; total : (2,) T."""
+
+    problem: VectorProblem
+    total: Array
+
+    solver: ClassVar[str] = "friction (newton)"
+    unit: ClassVar[str] = "the displacement"
+
+    def evaluate(self, unknown: Array) -> _State | None:
+        """The state at eta, shifted so that forces add up to the total; None where that fails."""
+        problem = self.problem
+        shifted = _onto_total(problem, unknown, self.total)
+        if shifted is None:
+            return None
+        q = problem.local_forces(shifted)
+        coupling = problem.couple(q)
+        roots = _roots(problem, shifted)
+        slopes = roots @ np.swapaxes(roots, 1, 2)
+        level = shifted + coupling  # X, at every asperity
+        middle = level.mean(axis=0)
+        pull = np.einsum("nij,nj->i", slopes, level - middle)
+        rise = middle + np.linalg.lstsq(slopes.sum(axis=0), pull, rcond=None)[0]
+        defect = level - rise
+        residual = float(np.hypot(*defect.T).max())
+        energy = problem.energy(q, coupling)
+        return _State(shifted, q, coupling, roots, rise, defect, residual, energy)
+
+    def direction(self, state: _State, left: float) -> Array:
+        """Solved directly: it leaves nothing."""
+        return _direction(self.problem, state)
+
+    def gradient(self, state: _State) -> Array:
+        size = np.hypot(*state.unknown.T)
+        bearable = np.minimum(size, self.problem.scalar.ceilings)
+        return along(bearable, state.unknown, size) + state.coupling - state.rise
+
+    def energy_rounding(self, state: _State) -> float:
+        # Near gross sliding X is large, and then so is what rounding of the total does.
+        return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
+
+    def noise(self, state: _State) -> float:
+        """Not known: steps go on until one does not halve the residual."""
+        return 0.0
+
+    def advice(self, state: _State) -> str:
+        return advice(self.problem.scalar, float(np.hypot(*self.total)))
 
 
-def _step(problem: VectorProblem, iterate: _Iterate, total: Array) -> _Iterate:
-    """One Newton step, halved until the energy falls (Armijo's rule along the arc q(eta))."""
-    direction = _direction(problem, iterate)
-    size = np.hypot(*iterate.deflections.T)
-    bearable = np.minimum(size, problem.scalar.ceilings)
-    gradient = along(bearable, iterate.deflections, size) + iterate.coupling - iterate.rise
-    # Near gross sliding X is large, and then so is what rounding of the total does to the energy.
-    rounding = SAFETY * iterate.energy + 1e-14 * float(np.hypot(*total) * np.hypot(*iterate.rise))
-    length = 1.0
-    while length > 1e-12:
-        trial = _evaluate(problem, iterate.deflections + length * direction, total)
-        if trial is not None:
-            slope = float((gradient * (trial.increments - iterate.increments)).sum())
-            if trial.energy - iterate.energy <= 1e-4 * min(slope, 0.0) + rounding:
-                return trial
-        length /= 2.0
-    raise SolverError("no step along its direction lowers the energy", solver="friction (newton)")
-
-
-def _direction(problem: VectorProblem, iterate: _Iterate) -> Array:
+def _direction(problem: VectorProblem, state: _State) -> Array:
     """d(eta); with the shift of the kernel added where the matrix is not positive definite."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
     n = len(problem)
-    roots = iterate.roots
+    roots = state.roots
     scaled = problem.kernel
     for _ in range(2):  # B W, then W'B W
         scaled = np.einsum("rjc,jcb->rjb", scaled.reshape(2 * n, n, 2), roots)
         scaled = scaled.reshape(2 * n, 2 * n).T
-    pushed = np.einsum("nij,ni->nj", roots, -iterate.defects)
+    pushed = np.einsum("nij,ni->nj", roots, -state.defect)
     turned = np.swapaxes(roots, 1, 2)  # W' for dX along x and along y
     right = np.concatenate((pushed[:, :, None], turned), axis=2).reshape(2 * n, 3)
     for shifted in (False, True):
@@ -150,13 +150,17 @@ def _direction(problem: VectorProblem, iterate: _Iterate) -> Array:
         if info == 0:
             break
     else:
-        raise SolverError("the shifted matrix is not positive definite", solver="friction (newton)")
+        raise SolverError(
+            "the shifted matrix is not positive definite",
+            solver=_Friction.solver,
+            iterate=state.forces,
+        )
     solved = dpotrs(factor, right, lower=1)[0].reshape(n, 2, 3)
     forces = np.einsum("nij,njk->nik", roots, solved)  # dq = W y
     sums = forces.sum(axis=0)
     change = np.linalg.lstsq(sums[:, 1:], -sums[:, 0], rcond=None)[0]  # dX, so that sum dq = 0
     moved = problem.couple(forces[:, :, 0] + forces[:, :, 1:] @ change)
-    return np.asarray(change - iterate.defects - moved)
+    return np.asarray(change - state.defect - moved)
 
 
 def _roots(problem: VectorProblem, eta: Array) -> Array:

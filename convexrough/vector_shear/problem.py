@@ -24,7 +24,7 @@ Averaging d d' over all directions leaves B = A: that is Ciavarella and Jaeger's
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -76,8 +76,12 @@ class VectorProblem:
     kernel: Array
 
     @classmethod
-    @lru_cache(maxsize=4)
     def of(cls, contact: Contact) -> VectorProblem:
+        """That of a contact, which keeps it. Raises InputError where it does not fit in memory."""
+        return contact.keep(cls._assemble)
+
+    @classmethod
+    def _assemble(cls, contact: Contact) -> VectorProblem:
         n = int(np.count_nonzero(contact.loads))
         checks.fits_in_memory("loaded asperities", n, 5 * 4 * 8, power=2)
         scalar = TangentialProblem.of(contact)

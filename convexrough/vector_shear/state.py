@@ -15,18 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact
-from convexrough.errors import InputError
+from convexrough.errors import InputError, SolverError
 from convexrough.roundoff import ROUNDOFF
-from convexrough.shearing.state import ShearCertificate
-from convexrough.sphere import mindlin
-from convexrough.vector_shear.certificate import judge_vectors
-from convexrough.vector_shear.cones import FrictionConic
+from convexrough.shearing.certificate import ShearCertificate
+from convexrough.vector_shear.judgement import judge_vectors
 from convexrough.vector_shear.newton import FrictionNewton
 from convexrough.vector_shear.problem import VectorProblem, VectorState
-
-__all__ = ["FrictionConic", "FrictionNewton", "VectorShearState", "shear_vector"]
 
 
 class FrictionSolver(Protocol):
@@ -107,31 +103,40 @@ def shear_vector(
     elif gross:
         state = _gross(problem, total)
     else:
-        state = solver.solve(problem, total)
+        state = _solved(solver, problem, total)
 
-    travel = mindlin.ratio(scene.material.poisson_ratio) * friction * scalar.units.length
-    unit = friction * scalar.units.force
+    unit, travel = scalar.force_unit, scalar.travel_unit
 
-    def everywhere(values: Array, unit: float) -> Array:
-        full = np.zeros((len(scene), *values.shape[1:]))
-        full[scalar.touching] = values * unit
-        return frozen(full)
+    def in_scene(values: Array, unit: float) -> Array:
+        return frozen(among_zeros(values * unit, scalar.touching, len(scene)))
 
     left = np.maximum(1.0 - problem.sizes(state.increments) / scalar.loads, 0.0)
     return VectorShearState(
         contact=contact,
         force=frozen(Q),
         displacement=frozen(_times(state.rise, travel)),
-        forces=everywhere(state.increments, unit),
-        slips=everywhere(state.slips, travel),
-        stick_radii=everywhere(contact.contact_radii[scalar.touching] * np.cbrt(left), 1.0),
+        forces=in_scene(state.increments, unit),
+        slips=in_scene(state.slips, travel),
+        stick_radii=in_scene(contact.contact_radii[scalar.touching] * np.cbrt(left), 1.0),
         disagreement=_disagreement(problem, state, amount),
         residual=problem.residual(state),
         duality_gap=problem.duality_gap(state) * unit * travel,
-        certificate=_certified(problem, contact, state, gross, unit, travel),
+        certificate=ShearCertificate.of(scalar, judge_vectors(problem, state, gross=gross)),
         solver=solver.name,
         iterations=state.iterations,
     )
+
+
+def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> VectorState:
+    """The solver's answer; the last forces of an error in the scene's units and order."""
+    try:
+        return solver.solve(problem, total)
+    except SolverError as error:
+        if error.iterate is not None and error.iterate.ndim == 2:
+            scalar = problem.scalar
+            forces = error.iterate * scalar.force_unit
+            error.iterate = among_zeros(forces, scalar.touching, len(scalar.scene))
+        raise
 
 
 def _vector(force: ArrayLike) -> Array:
@@ -187,40 +192,11 @@ def _disagreement(problem: VectorProblem, state: VectorState, amount: Array) -> 
     return float(np.linalg.norm(difference / amount[0]) / np.linalg.norm(other / amount[0]))
 
 
-def _certified(
-    problem: VectorProblem,
-    contact: Contact,
-    state: VectorState,
-    gross: bool,
-    unit: float,
-    travel: float,
-) -> ShearCertificate:
-    """In the units and the order of the scene."""
-    touching = problem.scalar.touching
-    bounds = judge_vectors(problem, contact, state, gross=gross)
-    friction = checks.friction(contact.scene.friction)
-    force_errors = np.where(contact.loads > 0, 0.0, friction * contact.certificate.load_errors)
-    force_errors[touching] = bounds.increments[0] * unit
-    slip_errors = np.where((contact.loads > 0) | (contact.status == "open"), 0.0, np.inf)
-    slip_errors[touching] = bounds.slips[0] * travel
-    words = np.full(len(contact.scene), "undecided", dtype="<U9")
-    words[contact.status == "open"] = "open"
-    words[touching[bounds.partial[0]]] = "partial"
-    words[touching[bounds.sliding[0]]] = "sliding"
-    return ShearCertificate(
-        scope=contact.certificate.scope if bounds.proved[0] else "none",
-        status=frozen(words),
-        force_errors=frozen(force_errors),
-        slip_errors=frozen(slip_errors),
-        displacement_error=float(bounds.rises[0]) * travel,
-    )
-
-
 def _unmoved(contact: Contact, solver: str) -> VectorShearState:
     """Nothing is loaded."""
     n = len(contact.scene)
     zero, none, pairs = frozen(np.zeros(n)), frozen(np.zeros(2)), frozen(np.zeros((n, 2)))
-    certificate = ShearCertificate(contact.certificate.scope, contact.status, zero, zero, 0.0)
+    certificate = ShearCertificate.of_no_load(contact.certificate)
     return VectorShearState(
         contact, none, none, pairs, pairs, zero, 0.0, 0.0, 0.0, certificate, solver, 0
     )

@@ -22,11 +22,12 @@ from scenes import (
 )
 
 import convexrough as cr
+from convexrough.convex.newton import descend
 from convexrough.influence import Kind, inverse_distances
 from convexrough.normal.load_control import highest_approach, shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Newton
-from convexrough.solvers.newton import _evaluate, _step
+from convexrough.solvers.newton import _Pressing
 from convexrough.sphere import hertz
 
 Case = tuple[cr.Scene, float, Kind]
@@ -286,9 +287,10 @@ def test_every_newton_step_lowers_the_energy(make: Any, kind: Kind) -> None:
         problem = assembled(scene, approach=approach, influence=kind)
         rng = np.random.default_rng(seed)
         start = problem.bounds(problem.ceiling) * rng.random(len(problem)) ** 3
-        state = _evaluate(problem, hertz.indentation(start, problem.coefficients))
+        law = _Pressing(problem, float(np.abs(problem.offsets).max()))
+        state = law.evaluate(hertz.indentation(start, problem.coefficients))
         for _ in range(12):
-            following = _step(problem, state, 0.0)
+            following = descend(law, state, law.direction(state, 0.0))
             assert following.energy <= state.energy + 1e-12 * abs(state.energy)
             state = following
 

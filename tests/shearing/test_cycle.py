@@ -12,7 +12,7 @@ from scenes import NAMED, PAPER_APPROACH, paper, random_scenes
 
 import convexrough as cr
 from convexrough.influence import inverse_distances
-from convexrough.shearing.history import _remember
+from convexrough.shearing.masing import remember
 from convexrough.sphere import hertz, mindlin
 
 NU = 0.3
@@ -228,7 +228,7 @@ def test_each_state_of_a_history_is_certified(influence: str) -> None:
 
 
 def test_nested_loops_are_forgotten() -> None:
-    steps = _remember(np.array([0.6, -0.2, 0.3, -0.1, 0.3, -0.6, 0.7, 0.65]))
+    steps = remember(np.array([0.6, -0.2, 0.3, -0.1, 0.3, -0.6, 0.7, 0.65]))
     assert [step.base for step in steps] == [-1, 0, 1, 2, 1, -1, -1, 6]
     assert [step.total for step in steps] == pytest.approx(
         [0.6, 0.4, 0.25, 0.2, 0.25, 0.6, 0.7, 0.025]

@@ -1,6 +1,8 @@
 """Friction of many asperities: state after state by an operator, against matrices and limits."""
 
+import gc
 import re
+import weakref
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -8,16 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, ctx
-from friction_scenes import FRICTION, NAMES, pressed
+from friction_scenes import FRICTION, NAMES, pressed, with_friction
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH
+from scenes import MATERIAL, PAPER_APPROACH, paper
 
 import convexrough as cr
 from convexrough.influence import LatticeInfluence
 from convexrough.run.stages import compute
-from convexrough.shearing.certificate import judge_in_turn, judge_states
-from convexrough.shearing.first_loading import Family
-from convexrough.shearing.newton import by_matrices, solve_in_turn, solve_together
+from convexrough.shearing.first_loading import FirstLoading
+from convexrough.shearing.judgement import judge_in_turn, judge_states
+from convexrough.shearing.many_states import by_matrices, solve_together
+from convexrough.shearing.newton import solve_in_turn
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.sphere import annulus
 
@@ -110,10 +113,10 @@ def test_judged_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     contact = refined("lattice")
     problem = TangentialProblem.of(contact)
     states = problem.solve(np.linspace(0, 1, 7) * problem.limit)
-    whole = judge_states(problem, contact, states)
-    monkeypatch.setattr("convexrough.shearing.certificate.BLOCK", 2 * len(problem))
-    assert len(list(judge_in_turn(problem, contact, states))) == 4
-    for all_at_once, in_blocks in zip(whole, judge_states(problem, contact, states), strict=True):
+    whole = judge_states(problem, states)
+    monkeypatch.setattr("convexrough.shearing.judgement.BLOCK", 2 * len(problem))
+    assert len(list(judge_in_turn(problem, states))) == 4
+    for all_at_once, in_blocks in zip(whole, judge_states(problem, states), strict=True):
         assert_allclose(all_at_once, in_blocks, rtol=1e-12)
 
 
@@ -151,17 +154,17 @@ def test_small_forces_keep_their_digits(fraction: float) -> None:
 
     w = (1/6) f''(...) T^3 comes from the local laws alone: sum P ceiling e(u / P), e = 5 t^3 / 81.
     """
-    family = Family(refined("lattice"))
-    problem, q = family.problem, family.problem.elastic
+    loading = FirstLoading(refined("lattice"))
+    problem, q = loading.problem, loading.problem.elastic
     total = fraction * problem.limit
-    states, _ = family.states(np.array([total]))
+    states, _ = loading.states(np.array([total]))
     t = q * total / problem.loads
     expected = 0.6 * float(problem.loads * problem.ceilings @ t**3) * 5 / 81
     near = 300 * fraction  # the next order, at the least loaded asperities
     elastic = float(q @ (q / problem.stiffest + problem.couple(q))) * total
     assert states.rises[0] == pytest.approx(elastic, rel=1e-12 + near)
-    assert family.partial_slip(states).sum() == pytest.approx(expected, rel=1e-10 + 100 * near)
-    assert family.trapezoid_error(states)[0] == pytest.approx(expected, rel=1e-10 + 100 * near)
+    assert loading.partial_slip(states).sum() == pytest.approx(expected, rel=1e-10 + 100 * near)
+    assert loading.trapezoid_error(states)[0] == pytest.approx(expected, rel=1e-10 + 100 * near)
 
 
 def test_one_state_takes_few_products(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,13 +178,13 @@ def test_one_state_takes_few_products(monkeypatch: pytest.MonkeyPatch) -> None:
 
     contact = refined("lattice", times=5, heights=0.0)
     problem = TangentialProblem.of(contact)
-    judge_states(problem, contact, problem.solve(np.array([0.0])))  # what is known of the loads
+    judge_states(problem, problem.solve(np.array([0.0])))  # what is known of the loads
     monkeypatch.setattr(LatticeInfluence, "apply", counting)
     states = problem.solve(np.linspace(0.05, 0.95, 19) * problem.limit)
     assert counted["float64"] <= 19 * 4.5
     assert counted["float32"] <= 19 * 25
     counted["float64"] = 0
-    judge_states(problem, contact, states)
+    judge_states(problem, states)
     assert counted["float64"] == 19 * 2
 
 
@@ -251,3 +254,25 @@ def test_the_law_by_the_width_of_the_annulus() -> None:
         assert annulus.width_at(float(phi)) == pytest.approx(float(1 - left ** (arb(1) / 3)), 1e-14)
         assert annulus.width_under(-t) == x
     assert (annulus.width_at(np.array([1.0, -1.0, 3.0])) == 1).all()
+
+
+def test_a_contact_is_freed_with_all_that_was_made_from_it() -> None:
+    """By counting references alone: nothing that later stages keep holds the contact."""
+    contact = cr.press(with_friction(paper()), approach=PAPER_APPROACH)
+    limit = FRICTION * contact.load
+    cr.shear(contact, force=0.3 * limit)
+    cr.cycle(contact, maximum=0.5 * limit)
+    cr.history(contact, forces=[0.4 * limit])
+    cr.shear_vector(contact, force=0.3 * limit)
+    cr.onset_of_sliding(contact, which=[0])
+    problem = weakref.ref(TangentialProblem.of(contact))
+    assert TangentialProblem.of(contact) is problem()
+    gc.collect()
+    gc.disable()
+    try:
+        left = weakref.ref(contact)
+        del contact
+        assert left() is None
+        assert problem() is None
+    finally:
+        gc.enable()

@@ -15,8 +15,8 @@ from scenes import MATERIAL, PAPER_APPROACH, paper, random_scenes, solve_exactly
 
 import convexrough as cr
 from convexrough.influence import inverse_distances
-from convexrough.shearing.certificate import judge_states
-from convexrough.shearing.load_errors import Known
+from convexrough.shearing.judgement import judge_states
+from convexrough.shearing.load_errors import LoadErrors
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.sphere import hertz, mindlin
 
@@ -263,7 +263,7 @@ def test_attacks_on_the_words(
     wrong = good._replace(
         increments=u, deflections=eta, slips=np.maximum(eta - problem.ceilings, 0)
     )
-    bounds = judge_states(problem, contact, wrong)
+    bounds = judge_states(problem, wrong)
     truly_sliding = good.slips > 0
     assert not (bounds.sliding & ~truly_sliding).any()
     assert not (bounds.partial & truly_sliding).any()
@@ -297,7 +297,7 @@ def test_doubt_about_the_loads_is_counted(
     contact, truth = pressed("paper", influence, control), exact("paper", fraction, control)
     doubtful = in_doubt(contact, digits, control)
     problem = TangentialProblem.of(doubtful)
-    known = Known.of(problem, doubtful)
+    known = LoadErrors.of(problem)
     missed = doubtful.loads[problem.touching] - contact.loads[problem.touching]
     missed[~known.sure] = 0.0
     weights = np.where(known.sure, known.stiffness, 0.0)
@@ -343,7 +343,7 @@ def test_all_that_wrong_loads_can_do_is_counted(influence: Any, fraction: float,
         ),
     )
     problem = TangentialProblem.of(wrong)
-    known = Known.of(problem, wrong)
+    known = LoadErrors.of(problem)
     missed = (loads - contact.loads)[problem.touching] / problem.units.force
     distance = np.sqrt(known.stiffness @ missed**2)
     assert distance <= known.distance * (1 + 1e-9)
@@ -402,3 +402,17 @@ def test_an_uncertified_contact_gets_no_word() -> None:
     assert state.certificate.scope == "none"
     assert not state.certificate.holds
     assert (state.status == "undecided").all()
+
+
+@pytest.mark.parametrize("influence", KINDS)
+def test_a_state_that_is_not_found_comes_with_its_last_forces(
+    influence: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    contact = cr.press(with_friction(paper()), approach=PAPER_APPROACH, influence=influence)
+    monkeypatch.setattr("convexrough.shearing.newton.MOST_STEPS", 1)
+    monkeypatch.setattr("convexrough.shearing.many_states.MOST_STEPS", 1)
+    with pytest.raises(cr.SolverError, match=r"this was at 0\.5 of gross sliding") as caught:
+        cr.shear(contact, force=0.5 * FRICTION * contact.load)
+    error = caught.value
+    assert (error.solver, error.iterate.shape) == ("shear", contact.loads.shape)
+    assert error.iterate.sum() == pytest.approx(0.5 * FRICTION * contact.load, rel=1e-12)

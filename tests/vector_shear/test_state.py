@@ -13,17 +13,12 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, scattered
 
 import convexrough as cr
+from convexrough import FrictionConic, FrictionNewton, VectorShearState, shear_vector
 from convexrough.convex import cones
 from convexrough.sphere import hertz, mindlin
 from convexrough.vector_shear import cones as friction_cones
-from convexrough.vector_shear.certificate import judge_vectors
+from convexrough.vector_shear.judgement import judge_vectors
 from convexrough.vector_shear.problem import VectorProblem, VectorState
-from convexrough.vector_shear.state import (
-    FrictionConic,
-    FrictionNewton,
-    VectorShearState,
-    shear_vector,
-)
 
 FRICTION = 0.5
 FRACTIONS = [1e-9, 1e-3, 0.1, 0.3, 0.5, 0.8, 0.99]
@@ -555,7 +550,7 @@ def test_attacks_on_the_words(name: str, fraction: float, kind: str, seed: int) 
         rise = rise * (1 + size * rng.standard_normal(2))
     q /= np.maximum(lengths(q) / problem.scalar.loads, 1.0)[:, None]
     wrong = good._replace(increments=q, rise=rise, slips=slips)
-    bounds = judge_vectors(problem, contact, wrong, gross=False)
+    bounds = judge_vectors(problem, wrong, gross=False)
     sliding = lengths(good.slips) > 0
     assert not (bounds.sliding[0] & ~sliding).any()
     assert not (bounds.partial[0] & sliding).any()
@@ -613,7 +608,7 @@ def test_the_bounds_are_needed(size: float) -> None:
     good = FrictionNewton().solve(problem, np.array([0.3, 0.1]) * problem.scalar.loads.sum())
     error = size * problem.scalar.loads[:, None] * np.array([[1.0, 0.5], [-1.0, -0.5]])
     wrong = good._replace(increments=good.increments + error)
-    bounds = judge_vectors(problem, contact, wrong, gross=False)
+    bounds = judge_vectors(problem, wrong, gross=False)
     assert bounds.proved[0]
     assert (lengths(error) <= bounds.increments[0]).all()
     assert bounds.increments[0].max() < 4 * lengths(error).max()

@@ -1,6 +1,6 @@
 """Judge vector friction states: bounds on forces and slips, and which asperities slide.
 
-The argument is that of `convexrough.shearing.certificate`, for vectors. The local energy is radial
+The argument is that of `convexrough.shearing.judgement`, for vectors. The local energy is radial
 and its Hessian at least h_i I, so on the true loads P* the energy is strictly convex with
 H = diag(h_i I), and for a state q with the residual e
 
@@ -21,26 +21,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.contact import Contact
 from convexrough.normal.certificate import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.certificate import Bounds, Known
+from convexrough.shearing.judgement import Bounds
+from convexrough.shearing.load_errors import LoadErrors
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
 #: Margins of convexity tried, the best first.
 MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 
 
-def judge_vectors(
-    problem: VectorProblem, contact: Contact, state: VectorState, *, gross: bool
-) -> Bounds:
+def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) -> Bounds:
     """Bounds on one state of a contact, whose loads are known to its certificate; m = 1.
 
     gross : |Q| = f P
     """
-    if contact.certificate.scope == "none":
+    if problem.scalar.certificate.scope == "none":
         return _nothing(len(problem))
-    known = Known.of(problem.scalar, contact)
+    known = LoadErrors.of(problem.scalar)
     if gross:
         return _at_limit(problem, known, state)
     if known.stray > 0:  # an asperity may touch that the problem leaves out
@@ -117,7 +115,7 @@ def _bent(problem: VectorProblem, size: Array, local: Array, change: Array) -> A
     return bent
 
 
-def _margin(problem: VectorProblem, known: Known) -> float:
+def _margin(problem: VectorProblem, known: LoadErrors) -> float:
     """A proved lower bound on the least eigenvalue of I + H^-1/2 B H^-1/2; 0 where none is found.
 
     As `certificate` does for the normal problem (Rump, BIT 46 (2006) 433), with H on loads no
@@ -141,7 +139,7 @@ def _margin(problem: VectorProblem, known: Known) -> float:
     return 0.0
 
 
-def _at_limit(problem: VectorProblem, known: Known, state: VectorState) -> Bounds:
+def _at_limit(problem: VectorProblem, known: LoadErrors, state: VectorState) -> Bounds:
     """Gross sliding: every force is f P_i along the total, whatever the displacements."""
     n = len(problem)
     unknown = np.full(n, np.inf)
