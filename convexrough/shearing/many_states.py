@@ -91,7 +91,7 @@ def _descend(
 ) -> Iterates:
     """One step for each state, halved until its energy falls."""
     after = evaluate(energy, states.deflections + directions, totals)
-    gradient = gradients(energy, states)
+    gradient = gradients(energy, states.deflections, states.coupling, states.rises[:, None])
     lengths = np.ones(len(totals))
     for _ in range(50):
         changes = after.energies - states.energies

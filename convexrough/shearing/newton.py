@@ -20,7 +20,6 @@ from convexrough.progress import Announce
 from convexrough.roundoff import SAFETY
 from convexrough.shearing.energy import TangentialEnergy
 from convexrough.shearing.normal_map import (
-    Iterates,
     States,
     elastic_deflections,
     evaluate,
@@ -79,7 +78,7 @@ def _state_at(
     if energy.at_limit(total)[0]:
         return *gross_sliding(energy), 0.0
     if energy.elastically(total)[0]:
-        found = _State(evaluate(energy, elastic_deflections(energy, total), total))
+        found = _State.at(energy, elastic_deflections(energy, total)[0], total)
     else:
         law = _Shearing(energy, total)
         start = curve.at(float(total[0]))
@@ -91,34 +90,21 @@ def _state_at(
 
 
 class _State(NamedTuple):
-    """One state, as `convex.newton` sees it."""
+    """One state, as `convex.newton` sees it; in the order of `Iterates`."""
 
-    all: Iterates  # of m = 1
+    unknown: Array  # (n,) eta
+    forces: Array  # (n,) u
+    coupling: Array  # (n,) A u
+    slopes: Array  # (n,) c
+    defect: Array  # (n,) F
+    scale: float  # the rise
+    energy: float
+    residual: float  # max |F|
 
-    @property
-    def unknown(self) -> Array:
-        return np.asarray(self.all.deflections[0])
-
-    @property
-    def forces(self) -> Array:
-        return np.asarray(self.all.increments[0])
-
-    @property
-    def defect(self) -> Array:
-        return np.asarray(self.all.defects[0])
-
-    @property
-    def energy(self) -> float:
-        return float(self.all.energies[0])
-
-    @property
-    def residual(self) -> float:
-        return float(self.all.residuals[0])
-
-    @property
-    def scale(self) -> float:
-        """The rise."""
-        return float(self.all.rises[0])
+    @classmethod
+    def at(cls, energy: TangentialEnergy, eta: Array, total: Array) -> _State:
+        """The state at eta (n,), moved to the total (1,)."""
+        return cls(*(field[0] for field in evaluate(energy, eta[None], total)))
 
 
 @dataclass(frozen=True)
@@ -132,26 +118,26 @@ class _Shearing:
     unit: ClassVar[str] = "the displacement"
 
     def evaluate(self, unknown: Array) -> _State:
-        return _State(evaluate(self.problem, unknown[None], self.total))
+        return _State.at(self.problem, unknown, self.total)
 
     def direction(self, state: _State, left: float) -> Array:
         return correct(
             self.problem.influence,
             self.problem.shells,
-            np.sqrt(state.all.slopes[0]),
+            np.sqrt(state.slopes),
             state.defect,
             balanced=True,
             tolerance=left,
         ).change
 
     def gradient(self, state: _State) -> Array:
-        return np.asarray(gradients(self.problem, state.all)[0])
+        return gradients(self.problem, state.unknown, state.coupling, state.scale)
 
     def energy_rounding(self, state: _State) -> float:
         return SAFETY * state.energy
 
     def noise(self, state: _State) -> float:
-        return self.problem.influence.rounding(state.forces).negligible(state.all.coupling[0])
+        return self.problem.influence.rounding(state.forces).negligible(state.coupling)
 
     def advice(self, state: _State) -> str:
         return advice(self.problem, float(self.total[0]))

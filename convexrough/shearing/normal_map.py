@@ -68,10 +68,11 @@ def evaluate(energy: TangentialEnergy, eta: Array, totals: Array) -> Iterates:
     return Iterates(eta, u, coupling, slopes, defects, rises, energies, residuals)
 
 
-def gradients(energy: TangentialEnergy, states: Iterates) -> Array:
-    """(m, n) of the energy in the increments, less the multiplier of their sum."""
-    local = np.clip(states.deflections, -energy.ceilings, energy.ceilings)
-    found: Array = local + states.coupling - states.rises[:, None]
+def gradients(
+    energy: TangentialEnergy, deflections: Array, coupling: Array, rises: Array | float
+) -> Array:
+    """Of the energy in the increments, less the multiplier of their sum."""
+    found: Array = np.clip(deflections, -energy.ceilings, energy.ceilings) + coupling - rises
     return found
 
 
