@@ -16,6 +16,7 @@ from convexrough.sphere.smooth import SmoothSphere, smooth
 from convexrough.vector_shear.cones import FrictionConic
 from convexrough.vector_shear.newton import FrictionNewton
 from convexrough.vector_shear.state import VectorShearState, shear_vector
+from convexrough.verdict import Verdict, verify
 from convexrough.version import __version__
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "SmoothSphere",
     "SolverError",
     "VectorShearState",
+    "Verdict",
     "__version__",
     "certify",
     "cycle",
@@ -50,4 +52,5 @@ __all__ = [
     "shear_vector",
     "smooth",
     "solvers",
+    "verify",
 ]

@@ -1,0 +1,181 @@
+"""`verify`: hold what somebody claims of a contact against what is proved.
+
+Loads from anywhere make three claims: these asperities touch (load > floor), the others do not, and
+these are the loads. `certify` judges how near the loads are to the solution and what that proves of
+the solution; here the claimed set itself is held against the proved words. Where the loads are too
+far off for every word to follow from them alone, Newton's method goes on from them to a solution
+nearby, and what is proved of that one names the asperities that are wrong.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.contact import Contact, press
+from convexrough.errors import InputError, SolverError
+from convexrough.influence.coupling import Kind
+from convexrough.normal.certificate import Certificate, certify
+from convexrough.scene.scene import Scene
+
+#: How far the sum of the loads may be off a prescribed total, relatively, unless `within` says so.
+TOTAL_WITHIN = 1e-6
+
+#: A suspect is off by at least this part of what the worst one is off by.
+SUSPICIOUS = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What is proved of a claim. Indices and arrays are those of the scene's asperities.
+
+    loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"
+    within      : loads must be proved this near, in parts of the largest; None: near enough for
+        every word to follow from the loads alone
+    total_prescribed : [force] None under a prescribed approach
+    certificate : of the loads as given, those up to the floor counted as 0
+    solution    : the solution that Newton's method finds from them, with its own certificate; None
+        where the claim holds without, or none is found
+    """
+
+    scene: Scene
+    loads: Array
+    floor: float
+    within: float | None
+    total_prescribed: float | None
+    certificate: Certificate
+    solution: Contact | None = None
+
+    @property
+    def holds(self) -> bool:
+        """The claimed set is proved right, every load is within, and the total agrees."""
+        wrong = len(self.wrongly_open) + len(self.wrongly_loaded) + len(self.undecided)
+        return not wrong and self.loads_hold and self.total_holds
+
+    @cached_property
+    def claimed(self) -> NDArray[np.bool_]:
+        """(n,) who is claimed to touch."""
+        return frozen(self.loads > self.floor)
+
+    @cached_property
+    def status(self) -> NDArray[np.str_]:
+        """(n,) the proved words: "contact", "open" or "undecided"."""
+        words = self.certificate.status
+        if self.solution is None:
+            return words
+        return frozen(np.where(words == "undecided", self.solution.status, words))
+
+    @cached_property
+    def wrongly_open(self) -> Indices:
+        """(m,) claimed open, and proved to touch."""
+        return frozen(np.flatnonzero(~self.claimed & (self.status == "contact")))
+
+    @cached_property
+    def wrongly_loaded(self) -> Indices:
+        """(m,) claimed to touch, and proved to be open."""
+        return frozen(np.flatnonzero(self.claimed & (self.status == "open")))
+
+    @cached_property
+    def undecided(self) -> Indices:
+        """(m,) proved neither to touch nor to be open."""
+        return frozen(np.flatnonzero(self.status == "undecided"))
+
+    @cached_property
+    def load_errors(self) -> Array:
+        """(n,) [force] proved bounds on |load - solution|; infinite where nothing is proved."""
+        ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
+        errors = self.certificate.load_errors + ignored
+        if self.solution is not None:
+            apart = np.abs(self.loads - self.solution.loads)
+            errors = np.minimum(errors, apart + self.solution.certificate.load_errors)
+        return frozen(errors)
+
+    @property
+    def load_error(self) -> float:
+        """The largest of `load_errors`, in parts of the largest load."""
+        largest = float(self.loads.max())
+        return float(self.load_errors.max()) / largest if largest > 0 else np.inf
+
+    @property
+    def loads_hold(self) -> bool:
+        """Every load is proved near enough."""
+        return self.certificate.holds if self.within is None else self.load_error <= self.within
+
+    @property
+    def total_given(self) -> float:
+        """[force] the sum of the loads."""
+        return float(self.loads.sum())
+
+    @property
+    def total_holds(self) -> bool:
+        """The loads add up to a prescribed total, within `within` of it or else 1e-6."""
+        if self.total_prescribed is None:
+            return True
+        missing = abs(self.total_given - self.total_prescribed)
+        return missing <= (self.within or TOTAL_WITHIN) * self.total_prescribed
+
+    @cached_property
+    def suspects(self) -> Indices:
+        """(m,) whose loads are furthest from the solution, likeliest first; none if all hold.
+
+        A single load that is missing, spurious or wrong is the first; two that were exchanged are
+        the first two. Loads that do not add up to the solution's total are also tried in the unit
+        in which they do.
+        """
+        wrong = np.concatenate((self.wrongly_open, self.wrongly_loaded))
+        if self.solution is None or (self.loads_hold and not len(wrong)):
+            return frozen(wrong[np.argsort(-self.load_errors[wrong], kind="stable")])
+        true, bounds = self.solution.loads, self.solution.certificate.load_errors
+        scales = [1.0]
+        if (total := self.total_given) > 0:
+            scales.append(self.solution.load / total)
+        apart = min((np.abs(scale * self.loads - true) for scale in scales), key=np.sum)
+        least = np.maximum(np.where(np.isfinite(bounds), bounds, 0.0), SUSPICIOUS * apart.max())
+        order = np.argsort(-apart, kind="stable")
+        return frozen(order[(apart > least)[order]])
+
+
+def verify(
+    scene: Scene,
+    loads: ArrayLike,
+    *,
+    approach: float | None = None,
+    load: float | None = None,
+    within: float | None = None,
+    floor: float = 0.0,
+    influence: Kind | None = None,
+) -> Verdict:
+    """Hold loads that came from anywhere against the contact law.
+
+    loads : (n,) [force] in the order of the scene's asperities
+    approach [length] or load [force] : what is prescribed, exactly one
+    within : loads must be proved this near, in parts of the largest load
+    floor  : [force] a load up to this counts as 0, and claims that its asperity is open; so does
+        noise below 0 that is no larger
+    influence : how to couple the asperities; None for the cheapest exact way
+
+    Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.
+    """
+    floor = checks.non_negative("floor", floor)
+    within = None if within is None else checks.positive("within", within)
+    given = checks.array("loads", loads, length=len(scene))
+    if (given < -floor).any():
+        first = int(np.argmax(given < -floor))
+        expected = "a load that is not negative; a floor lets noise up to its size count as 0"
+        raise InputError(f"loads[{first}]", found=given[first], expected=expected)
+    prescribed: Any = {"approach": approach, "load": load, "influence": influence}
+    claimed = np.where(given > floor, given, 0.0)
+    certificate = certify(scene, claimed, **prescribed)
+    verdict = Verdict(scene, given, floor, within, load, certificate)
+    if verdict.holds:
+        return verdict
+    with suppress(SolverError):  # without a solution nearby only the loads' own certificate speaks
+        return replace(verdict, solution=press(scene, start=claimed, **prescribed))
+    return verdict

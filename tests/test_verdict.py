@@ -1,0 +1,157 @@
+"""`verify`: wrong claims are found, the guilty are named first, and nothing wrong passes."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import PAPER_APPROACH, operators, paper, scattered
+
+import convexrough as cr
+
+KINDS = ("dropped", "added", "scaled", "swapped")
+
+
+@cache
+def solved(seed: int, control: str) -> tuple[cr.Contact, dict[str, float]]:
+    scene, approach = scattered(seed, 30, 0.2 + 0.02 * (seed % 25), [0.1, 0.3, 0.6][seed % 3])
+    contact = cr.press(scene, approach=approach)
+    if control == "load":
+        contact = cr.press(scene, load=contact.load)
+        return contact, {"load": contact.load}
+    return contact, {"approach": approach}
+
+
+def corrupted(contact: cr.Contact, kind: str, rng: Any) -> tuple[Any, set[int]]:
+    """Loads with one thing wrong, and who is guilty; nobody where that is not possible."""
+    loads, largest = contact.loads.copy(), contact.loads.max()
+    touching, open_ones = np.flatnonzero(loads), np.flatnonzero(loads == 0)
+    if kind == "added":
+        if len(open_ones) == 0:
+            return loads, set()
+        i = rng.choice(open_ones)
+        loads[i] = largest * 10 ** rng.uniform(-5, 0)
+        return loads, {int(i)}
+    if kind == "swapped":
+        i, j = rng.choice(touching, 2, replace=False)
+        loads[[i, j]] = loads[[j, i]]
+        near = abs(loads[i] - loads[j]) < 1e-9 * largest
+        return loads, set() if near else {int(i), int(j)}
+    i = rng.choice(touching)
+    loads[i] *= 0.0 if kind == "dropped" else 10 ** rng.uniform(-2, 2)
+    return loads, {int(i)}
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_single_corruptions(kind: str, control: str) -> None:
+    """Some 1,700 in all: the guilty one is named first, and none passes."""
+    rng, first, tried = np.random.default_rng(5), 0, 0
+    for seed in range(50):
+        contact, given = solved(seed, control)
+        if np.count_nonzero(contact.loads) < 3:
+            continue
+        for _ in range(5):
+            loads, guilty = corrupted(contact, kind, rng)
+            if not guilty:
+                continue
+            verdict = cr.verify(contact.scene, loads, **given, within=1e-6)
+            assert not verdict.holds
+            wrong = (loads > 0) != (contact.loads > 0)
+            assert set(verdict.wrongly_open) <= set(np.flatnonzero(wrong & (loads == 0)))
+            assert set(verdict.wrongly_loaded) <= set(np.flatnonzero(wrong & (loads > 0)))
+            if wrong.any():  # also where no load has to be near
+                assert not cr.verify(contact.scene, loads, **given).holds
+            tried += 1
+            first += int(verdict.suspects[0]) in guilty
+            if kind == "swapped":
+                assert set(verdict.suspects[:2].tolist()) == guilty
+    assert tried > 100
+    assert first >= 0.99 * tried
+
+
+@pytest.mark.parametrize("influence", operators(paper()))
+@pytest.mark.parametrize("index", [36, 7, 0])
+def test_a_dropped_asperity_of_the_paper(influence: Any, index: int) -> None:
+    """It is named, alone, with what the solution has there."""
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    loads = contact.loads.copy()
+    loads[index] = 0.0
+    verdict = cr.verify(paper(), loads, approach=PAPER_APPROACH, influence=influence)
+    assert verdict.wrongly_open.tolist() == verdict.suspects.tolist() == [index]
+    assert verdict.load_errors[index] == pytest.approx(contact.loads[index], rel=1e-6)
+    assert verdict.solution is not None
+    assert not verdict.holds
+
+
+def test_a_small_load_that_is_missing_does_not_pass() -> None:
+    """Where the loads are good enough for every word, the set still has to be that of the words."""
+    passed = 0
+    for seed in range(40):
+        contact, given = solved(seed, "approach")
+        share = contact.loads / contact.loads.max()
+        small = np.flatnonzero((share > 0) & (share < 0.02))
+        for i in small[:1]:
+            loads = contact.loads.copy()
+            loads[i] = 0.0
+            verdict = cr.verify(contact.scene, loads, **given)
+            assert verdict.wrongly_open.tolist() == [i]
+            assert not verdict.holds
+            passed += verdict.certificate.holds
+    assert passed > 5  # whose words alone say that all is well
+
+
+def test_what_is_right_holds() -> None:
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    for within in (None, 1e-6, 1e-11):
+        verdict = cr.verify(paper(), contact.loads, approach=PAPER_APPROACH, within=within)
+        assert verdict.holds
+        assert verdict.solution is None
+        assert len(verdict.suspects) == 0
+    assert verdict.load_error < 1e-11
+    loose = np.round(contact.loads / contact.loads.max(), 4) * contact.loads.max()
+    assert not cr.verify(paper(), loose, approach=PAPER_APPROACH, within=1e-6).holds
+    near = cr.verify(paper(), loose, approach=PAPER_APPROACH, within=1e-3)
+    assert near.holds
+    assert near.load_error < 1e-3
+
+
+def test_totals_in_another_unit() -> None:
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    verdict = cr.verify(paper(), 1e3 * contact.loads, load=contact.load)
+    assert verdict.certificate.holds  # the set is right
+    assert not verdict.total_holds
+    assert not verdict.holds
+    assert verdict.total_given / verdict.total_prescribed == pytest.approx(1e3)
+    assert cr.verify(paper(), contact.loads * (1 + 1e-8), load=contact.load).holds
+    assert not cr.verify(paper(), contact.loads * (1 + 1e-5), load=contact.load).total_holds
+    assert cr.verify(paper(), contact.loads * (1 + 1e-5), load=contact.load, within=1e-4).holds
+
+
+def test_loads_in_another_unit_under_a_prescribed_approach() -> None:
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    verdict = cr.verify(paper(), 1e3 * contact.loads, approach=PAPER_APPROACH)
+    assert not verdict.loads_hold
+    assert not verdict.holds
+
+
+@pytest.mark.parametrize("noise", [1e-20, -1e-20, 1e-17, -1e-17])
+def test_noise_up_to_the_floor_is_open(noise: float) -> None:
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    loads = np.where(contact.loads > 0, contact.loads, noise)
+    assert cr.verify(paper(), loads, approach=PAPER_APPROACH, floor=1e-16).holds
+    if noise < 0:
+        with pytest.raises(cr.InputError, match=r"loads\[\d+\]: .*a floor lets noise"):
+            cr.verify(paper(), loads, approach=PAPER_APPROACH)
+    else:
+        verdict = cr.verify(paper(), loads, approach=PAPER_APPROACH)
+        assert len(verdict.wrongly_loaded) == 24
+
+
+def test_where_nothing_can_be_proved_nothing_holds() -> None:
+    scene, approach = scattered(1, 20, 4.0, 0.5)
+    contact = cr.press(scene, approach=approach)
+    verdict = cr.verify(scene, contact.loads, approach=approach)
+    assert contact.certificate.scope == "none"
+    assert len(verdict.undecided) == len(scene)
+    assert not verdict.holds
