@@ -36,7 +36,7 @@ OPTIONS = {
     "CLARABEL": _Options(("tol_gap_abs", "tol_gap_rel", "tol_feas"), "max_iter", 200),
     "ECOS": _Options(("abstol", "reltol", "feastol"), "max_iters", 200),
     "QOCO": _Options(("abstol", "reltol"), "max_iters", 200),
-    "SCS": _Options(("eps_abs", "eps_rel"), "max_iters", 100_000),
+    "SCS": _Options(("eps_abs", "eps_rel"), "max_iters", 20_000),
 }
 
 
@@ -46,7 +46,7 @@ class ConicCVXPY(ConeSolver):
 
     tolerance      : absolute and relative, of feasibility and of the duality gap, in the problem's
         units; a solver not named in `OPTIONS` keeps its own
-    max_iterations : of the solver; None for 200 of an interior-point method, 100,000 of SCS
+    max_iterations : of the solver; None for 200 of an interior-point method, 20,000 of SCS
     solver         : its name in CVXPY, in any case: `cvxpy.installed_solvers()`
     """
 
