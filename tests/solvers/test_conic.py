@@ -15,7 +15,7 @@ from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, refere
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Conic, ConicCVXPY, Newton, Solution, TooDenseError, conic_cvxpy
-from convexrough.solvers.cone_boxes import Boxes, solve_in
+from convexrough.solvers.cone_boxes import Boxes, judged, solve_in
 from convexrough.solvers.programs import Answer
 
 SOLVERS = [Conic(), ConicCVXPY()]
@@ -276,7 +276,7 @@ def test_a_solver_that_stops_early(solver: Any) -> None:
     if isinstance(few, Conic):  # CVXPY keeps its last iterate to itself
         boxes = Boxes.choose(problem)
         assert stopped.value.iterate is not None
-        assert 0 < stopped.value.iterate.max()
+        assert stopped.value.iterate.max() > 0
         assert (stopped.value.iterate <= boxes.to_candidates(problem, boxes.loads)).all()
     else:
         assert stopped.value.iterate is None
@@ -367,6 +367,15 @@ def test_wrong_loads_are_not_returned(factor: float) -> None:
     solver = Wrong(newton_step=False, factor=factor)
     with pytest.raises(cr.SolverError, match=r"^conic: loads.*; try"):
         solver.solve(problem)
+
+
+@pytest.mark.parametrize("step", [False, True])
+def test_an_approach_that_is_not_a_number_is_not_returned(step: bool) -> None:
+    problem = problem_of(paper(), PAPER_APPROACH, "load")
+    solver, boxes = Conic(newton_step=step), Boxes.choose(problem)
+    answer = solver.answer(problem, boxes)._replace(approach=np.nan)
+    with pytest.raises(cr.SolverError, match=r"^conic.*an approach that are not numbers; try"):
+        judged(solver, problem, boxes, answer)
 
 
 @pytest.mark.parametrize("solver", [Conic, ConicCVXPY])

@@ -16,6 +16,8 @@ from convexrough.solvers.bristles import BristleProgram
 from convexrough.solvers.cone_boxes import Boxes
 from convexrough.solvers.conic import LiftedProgram
 from convexrough.solvers.programs import RawAnswer, run_clarabel, run_osqp
+from convexrough.vector_shear.cones import FrictionConic
+from convexrough.vector_shear.problem import VectorProblem
 
 CONTROLS = ("approach", "load")
 
@@ -126,3 +128,13 @@ def test_too_large_for_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     boxes = replace(Boxes.choose(problem), members=np.arange(10**5))
     with pytest.raises(cr.InputError, match=r"asperities of the cone program: found 1e\+05"):
         LiftedProgram.accept(problem, boxes)
+
+
+def test_a_refused_friction_program_gives_its_last_forces() -> None:
+    contact = cr.press(replace(paper(), friction=0.3), approach=PAPER_APPROACH)
+    problem = VectorProblem.of(contact)
+    total = np.array([0.3, 0.4]) * problem.scalar.loads.sum()
+    with pytest.raises(cr.SolverError, match=r"accepted are 1e-18 and 1e-14; try") as refused:
+        FrictionConic(accepted=1e-18).solve(problem, total)
+    assert refused.value.iterate is not None
+    assert_allclose(refused.value.iterate.sum(axis=0), total, rtol=1e-7)
