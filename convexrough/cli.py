@@ -160,6 +160,8 @@ def verify(scene: Path, loads: Path, as_json: bool) -> int:
 def compare(scene: Path, as_json: bool) -> int:
     """Run every formulation and solver on one scene: agreement, certificate, time.
 
+    The cone program also goes through SCS and QOCO, where they are installed.
+
     Exit status 3 also where a solver refuses the scene, or where two certified answers exclude each
     other: that would be a mistake in the mathematics.
     """

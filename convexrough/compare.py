@@ -9,9 +9,10 @@ package, or a mistake in its code.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from itertools import combinations
 from typing import Literal, NamedTuple
 
@@ -23,12 +24,16 @@ from convexrough.contact import Contact, press
 from convexrough.errors import ConvexroughError, InputError, SolverError
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
+from convexrough.progress import Announce
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
 
 #: How many asperities a message names before it says "and so many more".
 MOST_NAMED = 5
+
+#: Solvers that CVXPY reaches by these names, where packages of these names are installed.
+THROUGH_CVXPY = ("SCS", "QOCO")
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,14 +86,14 @@ def compare(
     approach: float | None = None,
     load: float | None = None,
     solvers: Sequence[solvers.Solver] | None = None,
-    announce: Callable[[str], object] = lambda name: None,
+    announce: Announce | None = None,
 ) -> Comparison:
     """Press on the scene with every solver.
 
     approach [length] or load [force] : what is prescribed, exactly one
     solvers  : settings objects; the default is `every_solver()`. Newton's method is the reference
         and always the first
-    announce : called with the name of each solver before it starts
+    announce : told the name of each solver before it starts
 
     Raises InputError where the reference refuses the scene or what is prescribed. What happens to
     the others is in their entries.
@@ -97,7 +102,8 @@ def compare(
     others = every_solver() if solvers is None else solvers
     entries: list[Entry] = []
     for solver in (reference, *(each for each in others if each != reference)):
-        announce(solver.name)
+        if announce is not None:
+            announce(solver.name)
         known = entries[0].contact if entries else None
         entries.append(_enter(solver, scene, approach, load, known))
     answers = [entry.contact for entry in entries if entry.contact is not None]
@@ -109,13 +115,17 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """Each formulation, and without its final Newton step where it can end with one."""
+    """Each formulation, and without its final Newton step where it can end with one.
+
+    The cone program in CVXPY also through SCS and QOCO, where they are installed.
+    """
     return (
         solvers.Newton(),
         solvers.Conic(),
         solvers.Conic(newton_step=False),
         solvers.ConicCVXPY(),
         solvers.ConicCVXPY(newton_step=False),
+        *(solvers.ConicCVXPY(solver=each) for each in THROUGH_CVXPY if find_spec(each.lower())),
         solvers.BristleQP(),
         solvers.BristleQP(newton_step=False),
     )

@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,7 @@ import convexrough as cr
 from convexrough import compare as comparing
 from convexrough.compare import Answer, compare, contradictions, every_solver
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers import BristleQP, Newton, Solution
+from convexrough.solvers import BristleQP, ConicCVXPY, Newton, Solution
 
 NAMES = [
     "newton",
@@ -25,6 +27,8 @@ NAMES = [
     "conic",
     "conic in CVXPY + Newton step",
     "conic in CVXPY",
+    "conic in CVXPY (SCS) + Newton step",
+    "conic in CVXPY (QOCO) + Newton step",
     "bristles + Newton step",
     "bristles",
 ]
@@ -57,7 +61,9 @@ def test_all_agree(name: str, control: str) -> None:
     assert [entry.solver for entry in comparison.entries] == NAMES
     assert comparison.contradictions == ()
     assert comparison.certified
-    limits = dict(zip(NAMES, [0.0, 1e-12, 1e-7, 1e-12, 1e-7, 3e-9, 0.6 / 64**2], strict=True))
+    limits = dict(
+        zip(NAMES, [0.0, 1e-12, 1e-7, 1e-12, 1e-7, 1e-12, 1e-12, 3e-9, 0.6 / 64**2], strict=True)
+    )
     for entry in comparison.entries:
         assert (entry.outcome, entry.message) == ("answered", "")
         assert entry.disagreement <= limits[entry.solver], entry.solver
@@ -80,6 +86,28 @@ def test_the_reference_comes_first_and_once() -> None:
     names = [entry.solver for entry in comparison.entries]
     assert names == told == ["newton", "bristles + Newton step", "newton"]
     assert len(every_solver()) == len(NAMES)
+
+
+def test_solvers_that_are_not_installed_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    for missing in ("scs", "qoco"):
+        monkeypatch.setitem(sys.modules, missing, None)
+    names = [solver.name for solver in every_solver()]
+    assert names == [name for name in NAMES if "(" not in name]
+    (_, asked) = compare(
+        paper(), approach=PAPER_APPROACH, solvers=[ConicCVXPY(solver="SCS")]
+    ).entries
+    assert asked.outcome == "failed"
+    assert "SCS is not installed; CVXPY finds " in asked.message
+    assert asked.message.endswith("pip install scs, or choose one of these")
+
+
+def test_listing_the_solvers_imports_none() -> None:
+    code = (
+        "import sys; from convexrough.compare import every_solver; "
+        f"assert len(every_solver()) == {len(NAMES)}; "
+        "assert not {'cvxpy', 'scs', 'qoco', 'clarabel', 'osqp'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_a_poor_answer_is_measured_and_contradicts_nothing() -> None:

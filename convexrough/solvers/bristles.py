@@ -33,29 +33,31 @@ bristles: an answer that gets there is refused.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array
-from convexrough.convex.libraries import load_library
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import Announce
 from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.newton import newton_step
+from convexrough.solvers.programs import Answer, QuadraticProgram, RawAnswer, Reduction, run_osqp
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-if TYPE_CHECKING:
-    from scipy.sparse import csc_matrix
+#: The convexity number S of a box that has to be cut to the convex range. The lemma proves the
+#: matrix definite below 1; the hundredth is a heuristic, so that rounding does not undo it.
+LARGEST_S = 0.99
 
-#: The convexity number of a box that has to be cut to the convex range.
-CUT = 0.99
+#: What is taken off the diagonal, as a part of it, where Cholesky decides whether the matrix is
+#: definite. A heuristic: far above what rounding does to a factorisation.
+MARGIN = 0.001
 
-#: A box is not smaller than this part of the largest: of loads as small nothing need be resolved.
+#: A box is not smaller than this part of the largest. A heuristic: of loads as small nothing need
+#: be resolved, and the stiffness of a box, which goes as its load^(-1/3), stays within a hundred.
 SMALLEST_BOX = 1e-6
 
 
@@ -96,72 +98,95 @@ class BristleQP:
         announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates (own units). OSQP starts where it likes: `start` is not used."""
-        program = _assemble(problem, self.bristles)
-        x, multipliers, iterations = _run_osqp(program, self)
-        loads, approach = _read(problem, program, x, multipliers)
-        _refuse_beyond(problem, program, loads, self.name)
+        program = BristleProgram.accept(problem, self.bristles, self.name)
+        loads, approach, iterations = program.through(self._run)
         if self.newton_step:
             last = newton_step(problem, loads)
             loads, approach = last.loads, last.approach
             iterations += last.iterations
-        return Solution(loads, approach, iterations, problem.residual(loads, approach))
+        return Solution.of(problem, loads, approach, iterations)
+
+    def _run(self, program: QuadraticProgram) -> RawAnswer:
+        return run_osqp(program, self.name, self.tolerance, self.max_iterations)
 
 
-class _Program(NamedTuple):
-    """minimise x'Qx / 2 + q'x,  lower <= C x <= upper,  x = (P, e row by row).
+@dataclass(frozen=True, eq=False)
+class BristleProgram(Reduction[QuadraticProgram, RawAnswer, Answer]):
+    """The contact law as rows of bristles, in the variables P and e, row by row.
 
-    box : (n,) loads B;  cut : (n,) whether the convex range ends there
+    m       : bristles of each row
+    solver  : the name that errors give
+    box     : (n,) loads B;  cut : (n,) whether the convex range ends there
+    hessian : (n, n) A + diag(h), positive definite
     """
 
+    problem: NormalProblem
+    m: int
+    solver: str
     box: Array
     cut: NDArray[np.bool_]
-    matrix: csc_matrix  # Q, upper triangle
-    linear: Array
-    constraints: csc_matrix  # C: phi_ij, then sum_j e_ij / m, then the total load if prescribed
-    lower: Array
-    upper: Array
+    hessian: Array
+
+    @classmethod
+    def accept(cls, problem: NormalProblem, m: int, solver: str) -> BristleProgram:
+        n = len(problem)
+        checks.fits_in_memory("asperities of the bristle program", n, 60 * n + 1000 * m)
+        return cls(problem, m, solver, *_convex_box(problem, solver))
+
+    def apply(self) -> QuadraticProgram:
+        """Constrained are phi_ij, then sum_j e_ij / m, then the total load if prescribed."""
+        from scipy import sparse  # 0.1 s to import: only when solving
+
+        problem, n, m = self.problem, len(self.problem), self.m
+        h, depth = problem.stiffness(self.box), hertz.indentation(self.box, problem.coefficients)
+        cell = np.arange(1, m + 1)
+        profile = depth[:, None] * (cell**2 - cell + 1 / 3) / m**2
+        prescribed = problem.offsets + (problem.approach or 0.0)
+
+        rows = sparse.kron(sparse.identity(n), np.ones((m, 1)))  # one entry per bristle
+        bristles = sparse.hstack((rows, sparse.identity(n * m)))
+        means = sparse.hstack((sparse.csc_matrix((n, n)), rows.T / m))
+        blocks = [bristles, means]
+        lower, upper = np.zeros(n * m + n), np.concatenate((np.full(n * m, np.inf), np.zeros(n)))
+        if problem.load is not None:
+            blocks.append(sparse.csc_matrix(np.repeat([1.0, 0.0], [n, n * m])[None]))
+            lower, upper = np.append(lower, problem.load), np.append(upper, problem.load)
+        springs = sparse.diags(np.repeat(h / m, m))
+        return QuadraticProgram(
+            quadratic=sparse.csc_matrix(sparse.block_diag((np.triu(self.hessian), springs))),
+            linear=np.concatenate((profile.mean(axis=1) - prescribed, profile.ravel() / m)),
+            constraints=sparse.csc_matrix(sparse.vstack(blocks)),
+            lower=lower,
+            upper=upper,
+        )
+
+    def invert(self, raw: RawAnswer) -> Answer:
+        """A bristle is in contact where h phi exceeds its multiplier.
+
+        The sign of their difference is decided, where phi itself is 0 to the solver's accuracy
+        only. Raises TooDenseError if the answer lies on a face where the convex range was cut.
+        """
+        problem, n, m = self.problem, len(self.problem), self.m
+        P, e = raw.x[:n], raw.x[n:].reshape(n, m)
+        pushed = raw.multipliers[: n * m].reshape(n, m) * m / problem.stiffness(self.box)[:, None]
+        loads = np.maximum(P[:, None] + e + pushed, 0.0).mean(axis=1)  # pushed is not positive
+        approach = -float(raw.multipliers[-1]) if problem.approach is None else problem.approach
+        if problem.load is not None:
+            loads = loads * (problem.load / loads.sum())
+        if len(beyond := np.flatnonzero(self.cut & (loads >= self.box))):
+            ratios = problem.shells[beyond] / problem.stiffness(loads[beyond], beyond)
+            raise TooDenseError(self.solver, problem.candidates[beyond], ratios, LARGEST_S)
+        return Answer(loads, approach, raw.iterations)
 
 
-def _assemble(problem: NormalProblem, m: int) -> _Program:
-    from scipy import sparse  # 0.1 s to import: only when solving
-
-    n = len(problem)
-    checks.fits_in_memory("asperities of the bristle program", n, 60 * n + 1000 * m)
-    box, cut, hessian = _convex_box(problem)
-    k = problem.coefficients
-    h, depth = problem.stiffness(box), hertz.indentation(box, k)
-    cell = np.arange(1, m + 1)
-    profile = depth[:, None] * (cell**2 - cell + 1 / 3) / m**2
-    prescribed = problem.offsets + (problem.approach or 0.0)
-
-    rows = sparse.kron(sparse.identity(n), np.ones((m, 1)))  # one entry per bristle
-    bristles = sparse.hstack((rows, sparse.identity(n * m)))
-    means = sparse.hstack((sparse.csc_matrix((n, n)), rows.T / m))
-    blocks = [bristles, means]
-    lower, upper = np.zeros(n * m + n), np.concatenate((np.full(n * m, np.inf), np.zeros(n)))
-    if problem.load is not None:
-        blocks.append(sparse.csc_matrix(np.repeat([1.0, 0.0], [n, n * m])[None]))
-        lower, upper = np.append(lower, problem.load), np.append(upper, problem.load)
-    springs = sparse.diags(np.repeat(h / m, m))
-    return _Program(
-        box=box,
-        cut=cut,
-        matrix=sparse.csc_matrix(sparse.block_diag((np.triu(hessian), springs))),
-        linear=np.concatenate((profile.mean(axis=1) - prescribed, profile.ravel() / m)),
-        constraints=sparse.csc_matrix(sparse.vstack(blocks)),
-        lower=lower,
-        upper=upper,
-    )
-
-
-def _convex_box(problem: NormalProblem) -> tuple[Array, NDArray[np.bool_], Array]:
+def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
     """The box of loads, where the convex range cuts it, and A + diag(h): positive definite."""
     ceiling = problem.ceiling
     if problem.load is not None:
         trial = hertz.load(problem.smooth_indentation(), problem.coefficients)
         ceiling = min(ceiling, problem.overhang(trial, problem.influence.apply(trial)))
     with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
-        faces = (2.0 / 3.0 * problem.coefficients * CUT / problem.shells) ** 3
+        faces = (2.0 / 3.0 * problem.coefficients * LARGEST_S / problem.shells) ** 3
     box = problem.bounds(ceiling)
     box = np.maximum(box, np.minimum(faces, SMALLEST_BOX * box.max()))
     if (hessian := _positive_definite(problem, box)) is not None:
@@ -171,86 +196,20 @@ def _convex_box(problem: NormalProblem) -> tuple[Array, NDArray[np.bool_], Array
     if (hessian := _positive_definite(problem, box)) is not None:
         return box, cut, hessian
     raise SolverError(
-        "the matrix is not positive definite within the convex range", solver="bristles"
+        f"the matrix is not positive definite by {MARGIN:g} of its diagonal at S = {LARGEST_S:g}",
+        solver=solver,
+        advice="try solvers.Conic(), or Newton's method",
     )
 
 
 def _positive_definite(problem: NormalProblem, box: Array) -> Array | None:
-    """A + diag(h) on the box; None unless Cholesky finds it so with 0.1 % of its diagonal off."""
+    """A + diag(h) on the box; None unless Cholesky finds it so with MARGIN of its diagonal off."""
     root = np.sqrt(1.0 / problem.stiffness(box))
     scaled = problem.influence.matrix * root * root[:, None]
-    np.fill_diagonal(scaled, 0.999)
+    np.fill_diagonal(scaled, 1.0 - MARGIN)
     try:
         np.linalg.cholesky(scaled)
     except np.linalg.LinAlgError:
         return None
     hessian: Array = problem.influence.matrix + np.diag(problem.stiffness(box))
     return hessian
-
-
-def _run_osqp(program: _Program, settings: BristleQP) -> tuple[Array, Array, int]:
-    """x, the multipliers of the constraints, the iterations."""
-    osqp = _import_osqp(settings.name)
-    solver = osqp.OSQP()
-    try:
-        solver.setup(
-            program.matrix,
-            program.linear,
-            program.constraints,
-            program.lower,
-            program.upper,
-            verbose=False,
-            polishing=True,
-            eps_abs=settings.tolerance,
-            eps_rel=settings.tolerance,
-            max_iter=settings.max_iterations,
-        )
-        result = solver.solve(raise_error=True)
-    except osqp.OSQPException as error:
-        reasons = {int(status): status.name for status in osqp.SolverStatus}
-        reason = reasons.get(error.args[0] if error.args else 0, f"error {error}")
-        if reason == "OSQP_SIGINT":  # OSQP takes the signal for itself
-            raise KeyboardInterrupt from error
-        raise SolverError(
-            f"OSQP did not solve the program: {reason}", solver=settings.name
-        ) from error
-    x, multipliers = np.asarray(result.x), np.asarray(result.y)
-    if not (np.isfinite(x).all() and np.isfinite(multipliers).all()):
-        raise SolverError("OSQP returned numbers that are not finite", solver=settings.name)
-    return x, multipliers, int(result.info.iter)
-
-
-def _import_osqp(solver: str) -> Any:
-    osqp = load_library("osqp", solver)
-    if int(osqp.__version__.split(".")[0]) < 1:
-        raise SolverError(
-            f'OSQP {osqp.__version__} is too old; pip install "osqp>=1.0"', solver=solver
-        )
-    return osqp
-
-
-def _read(
-    problem: NormalProblem, program: _Program, x: Array, multipliers: Array
-) -> tuple[Array, float]:
-    """Loads and approach. A bristle is in contact where h phi exceeds its multiplier.
-
-    The sign of their difference is decided, where phi itself is 0 to the solver's accuracy only.
-    """
-    n = len(problem)
-    h = problem.stiffness(program.box)
-    m = len(x) // n - 1
-    force = (program.constraints @ x)[: n * m].reshape(n, m)
-    pushed = multipliers[: n * m].reshape(n, m) * m / h[:, None]  # not positive
-    loads = np.maximum(force + pushed, 0.0).mean(axis=1)
-    if problem.load is None:
-        assert problem.approach is not None  # exactly one of the two
-        return loads, problem.approach
-    return loads * (problem.load / loads.sum()), -float(multipliers[-1])
-
-
-def _refuse_beyond(problem: NormalProblem, program: _Program, loads: Array, solver: str) -> None:
-    """Raise TooDenseError if the answer lies on a face where the convex range was cut."""
-    beyond = np.flatnonzero(program.cut & (loads >= program.box))
-    if len(beyond):
-        ratios = problem.shells[beyond] / problem.stiffness(loads[beyond], beyond)
-        raise TooDenseError(solver, problem.candidates[beyond], ratios, CUT)

@@ -1,35 +1,40 @@
-"""What every conic solver does around its program: choose the boxes, and judge what comes back.
+"""What every solver of the cone program does around it: choose the boxes, judge what comes back.
 
 The lifted program (docs/theory/exact-cones.md) is exact in boxes 0 <= P_i <= B_i whose convexity
 numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most 21/25 (four cones) or 1 (five). Boxes that
 hold the a priori bounds are used where they are small enough. Elsewhere they are cut, and then
 every cut box must turn out to be wide enough: else the five cones are tried, and then the scene is
-refused.
+refused ("Which box").
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import Announce
 from convexrough.solvers.newton import newton_step
+from convexrough.solvers.programs import Answer
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
 #: An asperity whose a priori bound is this small a part of the largest is left out of the program:
-#: it gets no load, or what the Newton step finds.
+#: it gets no load, or what the Newton step finds. A heuristic, well below what a solver tells from
+#: nothing; were it ever too large, the contact law would say so: it is checked for all asperities.
 NEGLIGIBLE = 1e-12
 
 #: Contact radii of a box over those of the a priori bound, where the convex range allows. On the
 #: bound itself an asperity with no neighbours would sit just at t = 1, where the room it has left
-#: and what presses it on are both nothing: interior points lose half their digits there.
+#: and what presses it on are both nothing: interior points lose half their digits there. That it
+#: is a tenth is a heuristic: any more room would do, at the price of a larger S.
 WIDENED = 1.1
 
 #: After a Newton step: the largest max |g| over |D0| + max |d_i| that is accepted. Where the first
@@ -37,7 +42,8 @@ WIDENED = 1.1
 ACCURATE = 1e-13
 
 #: Without one: the largest max |P - P(D - A P)| over max P that is accepted, in square roots of
-#: the tolerance. An energy within the tolerance fixes the loads to its root.
+#: the tolerance. An energy within the tolerance fixes the loads to its root; the ten is a
+#: heuristic, for the constant that this leaves open.
 ROOTS = 10.0
 
 
@@ -71,7 +77,7 @@ class Boxes:
     loads   : (m,) B_i, the loads at t = 1
     S       : (m,) convexity numbers of the boxes
     cut     : (m,) whether B_i is below the a priori bound
-    five    : five-cone form
+    five    : five-cone form;  limit : the largest S that the form can do
     """
 
     members: Indices
@@ -79,6 +85,7 @@ class Boxes:
     S: Array
     cut: NDArray[np.bool_]
     five: bool
+    limit: float
 
     @classmethod
     def choose(cls, problem: NormalProblem, *, five: bool = False) -> Boxes:
@@ -91,49 +98,72 @@ class Boxes:
             faces = (2.0 / 3.0 * limit * k / problem.shells[members]) ** 3
         loads = np.minimum(WIDENED**3 * bounds, faces)
         S = problem.shells[members] / problem.stiffness(loads, members)
-        return cls(members, loads, S, faces < bounds, five)
-
-    @property
-    def limit(self) -> float:
-        """The largest S that the form can do."""
-        return FIVE_CONES_LIMIT if self.five else FOUR_CONES_LIMIT
+        return cls(members, loads, S, faces < bounds, five, limit)
 
     def energies(self, problem: NormalProblem) -> Array:
         """(m,) k B^(5/3): times (3/5) t^5 - (S/3) t^6 the one-asperity energy h."""
         energies: Array = problem.coefficients[self.members] * np.cbrt(self.loads) ** 5
         return energies
 
+    def to_candidates(self, problem: NormalProblem, loads: Array) -> Array:
+        """(n,) loads (m,) of the members as loads of all candidates, each within its box."""
+        everywhere = np.zeros(len(problem))
+        everywhere[self.members] = np.clip(loads, 0.0, self.loads)
+        return everywhere
 
-class Answer(NamedTuple):
-    """What a conic solver makes of one lifted program."""
-
-    loads: Array  # (m,) of the members
-    approach: float  # the multiplier of the total, under load control
-    iterations: int
-
-
-class ConeSolver(Protocol):
-    """Settings that `solve_in_boxes` needs, and the one thing that solvers do differently."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def tolerance(self) -> float: ...
-    @property
-    def newton_step(self) -> bool: ...
-    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer: ...
+    def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
+        """The error that names the members which are `pressed` on, (m,), 0 where they are not."""
+        which = np.flatnonzero(pressed)
+        indices = problem.candidates[self.members[which]]
+        return TooDenseError(solver, indices, pressed[which], self.limit)
 
 
-def solve_in_boxes(solver: ConeSolver, problem: NormalProblem) -> Solution:
-    """Four cones, and five where a cut box stops an asperity.
+@dataclass(frozen=True)
+class ConeSolver(ABC):
+    """Settings of a solver of the cone program, and what all of them do with its answer.
 
-    Raises TooDenseError where an asperity is stopped by the largest convex box, and SolverError
-    where the contact law is missed.
+    newton_step : end with a step of Newton's method, which takes loads from some 1e-8 of the
+        largest to rounding; a second one where the first leaves more than is accepted
+
+    Accepted is an answer with  max |g_i| <= 1e-13 (|D0| + max |d_i|)  where touching, and overlaps
+    no larger than that where open; without the Newton step, one with
+    max |P - P(D - A P)| <= 10 sqrt(tolerance) max P.  Else SolverError is raised; TooDenseError
+    where the boxes of the convex range do not hold the solution.
     """
-    try:
-        return solve_in(solver, problem, Boxes.choose(problem))
-    except TooDenseError:
-        return solve_in(solver, problem, Boxes.choose(problem, five=True))
+
+    tolerance: float = 1e-9
+    newton_step: bool = True
+
+    def __post_init__(self) -> None:
+        checks.positive("tolerance", self.tolerance)
+
+    @property
+    @abstractmethod
+    def formulation(self) -> str:
+        """The name, but for the Newton step."""
+
+    @abstractmethod
+    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
+        """What the solver makes of the program in these boxes, not yet judged."""
+
+    @property
+    def name(self) -> str:
+        return f"{self.formulation} + Newton step" if self.newton_step else self.formulation
+
+    def solve(
+        self,
+        problem: NormalProblem,
+        start: Array | None = None,
+        announce: Announce | None = None,
+    ) -> Solution:
+        """Loads of the candidates: with four cones, with five where a cut box stops an asperity.
+
+        `start` is not used: cone solvers begin in the middle.
+        """
+        try:
+            return solve_in(self, problem, Boxes.choose(problem))
+        except TooDenseError:
+            return solve_in(self, problem, Boxes.choose(problem, five=True))
 
 
 def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: Boxes) -> Solution:
@@ -141,37 +171,51 @@ def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: Boxes) -> Soluti
     most = float(boxes.loads.sum())
     if problem.load is not None and most <= problem.load:  # no state in the boxes carries as much
         pressed = np.cbrt(problem.load / most) * np.where(boxes.cut, boxes.S, 0.0)
-        raise _too_dense(solver, problem, boxes, pressed)
-    return accept(solver, problem, boxes, solver.answer(problem, boxes))
+        raise boxes.too_dense(problem, solver.name, pressed)
+    return judged(solver, problem, boxes, solver.answer(problem, boxes))
 
 
-def accept(solver: ConeSolver, problem: NormalProblem, boxes: Boxes, answer: Answer) -> Solution:
-    """The answer as the solution of the contact law, if it is that; else the errors above."""
-    if not np.isfinite(answer.loads).all():
-        raise SolverError("loads that are not numbers", solver=solver.name)
-    loads = np.zeros(len(problem))
-    loads[boxes.members] = np.clip(answer.loads, 0.0, boxes.loads)
-    pressed = _pressed_on(problem, boxes, loads, answer.approach)
-    if pressed.any():
-        raise _too_dense(solver, problem, boxes, pressed)
-    return _judged(solver, problem, boxes, loads, answer)
+def judged(solver: ConeSolver, problem: NormalProblem, boxes: Boxes, answer: Answer) -> Solution:
+    """The answer as the solution of the contact law, if it is that; else the errors above.
+
+    The sign of D - A P tells open asperities from lightly loaded ones ("What comes back").
+    """
+    if not (np.isfinite(answer.loads).all() and np.isfinite(answer.approach)):
+        raise SolverError(
+            "loads or an approach that are not numbers",
+            solver=solver.name,
+            advice="try a larger tolerance, or Newton's method",
+        )
+    loads, approach = boxes.to_candidates(problem, answer.loads), answer.approach
+    indentation = approach + problem.offsets - problem.influence.apply(loads)  # D - A P
+    if (pressed := _pressed_on(problem, boxes, loads, indentation)).any():
+        raise boxes.too_dense(problem, solver.name, pressed)
+    alone = hertz.load(indentation, problem.coefficients)  # P(D - A P)
+    loads = np.where(indentation > 0, loads, 0.0)
+    if solver.newton_step:
+        step = _after_newton_step(solver, problem, loads, alone)
+        theta = problem.shells / problem.stiffness(step.loads)
+        if (theta >= FIVE_CONES_LIMIT).any():
+            beyond = np.where(theta < 1, 0.0, theta)[boxes.members]
+            raise boxes.too_dense(problem, solver.name, beyond)
+        return replace(step, iterations=answer.iterations + step.iterations)
+    missed = float(np.abs(loads - alone).max() / max(loads.max(), np.finfo(float).tiny))
+    if not missed <= (accepted := ROOTS * np.sqrt(solver.tolerance)):
+        raise SolverError(
+            f"loads miss the contact law by {missed:.3g} of the largest, accepted {accepted:.3g}",
+            solver=solver.name,
+            advice="try newton_step=True or more iterations",
+            iterate=loads,
+        )
+    return Solution.of(problem, loads, approach, answer.iterations)
 
 
-def _too_dense(
-    solver: ConeSolver, problem: NormalProblem, boxes: Boxes, pressed: Array
-) -> TooDenseError:
-    which = np.flatnonzero(pressed)
-    indices = problem.candidates[boxes.members[which]]
-    return TooDenseError(solver.name, indices, pressed[which], boxes.limit)
-
-
-def _pressed_on(problem: NormalProblem, boxes: Boxes, loads: Array, approach: float) -> Array:
+def _pressed_on(problem: NormalProblem, boxes: Boxes, loads: Array, indentation: Array) -> Array:
     """(m,) contact radius over (pi/2) s_i that an asperity stopped by its box wants; else 0.
 
     What presses an asperity on and the room it has left, as parts of what it has in its box, are
     complementary: one of the two is 0 at the solution, and the smaller one near it.
     """
-    indentation = approach + problem.offsets - problem.influence.apply(loads)  # D - A P
     k = problem.coefficients[boxes.members]
     wanted = indentation[boxes.members] / hertz.indentation(boxes.loads, k)
     room = 1.0 - loads[boxes.members] / boxes.loads
@@ -179,39 +223,25 @@ def _pressed_on(problem: NormalProblem, boxes: Boxes, loads: Array, approach: fl
     return np.where(stopped, boxes.S * np.sqrt(np.maximum(wanted, 1.0)), 0.0)
 
 
-def _judged(
-    solver: ConeSolver, problem: NormalProblem, boxes: Boxes, loads: Array, answer: Answer
+def _after_newton_step(
+    solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
 ) -> Solution:
-    """Tell open asperities from lightly loaded ones, take the Newton step, check the law."""
-    indentation = answer.approach + problem.offsets - problem.influence.apply(loads)
-    alone = hertz.load(indentation, problem.coefficients)  # P(D - A P)
-    loads = np.where(indentation > 0, loads, 0.0)
-    if not solver.newton_step:
-        missed = float(np.abs(loads - alone).max() / max(loads.max(), np.finfo(float).tiny))
-        if not missed <= ROOTS * np.sqrt(solver.tolerance):
-            raise SolverError(
-                f"loads miss the contact law by {missed:.3g} of the largest", solver=solver.name
-            )
-        residual = problem.residual(loads, answer.approach)
-        return Solution(loads, answer.approach, answer.iterations, residual)
+    """One step of Newton's method, or two, from the loads or from what each would bear alone.
 
-    # An error e of the loads is h_i e_i in an asperity's own indentation and A e in D - A P: begin
-    # with the better of the two, so that the step starts close also where a load is almost 0.
+    An error e of the loads is h_i e_i in an asperity's own indentation and A e in D - A P: begin
+    with the better of the two, so that the step starts close also where a load is almost 0.
+    """
     light = problem.stiffness(loads) > problem.influence.apply(np.ones(len(problem)))
-    step, iterations = newton_step(problem, np.where(light, alone, loads)), answer.iterations + 1
-    if not _missed(problem, step) <= ACCURATE:
-        step, iterations = newton_step(problem, step.loads), iterations + 1
-    if not (missed := _missed(problem, step)) <= ACCURATE:
-        raise SolverError(
-            f"residual of {missed:.3g} of the approach after two Newton steps", solver=solver.name
-        )
-    theta = problem.shells / problem.stiffness(step.loads)
-    if (theta >= FIVE_CONES_LIMIT).any():
-        raise _too_dense(solver, problem, boxes, np.where(theta < 1, 0.0, theta)[boxes.members])
-    return replace(step, iterations=iterations)
-
-
-def _missed(problem: NormalProblem, solution: Solution) -> float:
-    """Its residual over |D0| + max |d_i|."""
-    scale = abs(solution.approach) + float(np.abs(problem.offsets).max())
-    return solution.residual / scale
+    loads = np.where(light, alone, loads)
+    for steps in (1, 2):
+        step = newton_step(problem, loads)
+        missed = step.residual / (abs(step.approach) + float(np.abs(problem.offsets).max()))
+        if missed <= ACCURATE:
+            return replace(step, iterations=steps)
+        loads = step.loads
+    raise SolverError(
+        f"residual of {missed:.3g} of the approach after two Newton steps, accepted {ACCURATE:g}",
+        solver=solver.name,
+        advice="try a smaller tolerance, or Newton's method",
+        iterate=loads,
+    )

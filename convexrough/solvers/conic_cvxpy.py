@@ -8,94 +8,96 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from convexrough import checks
 from convexrough.arrays import Array
-from convexrough.convex.libraries import load_library
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.progress import Announce
-from convexrough.solvers.cone_boxes import Answer, Boxes, accept, solve_in_boxes
+from convexrough.solvers.cone_boxes import Boxes, ConeSolver, judged
+from convexrough.solvers.programs import Answer, Reduction, load_library
 from convexrough.solvers.solution import Solution
 
 
-@dataclass(frozen=True)
-class ConicCVXPY:
-    """Settings of the cone program in CVXPY, with Clarabel behind it; as those of `Conic`."""
+class _Options(NamedTuple):
+    """What a solver calls the tolerance and the most steps, and how many it is given."""
 
-    tolerance: float = 1e-9
-    newton_step: bool = True
-    max_iterations: int = 200
+    tolerances: tuple[str, ...]
+    limit: str
+    steps: int
+
+
+#: Of a solver that is not here its own tolerance and limit hold. Clarabel, ECOS and QOCO are
+#: interior-point methods, which end in some twenty steps; SCS is of first order and takes
+#: thousands. All tolerances are of feasibility, of either side, and of the duality gap.
+OPTIONS = {
+    "CLARABEL": _Options(("tol_gap_abs", "tol_gap_rel", "tol_feas"), "max_iter", 200),
+    "ECOS": _Options(("abstol", "reltol", "feastol"), "max_iters", 200),
+    "QOCO": _Options(("abstol", "reltol"), "max_iters", 200),
+    "SCS": _Options(("eps_abs", "eps_rel"), "max_iters", 20_000),
+}
+
+
+@dataclass(frozen=True)
+class ConicCVXPY(ConeSolver):
+    """Settings of the cone program in CVXPY, with any of its solvers for second-order cones.
+
+    tolerance      : absolute and relative, of feasibility and of the duality gap, in the problem's
+        units; a solver not named in `OPTIONS` keeps its own
+    max_iterations : of the solver; None for 200 of an interior-point method, 20,000 of SCS
+    solver         : its name in CVXPY, in any case: `cvxpy.installed_solvers()`
+    """
+
+    max_iterations: int | None = None
+    solver: str = "CLARABEL"
 
     def __post_init__(self) -> None:
-        checks.positive("tolerance", self.tolerance)
+        super().__post_init__()
+        if not isinstance(self.solver, str):
+            raise InputError("solver", found=repr(self.solver), expected="a name that CVXPY knows")
+        object.__setattr__(self, "solver", self.solver.upper())
 
     @property
-    def name(self) -> str:
-        return "conic in CVXPY + Newton step" if self.newton_step else "conic in CVXPY"
-
-    def solve(
-        self,
-        problem: NormalProblem,
-        start: Array | None = None,
-        announce: Announce | None = None,
-    ) -> Solution:
-        """Loads of the candidates. `start` is not used: interior points begin in the middle."""
-        return solve_in_boxes(self, problem)
+    def formulation(self) -> str:
+        default = self.solver == "CLARABEL"
+        return "conic in CVXPY" if default else f"conic in CVXPY ({self.solver})"
 
     def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
-        """What Clarabel makes of the program in these boxes, not yet judged."""
-        return self._model(problem, boxes).answer()
+        """What the solver makes of the program in these boxes, not yet judged."""
+        return LiftedModel.accept(self, problem, boxes).answer()
 
     def model(self, problem: NormalProblem, *, five: bool = False) -> LiftedModel:
         """The program itself, with four cones or five: to read, to change, to solve again."""
-        return self._model(problem, Boxes.choose(problem, five=five))
+        return LiftedModel.accept(self, problem, Boxes.choose(problem, five=five))
 
-    def _model(self, normal: NormalProblem, boxes: Boxes) -> LiftedModel:
+    def run(self, program: Any) -> Any:
+        """A cvxpy.Problem, solved."""
         cp = load_library("cvxpy", self.name)
-
-        def rotated(x: Any, y: Any, w: Any) -> Any:
-            """x y >= w^2 with x, y >= 0."""
-            return cp.SOC(x + y, cp.vstack([x - y, 2 * w]), axis=0)
-
-        i, n = boxes.members, len(boxes.members)
-        checks.fits_in_memory("asperities of the cone program in CVXPY", n, 400, power=2)
-        B, S, e = boxes.loads, boxes.S, boxes.energies(normal)
-        M = normal.influence.matrix[np.ix_(i, i)] + np.diag(normal.shells[i])
-        d = normal.offsets[i]
-        D0 = cp.Parameter(name="D0")
-        D0.value = normal.ceiling if normal.approach is None else normal.approach
-
-        p, y1, y2, y3, y4, y5, z = (
-            cp.Variable(n, name=name) for name in ("p", "y1", "y2", "y3", "y4", "y5", "z")
-        )
-        energy = (
-            (e * (3 / 5 - S / 3)) @ y5
-            + (e * S / 3) @ z
-            + cp.quad_form(p, cp.psd_wrap(M)) / 2  # its own check is known to fail on valid M
-            - (D0 + d) @ p
-        )
-        link = p == cp.multiply(B, y3)
-        cones = [
-            rotated(y2 - y3, y4 - y5, y3 - y4),
-            rotated(y3, y5, y4),
-            rotated(y3 - y4, z, y4 - y5),
-        ]
-        if boxes.five:
-            cones += [rotated(1 - y1, y2 - y3, y1 - y2), rotated(y1 - y2, y3 - y4, y2 - y3)]
-        else:
-            cones += [rotated(np.ones(n), y4, y2)]
-        total = None if normal.load is None else cp.sum(p) == normal.load
-        constraints = [link, *cones] if total is None else [link, *cones, total]
-        program = cp.Problem(cp.Minimize(energy), constraints)
-        return LiftedModel(self, normal, boxes, program, D0, p, link, total)
+        options: dict[str, float] = {}
+        if names := OPTIONS.get(self.solver):
+            steps = names.steps if self.max_iterations is None else self.max_iterations
+            options = dict.fromkeys(names.tolerances, self.tolerance) | {names.limit: steps}
+        advice = "try more max_iterations, a larger tolerance, or another solver"
+        try:
+            with warnings.catch_warnings():  # whether it is accurate is judged by the contact law
+                warnings.filterwarnings("ignore", message="Solution may be inaccurate")
+                program.solve(solver=self.solver, **options)
+        except cp.error.SolverError as error:
+            what, installed = str(error), cp.installed_solvers()
+            if self.solver not in installed:
+                what = f"{self.solver} is not installed; CVXPY finds {', '.join(installed)}"
+                advice = f"pip install {self.solver.lower()}, or choose one of these"
+            raise SolverError(what, solver=self.name, advice=advice) from error
+        if program.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+            what = f"{self.solver.lower()} stopped with {program.status}"
+            raise SolverError(what, solver=self.name, advice=advice)
+        return program
 
 
 @dataclass(frozen=True, eq=False)
-class LiftedModel:
+class LiftedModel(Reduction[Any, Any, Answer]):
     """A compiled program: CVXPY objects, in the problem's own units.
 
     program  : cvxpy.Problem
@@ -114,6 +116,39 @@ class LiftedModel:
     link: Any
     total: Any
 
+    @classmethod
+    def accept(cls, settings: ConicCVXPY, normal: NormalProblem, boxes: Boxes) -> LiftedModel:
+        """Equation 1 of docs/theory/exact-cones.md; with five cones, 1 and 2."""
+        cp = load_library("cvxpy", settings.name)
+        i, n = boxes.members, len(boxes.members)
+        checks.fits_in_memory("asperities of the cone program in CVXPY", n, 400, power=2)
+        B, S, e = boxes.loads, boxes.S, boxes.energies(normal)
+        M = normal.influence.matrix[np.ix_(i, i)] + np.diag(normal.shells[i])
+        d = normal.offsets[i]
+        D0 = cp.Parameter(name="D0")
+        D0.value = normal.ceiling if normal.approach is None else normal.approach
+
+        p, *lift = (cp.Variable(n, name=name) for name in ("p", *_LIFT))
+        _, _, y3, _, y5, z = lift
+        energy = (
+            (e * (3 / 5 - S / 3)) @ y5
+            + (e * S / 3) @ z
+            + cp.quad_form(p, cp.psd_wrap(M)) / 2  # its own check is known to fail on valid M
+            - (D0 + d) @ p
+        )
+        link = p == cp.multiply(B, y3)
+        total = None if normal.load is None else cp.sum(p) == normal.load
+        constraints = [link, *_cones(cp, *lift, five=boxes.five)]
+        program = cp.Problem(cp.Minimize(energy), constraints + ([] if total is None else [total]))
+        return cls(settings, normal, boxes, program, D0, p, link, total)
+
+    def apply(self) -> Any:
+        return self.program
+
+    def invert(self, raw: Any) -> Answer:
+        """CVXPY leaves its answer in its own variables."""
+        return Answer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
+
     def solve(self, approach: float | None = None) -> Solution:
         """Solve, at another approach if given (own units; no larger than the boxes are made for).
 
@@ -126,30 +161,11 @@ class LiftedModel:
                 raise InputError("approach", found=approach, expected=expected)
             self.D0.value = approach
             normal = replace(normal, approach=approach)
-        return accept(self.settings, normal, self.boxes, self.answer())
+        return judged(self.settings, normal, self.boxes, self.answer())
 
     def answer(self) -> Answer:
-        """Run Clarabel on the program as it stands."""
-        settings, cp = self.settings, load_library("cvxpy", self.settings.name)
-        tolerance = settings.tolerance
-        try:
-            with warnings.catch_warnings():  # whether it is accurate is judged by the contact law
-                warnings.filterwarnings("ignore", message="Solution may be inaccurate")
-                self.program.solve(
-                    solver=cp.CLARABEL,
-                    max_iter=settings.max_iterations,
-                    tol_gap_abs=tolerance,
-                    tol_gap_rel=tolerance,
-                    tol_feas=tolerance,
-                )
-        except cp.error.SolverError as error:
-            if cp.CLARABEL not in cp.installed_solvers():
-                load_library("clarabel", settings.name)
-            raise SolverError(f"{error}", solver=settings.name) from error
-        if self.program.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-            raise SolverError(f"clarabel stopped with {self.program.status}", solver=settings.name)
-        iterations = int(self.program.solver_stats.num_iters or 0)
-        return Answer(self.loads, self.approach, iterations)
+        """Run the solver on the program as it stands."""
+        return self.through(self.settings.run)
 
     @property
     def variables(self) -> dict[str, Any]:
@@ -171,3 +187,22 @@ class LiftedModel:
         """(m,) of the last solution, from the multiplier of the link."""
         gaps: Array = np.maximum(-self.link.dual_value, 0.0)
         return gaps
+
+
+_LIFT = ("y1", "y2", "y3", "y4", "y5", "z")
+
+
+def _cones(cp: Any, y1: Any, y2: Any, y3: Any, y4: Any, y5: Any, z: Any, *, five: bool) -> Any:
+    """The cones of equations 1 and 2, x y >= w^2 with x, y >= 0."""
+
+    def rotated(x: Any, y: Any, w: Any) -> Any:
+        return cp.SOC(x + y, cp.vstack([x - y, 2 * w]), axis=0)
+
+    cones = [
+        rotated(y2 - y3, y4 - y5, y3 - y4),
+        rotated(y3, y5, y4),
+        rotated(y3 - y4, z, y4 - y5),
+    ]
+    if five:
+        return [*cones, rotated(1 - y1, y2 - y3, y1 - y2), rotated(y1 - y2, y3 - y4, y2 - y3)]
+    return [*cones, rotated(np.ones(y4.size), y4, y2)]

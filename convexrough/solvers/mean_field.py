@@ -13,14 +13,15 @@ from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
-#: At most so many rings, and of so many asperities at least.
+#: At most so many rings, and of so many asperities at least: heuristics, good enough for a start.
 RINGS, LEAST = 128, 150
 
 #: Of more asperities than about this, only every so many-eth is looked at.
 SAMPLE = 100_000
 
 #: What an asperity misses of the even load around it, which it does not cause itself: the
-#: potential of a disc of its share of the area, times this. Exact for square and hexagonal arrays.
+#: potential of a disc of its share of the area, times this. By Ewald's sums 1.1002 for square and
+#: 1.1061 for hexagonal arrays; for any other layout a heuristic, which a start can bear.
 OWN_SHARE = 1.10
 
 

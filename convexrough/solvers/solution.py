@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import Announce
@@ -21,6 +23,12 @@ class Solution:
     approach: float
     iterations: int
     residual: float
+
+    @classmethod
+    def of(cls, problem: NormalProblem, loads: Array, approach: float, iterations: int) -> Solution:
+        """With its residual from the problem, infinite where that is undefined."""
+        residual = problem.residual(loads, approach)
+        return cls(loads, approach, iterations, np.inf if np.isnan(residual) else residual)
 
 
 class Solver(Protocol):

@@ -22,15 +22,18 @@ the elastic estimate of |q_i| / P_i, or 1; so the numbers are about 1 under any 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
-from convexrough.convex.libraries import load_library
 from convexrough.errors import SolverError
+from convexrough.solvers.programs import ConeProgram, RawAnswer, Reduction, run_clarabel
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 
 class _Lift(NamedTuple):
@@ -82,8 +85,17 @@ FIVE = _Lift(
 #: x y >= w^2 with x, y >= 0 is the second-order cone  x + y >= || (x - y, 2 w) ||.
 _SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 
-#: Below this part of gross sliding the state is elastic, to more digits than the cones give.
+#: Below this part of gross sliding the state is elastic, proportional to T, to more digits than the
+#: cones give. A heuristic: the state at this part is solved for, and scaled.
 ELASTIC = 1e-9
+
+#: Accepted residuals, slips included, over accepted energies. A heuristic: at the default both say
+#: the same, as an energy within a part of the least fixes forces to the root of that part.
+SLIPS = 1e4
+
+#: Most of the way to the boundary of the cones that a step of Clarabel may go. Short steps are an
+#: order more accurate; a few problems need long ones. Heuristics, tried one after the other.
+STEPS = (0.9, 0.99)
 
 
 @dataclass(frozen=True)
@@ -102,123 +114,100 @@ class FrictionConic:
 
     def solve(self, problem: VectorProblem, total: Array) -> VectorState:
         """The state of a total increment (2,), |T| < sum P (own units)."""
-        clarabel = load_library("clarabel", f"friction ({self.name})")
-        shares = _shares(problem)
-        # Below, the state is elastic: proportional to T to more digits than the cones give.
-        limit = ELASTIC * problem.scalar.loads.sum()
-        scale = min(float(np.hypot(*total)) / limit, 1.0)
-        program = _Program.of(problem, shares, total / scale)
-        data = program.data(clarabel)
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = self.tolerance
-        for fraction in (0.9, 0.99):  # short steps are an order more accurate; a few need long ones
-            settings.max_step_fraction = fraction
-            solution = clarabel.DefaultSolver(*data, settings).solve()
-            answer, multipliers = np.array(solution.x), np.array(solution.z)
-            if not (np.isfinite(answer).all() and np.isfinite(multipliers).all()):
-                raise SolverError(
-                    "the answer of clarabel is not a number", solver=f"friction ({self.name})"
-                )
-            q, rise, slips = program.read(answer, multipliers)
-            state = VectorState(total / scale, q, rise, slips, int(solution.iterations))
-            energy = problem.energy(q, problem.couple(q))
+        scale = min(float(np.hypot(*total)) / (ELASTIC * problem.scalar.loads.sum()), 1.0)
+        program = FrictionProgram.accept(problem, total / scale)
+        data, solver = program.apply(), f"friction ({self.name})"
+        for step in STEPS:
+            raw = run_clarabel(data, solver, self.tolerance, max_step_fraction=step)
+            state = program.invert(raw)
+            energy = problem.energy(state.increments, problem.couple(state.increments))
             gap, residual = problem.duality_gap(state) / energy, problem.residual(state)
-            if gap <= self.accepted and residual <= 1e4 * self.accepted:
+            if gap <= self.accepted and residual <= SLIPS * self.accepted:
+                q, rise, slips = state.increments, state.rise, state.slips
                 return VectorState(total, scale * q, scale * rise, scale * slips, state.iterations)
         raise SolverError(
-            f"clarabel stopped after {solution.iterations} steps with "
-            f"{solution.status}, at an energy proved to be within {gap:.3g} of the least, "
-            f"relatively, and a residual of {residual:.3g}; accepted are {self.accepted:g} and "
-            f"{1e4 * self.accepted:g}",
-            solver=f"friction ({self.name})",
+            f"clarabel stopped after {raw.iterations} steps with {raw.word}, at an energy proved "
+            f"to be within {gap:.3g} of the least, relatively, and a residual of {residual:.3g}; "
+            f"accepted are {self.accepted:g} and {SLIPS * self.accepted:g}",
+            solver=solver,
+            advice="try a larger `accepted`, or FrictionNewton()",
+            iterate=scale * state.increments,
         )
 
 
-def _shares(problem: VectorProblem) -> Array:
-    """(n,) S, in the range of the cones; or an error that says who is too dense."""
-    shares = problem.shift.shares
-    if shares.max() <= FIVE_CONES_LIMIT:
-        return shares
-    touching = problem.scalar.touching
-    worst = np.argsort(-problem.crowding)[:5]
-    named = ", ".join(f"{touching[i]} ({problem.crowding[i]:.4g})" for i in worst)
-    raise SolverError(
-        f"too dense for a convex program: the least shift of the tangential "
-        f"kernel is {shares.max():.4g} of the local stiffness, and at most 1 is convex. Most "
-        f"crowded, by their indices, with their contact radii over (pi/4) times the distance to "
-        f"the nearest neighbour: {named}. Use a smaller load, sharper tips, or asperities further "
-        f"apart",
-        solver="friction (conic)",
-    )
-
-
 @dataclass(frozen=True, eq=False)
-class _Program:
+class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     """The program, with its numbers about 1.
 
-    lift   : its cones;  total : (2,) T;  shares : (n,) S
+    The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., and then the lifts, each
+    asperity's together.
+
+    total  : (2,) T
+    lift   : its cones
     small  : (n,) epsilon
     energy : what the energy is counted in
     """
 
     problem: VectorProblem
-    lift: _Lift
     total: Array
-    shares: Array
+    lift: _Lift
     small: Array
     energy: float
 
     @classmethod
-    def of(cls, problem: VectorProblem, shares: Array, total: Array) -> _Program:
-        scalar = problem.scalar
+    def accept(cls, problem: VectorProblem, total: Array) -> FrictionProgram:
+        """Raises SolverError where S is above the range of the cones, and says who is too dense."""
+        scalar, shares = problem.scalar, problem.shift.shares
+        if shares.max() > FIVE_CONES_LIMIT:
+            raise _too_dense(problem)
         elastic = np.hypot(*total) * scalar.elastic / scalar.loads
         small = np.clip(elastic, 0.01 * elastic.max(), 1.0)
         energy = float((scalar.loads * scalar.ceilings * small**2).max())
         lift = FOUR if shares.max() <= FOUR_CONES_LIMIT else FIVE
-        return cls(problem, lift, total, shares, small, energy)
+        return cls(problem, total, lift, small, energy)
 
     @property
     def force(self) -> float:
         """What the total is counted in."""
         return float(np.hypot(*self.total))
 
-    def data(self, clarabel: Any) -> tuple[Any, ...]:
-        """P, q, A, b, cones of  minimise (1/2) x'P x + q'x,  A x + s = b,  s in the cones.
+    def apply(self) -> ConeProgram:
+        rows = self._rows()
+        constant = np.concatenate((self.total / self.force, rows[:, :, 0].ravel()))
+        return ConeProgram(*self._objective(), self._constraints(rows), constant, equalities=2)
 
-        The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., and then the lifts, each
-        asperity's together.
-        """
+    def _objective(self) -> tuple[csc_matrix, Array]:
+        """(1/2) q'Mq in q / (epsilon P), and the local energy in the lifts."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
-        n, P, S = len(problem), problem.scalar.loads, self.shares[:, None]
-        size = len(lift.orders) - 1
+        n, P, S = len(problem), problem.scalar.loads, problem.shift.shares[:, None]
         unit = np.repeat(self.small * P, 2)
         M = problem.kernel.copy()
         M[np.diag_indices(2 * n)] += np.repeat(problem.shift.values, 2)
         upper = sparse.csc_matrix(np.triu(M * (unit / self.energy) * unit[:, None]))
-        quadratic = sparse.csc_matrix(
-            sparse.block_diag((upper, sparse.csc_matrix((size * n, size * n))))
-        )
+        nothing = sparse.csc_matrix(((len(lift.orders) - 1) * n,) * 2)
         counted = (P * problem.scalar.ceilings / self.energy)[:, None] * small**lift.orders
         lifted = (counted * (lift.energy[0] + S * lift.energy[1]))[:, 1:]
         linear = np.concatenate((np.zeros(2 * n), lifted.ravel()))
+        return sparse.csc_matrix(sparse.block_diag((upper, nothing))), linear
 
-        rows = self._rows()
+    def _constraints(self, rows: Array) -> csc_matrix:
+        """sum q = T, counted in |T|, and then the cones of every asperity."""
+        from scipy import sparse
+
+        n, _, variables = rows.shape
         vectors = np.zeros((rows.shape[1], 2))
         vectors[[1, 2], [0, 1]] = 1.0
         coefficients = (np.ascontiguousarray(rows[:, :, 1:]), np.arange(n), np.arange(n + 1))
-        balance = sparse.kron((self.small * P)[None] / self.force, sparse.identity(2))
+        weights = (self.small * self.problem.scalar.loads)[None] / self.force
+        balance = sparse.kron(weights, sparse.identity(2))
         powers = sparse.csc_matrix(sparse.bsr_matrix(coefficients))
         each = sparse.hstack([sparse.csc_matrix(sparse.kron(sparse.identity(n), vectors)), powers])
-        totals = sparse.hstack([balance, sparse.csc_matrix((2, size * n))])
+        totals = sparse.hstack([balance, sparse.csc_matrix((2, (variables - 1) * n))])
         constraints = sparse.csc_matrix(sparse.vstack([totals, -each]))
         constraints.eliminate_zeros()
-        constant = np.concatenate((self.total / self.force, rows[:, :, 0].ravel()))
-        count = n * (rows.shape[1] // 3)
-        cones = [clarabel.ZeroConeT(2), *[clarabel.SecondOrderConeT(3)] * count]
-        return quadratic, linear, constraints, constant, cones
+        return constraints
 
     def _rows(self) -> Array:
         """(n, rows, k) the cones of every asperity, three rows each:  m / P >= |(x, y)|  first.
@@ -234,7 +223,7 @@ class _Program:
         friction[:, 0] = lift.share * small ** (lift.orders - 1)
         return np.concatenate((friction, rows), axis=1)
 
-    def read(self, answer: Array, multipliers: Array) -> tuple[Array, Array, Array]:
+    def invert(self, raw: RawAnswer) -> VectorState:
         """Forces, rigid displacement and slips from the answer and its multipliers.
 
         An interior point leaves an asperity that slides a little short of P, and one that does not
@@ -243,12 +232,27 @@ class _Program:
         problem = self.problem
         n, P, ceilings = len(problem), problem.scalar.loads, problem.scalar.ceilings
         unit = self.small * P
-        q = answer[: 2 * n].reshape(n, 2) * unit[:, None]
+        q = raw.x[: 2 * n].reshape(n, 2) * unit[:, None]
         size = np.hypot(*q.T)
-        rise = -multipliers[:2] * self.energy / self.force
-        limit = multipliers[2:].reshape(n, -1)[:, 0] * self.energy / unit  # of |q_i| <= m_i
+        rise = -raw.multipliers[:2] * self.energy / self.force
+        limit = raw.multipliers[2:].reshape(n, -1)[:, 0] * self.energy / unit  # of |q_i| <= m_i
         slip = limit - (ceilings - problem.shift.values * P)  # where |q_i| = P_i
         left = ceilings - problem.scalar.deflections(np.minimum(size, P))
         sliding = slip > left
         q = along(np.where(sliding, P, np.minimum(size, P)), q, size)
-        return q, rise, along(np.where(sliding, slip, 0.0), q, np.hypot(*q.T))
+        slips = along(np.where(sliding, slip, 0.0), q, np.hypot(*q.T))
+        return VectorState(self.total, q, rise, slips, raw.iterations)
+
+
+def _too_dense(problem: VectorProblem) -> SolverError:
+    touching = problem.scalar.touching
+    worst = np.argsort(-problem.crowding)[:5]
+    named = ", ".join(f"{touching[i]} ({problem.crowding[i]:.4g})" for i in worst)
+    return SolverError(
+        f"too dense for a convex program: the least shift of the tangential kernel is "
+        f"{problem.shift.shares.max():.4g} of the local stiffness, and at most 1 is convex. Most "
+        f"crowded, by their indices, with their contact radii over (pi/4) times the distance to "
+        f"the nearest neighbour: {named}",
+        solver="friction (conic)",
+        advice="use a smaller load, sharper tips, or asperities further apart",
+    )

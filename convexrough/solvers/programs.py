@@ -1,0 +1,162 @@
+"""Programs in standard form: how a problem becomes one, who solves it, and the way back.
+
+Clarabel, OSQP and what CVXPY knows know no contact. They are reached by a `Reduction`, as those of
+cvxpy (Agrawal, Verschueren, Diamond and Boyd, J. Control Decis. 5 (2018) 42), and run by a few
+lines each: data in, raw answer out. docs/how-to/add-a-solver.md adds another.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.errors import SolverError
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+
+Data = TypeVar("Data")
+Raw = TypeVar("Raw")
+Found = TypeVar("Found")
+
+
+class Reduction(ABC, Generic[Data, Raw, Found]):
+    """One problem as a program; its fields are what the way back needs.
+
+    A class method `accept(problem, ...)` makes it, or raises: an error that names the asperities
+    for which the program is not exact, or InputError where it does not fit in memory.
+    """
+
+    @abstractmethod
+    def apply(self) -> Data:
+        """The data of the program."""
+
+    @abstractmethod
+    def invert(self, raw: Raw) -> Found:
+        """What the problem asks for, in its order and units; residuals come from the problem."""
+
+    def through(self, run: Callable[[Data], Raw]) -> Found:
+        """What the problem asks for, by way of a solver."""
+        return self.invert(run(self.apply()))
+
+
+class ConeProgram(NamedTuple):
+    """minimise (1/2) x'P x + q'x,  A x + s = b.
+
+    The first entries of s are 0, and all that follow lie three by three in second-order cones,
+    s_1 >= || (s_2, s_3) ||.
+    """
+
+    quadratic: csc_matrix  # P, upper triangle
+    linear: Array  # q
+    constraints: csc_matrix  # A
+    constant: Array  # b
+    equalities: int  # how many entries of s are 0
+
+    @property
+    def cones(self) -> int:
+        return (len(self.constant) - self.equalities) // 3
+
+
+class QuadraticProgram(NamedTuple):
+    """minimise (1/2) x'P x + q'x,  lower <= A x <= upper."""
+
+    quadratic: csc_matrix  # P, upper triangle
+    linear: Array  # q
+    constraints: csc_matrix  # A
+    lower: Array
+    upper: Array
+
+
+class RawAnswer(NamedTuple):
+    """What a solver says of a program in standard form."""
+
+    x: Array
+    multipliers: Array  # of the rows of A
+    iterations: int
+    word: str  # on how it ended
+
+
+class Answer(NamedTuple):
+    """What a program says of a normal problem, not yet judged."""
+
+    loads: Array  # of its members, in the problem's order and units
+    approach: float  # the multiplier of the total, under load control
+    iterations: int
+
+
+def load_library(package: str, solver: str) -> Any:
+    """The module `package`, imported when first used; else a SolverError of `solver`."""
+    try:
+        return import_module(package)
+    except ImportError as error:
+        raise SolverError(
+            f"needs the package {package}, which cannot be imported ({error})",
+            solver=solver,
+            advice=f"pip install {package}",
+        ) from error
+
+
+def run_clarabel(
+    program: ConeProgram, solver: str, tolerance: float, **settings: object
+) -> RawAnswer:
+    """Clarabel, an interior-point method. `settings` are others of its own, by its names."""
+    clarabel = load_library("clarabel", solver)
+    chosen = clarabel.DefaultSettings()
+    chosen.verbose = False
+    chosen.tol_gap_abs = chosen.tol_gap_rel = chosen.tol_feas = tolerance
+    for name, value in settings.items():
+        setattr(chosen, name, value)
+    *data, equalities = program
+    cones = [clarabel.ZeroConeT(equalities), *[clarabel.SecondOrderConeT(3)] * program.cones]
+    found = clarabel.DefaultSolver(*data, cones, chosen).solve()
+    raw = RawAnswer(np.array(found.x), np.array(found.z), int(found.iterations), str(found.status))
+    return _of_numbers(raw, "Clarabel", solver)
+
+
+def run_osqp(
+    program: QuadraticProgram, solver: str, tolerance: float, max_iterations: int
+) -> RawAnswer:
+    """OSQP, a first-order method that then solves the equations of the active set (polishing)."""
+    osqp = load_library("osqp", solver)
+    if int(osqp.__version__.split(".")[0]) < 1:
+        what = f"OSQP {osqp.__version__} is too old"
+        raise SolverError(what, solver=solver, advice='pip install "osqp>=1.0"')
+    method = osqp.OSQP()
+    try:
+        method.setup(
+            *program,
+            verbose=False,
+            polishing=True,
+            eps_abs=tolerance,
+            eps_rel=tolerance,
+            max_iter=max_iterations,
+        )
+        found = method.solve(raise_error=True)
+    except osqp.OSQPException as error:
+        reasons = {int(status): status.name for status in osqp.SolverStatus}
+        reason = reasons.get(error.args[0] if error.args else 0, f"error {error}")
+        if reason == "OSQP_SIGINT":  # OSQP takes the signal for itself
+            raise KeyboardInterrupt from error
+        raise SolverError(
+            f"OSQP did not solve the program: {reason}",
+            solver=solver,
+            advice="try more max_iterations or a larger tolerance",
+        ) from error
+    raw = RawAnswer(np.asarray(found.x), np.asarray(found.y), int(found.info.iter), "solved")
+    return _of_numbers(raw, "OSQP", solver)
+
+
+def _of_numbers(raw: RawAnswer, library: str, solver: str) -> RawAnswer:
+    if not (np.isfinite(raw.x).all() and np.isfinite(raw.multipliers).all()):
+        raise SolverError(
+            f"the answer of {library} is not a number, after {raw.iterations} steps ({raw.word})",
+            solver=solver,
+            advice="try a larger tolerance, or Newton's method",
+        )
+    return raw
