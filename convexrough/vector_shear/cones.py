@@ -141,14 +141,15 @@ def _shares(problem: VectorProblem) -> Array:
     if shares.max() <= FIVE_CONES_LIMIT:
         return shares
     touching = problem.scalar.touching
-    worst = np.argsort(-problem.crowding)[:5]
-    named = ", ".join(f"{touching[i]} ({problem.crowding[i]:.4g})" for i in worst)
+    numbers = problem.convexity_numbers
+    worst = np.argsort(-numbers)[:5]
+    named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
     raise SolverError(
         f"too dense for a convex program: the least shift of the tangential "
-        f"kernel is {shares.max():.4g} of the local stiffness, and at most 1 is convex. Most "
-        f"crowded, by their indices, with their contact radii over (pi/4) times the distance to "
-        f"the nearest neighbour: {named}. Use a smaller load, sharper tips, or asperities further "
-        f"apart",
+        f"kernel is {shares.max():.4g} of the local stiffness, and at most 1 is convex. Largest "
+        f"convexity numbers, contact radii over (pi/4) times the distance to the nearest "
+        f"neighbour, by their indices: {named}. Use a smaller load, sharper tips, or asperities "
+        f"further apart",
         solver="friction (conic)",
     )
 

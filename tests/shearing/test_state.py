@@ -303,7 +303,7 @@ def test_doubt_about_the_loads_is_counted(
     weights = np.where(known.sure, known.stiffness, 0.0)
     distance = np.sqrt(np.sum(weights * (missed / problem.units.force) ** 2))
     assert distance <= known.distance * (1 + 1e-9) + 1e-13
-    assert known.scaled(np.ones(len(problem))) <= known.distance * (1 + 1e-9)
+    assert known.image_norm(np.ones(len(problem))) <= known.distance * (1 + 1e-9)
     state = cr.shear(doubtful, force=fraction * FRICTION * contact.load)
     certificate = state.certificate
     for i, true in enumerate(truth.forces):
