@@ -4,10 +4,10 @@ The proofs are those of docs/theory/shear.md, "Proof" (by convexity, in six step
 gross sliding" (by exhaustion). All bounds shrink with the shear force. Arrays are (m, n): m states
 of n loaded asperities. In the letters of that page, all displacements over c_t f:
 
-    loads P, errors b, ceilings k P^(2/3)    increments u, used t = |u| / P, totals T
+    loads P, errors b, ceilings k P^(2/3)     increments u, used t = |u| / P, totals T
     stiffness h of H, convexity_number theta  rises Delta, available Delta - A u
-    shifts tau                                local k P^(2/3) phi(t), signed as u
-    carried || t (P* - P) ||_H                residual e, distance || d ||_H
+    shifts tau, coupled A |tau|               own k P^(2/3) phi(t), signed as u
+    carried_norm || t (P* - P) ||_H           residual e, distance || d ||_H
 
 What is known of the rounding of A u only in the 2-norm stays apart until it enters a norm, or a
 single component.
@@ -138,10 +138,9 @@ def _by_convexity(given: _Given) -> Bounds:
 
 
 class _Image(NamedTuple):
-    """States carried over to the true loads, t P* + tau: step 1 and 2."""
+    """States carried over to the true loads, t P* + tau: steps 1 and 2."""
 
-    used: Array  # (m, n) t = |u| / P, 0 where not sure
-    carried: Array  # (m,) bounds on || t (P* - P) ||_H
+    carried_norm: Array  # (m,) bounds on || t (P* - P) ||_H
     restored: NDArray[np.bool_]  # (m,) whether shifts can restore the total
     shifts: Array  # (m, n) bounds on |tau|, 0 where they cannot
     coupled: Array  # (m, n) bounds on A |tau|
@@ -154,7 +153,7 @@ def _image(given: _Given) -> _Image:
     """
     problem, known, states = given.problem, given.known, given.states
     P, u, size = problem.loads, states.increments, np.abs(states.increments)
-    used = np.where(known.sure, size / P, 0.0)
+    used = np.where(known.sure, size / P, 0.0)  # t
     missing = known.distance * np.sqrt((used**2 / known.stiffness).sum(axis=1))
     missing = np.minimum((size * known.relative).sum(axis=1), missing)
     missing += np.where(known.sure, 0.0, P + known.errors + size).sum(axis=1)
@@ -165,8 +164,8 @@ def _image(given: _Given) -> _Image:
     shifts = missing[:, None] * _parts(slopes)
     restored = slopes.any(axis=1) & ((slopes == 0) | (shifts < 0.5 * (P - size))).all(axis=1)
     shifts[~restored] = 0.0
-    carried = np.array([known.image_norm(each) for each in used])
-    return _Image(used, carried, restored, shifts, couple_above(problem, shifts))
+    norm = np.array([known.image_norm(each) for each in used])
+    return _Image(norm, restored, shifts, couple_above(problem, shifts))
 
 
 def _parts(weights: Array) -> Array:
@@ -178,36 +177,36 @@ def _parts(weights: Array) -> Array:
 class _Residual(NamedTuple):
     """How far the law is from holding for the image on the true loads: step 3."""
 
-    local: Array  # (m, n) own deflections at u, not at the image
+    own: Array  # (m, n) own deflections at u, not at the image
     uncertainty: Array  # (m, n) of `available`: rounding, and what asperities not sure do to it
     values: Array  # (m, n) bounds on |e|, less what `_distance` adds in norms
 
 
 def _residual(given: _Given, image: _Image) -> _Residual:
-    """Step 3: |e| <= |Delta - A u - local|, or what Delta - A u lacks of the ceiling if t = 1.
+    """Step 3: |e| <= |Delta - A u - own|, or what Delta - A u lacks of the ceiling if t = 1.
 
-    With rounding, and with what the shifts change in the local law.
+    With rounding, and with what the shifts change in own deflections.
     """
     problem, known, u = given.problem, given.known, given.states.increments
-    size, available, local = np.abs(u), given.available, problem.deflections(u)
-    sums = np.abs(local) + given.magnitude + given.states.rises[:, None]
+    size, available, own = np.abs(u), given.available, problem.deflections(u)
+    sums = np.abs(own) + given.magnitude + given.states.rises[:, None]
     uncertainty = SUM_ROUNDOFFS * ROUNDOFF * sums
     uncertainty += given.rounding + known.stray_effect + known.loose_effect
-    change = local_change(problem, size, np.abs(local), image.shifts)
+    change = own_change(problem, size, np.abs(own), image.shifts)
     beyond = available * np.sign(u) - problem.ceilings
-    sticks = np.abs(available - local) + uncertainty + change
+    sticks = np.abs(available - own) + uncertainty + change
     values = np.where(size < problem.loads, sticks, np.maximum(uncertainty - beyond, 0.0))
-    return _Residual(local, uncertainty, np.where(known.sure, values, 0.0))
+    return _Residual(own, uncertainty, np.where(known.sure, values, 0.0))
 
 
-def local_change(energy: TangentialEnergy, size: Array, local: Array, change: Array) -> Array:
+def own_change(energy: TangentialEnergy, size: Array, own: Array, change: Array) -> Array:
     """Bounds on how far own deflections turn or grow if |u| or |q|, now `size`, change by so much.
 
     Step 3: phi' grows with t, and 1.5 is for P* in place of P while `change` is at most half of
-    P - size. `local` are the lengths of the deflections now.
+    P - size. `own` are the lengths of the deflections now.
     """
     farther = np.minimum(size + change, energy.loads)
-    bound: Array = 1.5 * (energy.deflections(farther) - local)
+    bound: Array = 1.5 * (energy.deflections(farther) - own)
     return bound
 
 
@@ -218,12 +217,12 @@ def _distance(given: _Given, image: _Image, residual: _Residual) -> Array:
 
     Here w = t (P* - P) + tau, and || e || has LOCAL || t (P* - P) ||_H for ceiling* in it.
     """
-    known, h, carried, tau = given.known, given.known.stiffness, image.carried, image.shifts
+    known, h, carried, tau = given.known, given.known.stiffness, image.carried_norm, image.shifts
     norm = np.sqrt((residual.values**2 / h).sum(axis=1)) + given.remainder / np.sqrt(h.min())
-    own = np.where(known.sure, h, 0.0) * tau**2
-    coupled = np.sqrt((own + tau * image.coupled).sum(axis=1))  # || tau ||_N
+    squares = np.where(known.sure, h, 0.0) * tau**2  # || tau ||_H^2
+    coupled = np.sqrt((squares + tau * image.coupled).sum(axis=1))  # || tau ||_N
     coupled = np.sqrt(1.0 + known.coupling) * carried + coupled
-    norm += (1.0 + LOCAL) * carried + np.sqrt(own.sum(axis=1))
+    norm += (1.0 + LOCAL) * carried + np.sqrt(squares.sum(axis=1))
     root = np.sqrt(1.0 - known.convexity_number)
     distance: Array = (norm / root + coupled) / root * (1 + SAFETY)
     return distance
@@ -232,20 +231,20 @@ def _distance(given: _Given, image: _Image, residual: _Residual) -> Array:
 def _words(given: _Given, image: _Image, residual: _Residual, distance: Array) -> Bounds:
     """Steps 5 and 6: the rise, known at every asperity sure to stick; the slips; and who slides.
 
-    |Delta - Delta*| <= |Delta - A u - local| + the changes of both, the least of those that stick;
+    |Delta - Delta*| <= |Delta - A u - own| + the changes of both, the least of those that stick;
     i slides if |Delta - A u| - ceiling exceeds its error, and does not if it falls short by that.
     """
     problem, known, u = given.problem, given.known, given.states.increments
-    P, ceilings, size, local = problem.loads, problem.ceilings, np.abs(u), residual.local
+    P, ceilings, size, own = problem.loads, problem.ceilings, np.abs(u), residual.own
     distances = distance[:, None] / np.sqrt(known.stiffness) + image.shifts  # u* from t P*
     uncertainty = residual.uncertainty + (
-        np.abs(local) * known.relative + image.coupled + given.remainder[:, None]
+        np.abs(own) * known.relative + image.coupled + given.remainder[:, None]
     )
-    uncertainty += (distance + image.carried)[:, None] * known.reach * (1 + SAFETY)
+    uncertainty += (distance + image.carried_norm)[:, None] * known.reach * (1 + SAFETY)
     sticks = known.sure & (distances < 0.5 * (P - size))
-    change = local_change(problem, size, np.abs(local), distances)
+    change = own_change(problem, size, np.abs(own), distances)
     available = given.available
-    at_each = np.where(sticks, np.abs(available - local) + uncertainty + change, np.inf)
+    at_each = np.where(sticks, np.abs(available - own) + uncertainty + change, np.inf)
     rise_errors = at_each.min(axis=1)
     slip_errors = uncertainty + rise_errors[:, None] + ceilings * known.relative
     return Bounds(

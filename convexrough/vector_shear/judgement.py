@@ -21,7 +21,7 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.normal.certificate import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.judgement import Bounds, local_change
+from convexrough.shearing.judgement import Bounds, own_change
 from convexrough.shearing.load_errors import LoadErrors
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
@@ -58,9 +58,9 @@ def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) ->
 class _Given(NamedTuple):
     """What the proof starts from: a state, and what the normal map makes of it (step 1).
 
-    state : the one that is judged, q of its total T and rise X;  forces : (n, 2) q(X - B q)
+    state : as given, of a total T and a rise X;  forces : (n, 2) q, mapped from X - B q of that
     sizes : (n,) lengths of `forces`;  own : (n,) their own deflections
-    available : (n, 2) the displacement X - B q(..) left to each asperity
+    available : (n, 2) the displacement X - B q that `forces` leave to each asperity
     reach : (n, n) |B_ij v| <= reach_ij |v|
     """
 
@@ -140,7 +140,7 @@ def _residual(given: _Given, image: _Image) -> _Residual:
     sums = own + reach @ sizes + float(np.hypot(*state.rise))
     uncertainty = (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * sums
     uncertainty += reach @ (image.carried + image.shifts) + own * known.relative
-    change = local_change(problem.scalar, sizes, own, image.shifts)
+    change = own_change(problem.scalar, sizes, own, image.shifts)
     values = np.where(known.sure, mapped + uncertainty + change, 0.0)
     return _Residual(mapped, uncertainty, values)
 
@@ -160,10 +160,10 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
     problem, known, state, q, sizes, own, available, reach = given
     h, ceilings = known.stiffness, problem.scalar.ceilings
     distances = distance / np.sqrt(h) + image.shifts  # q* from q P* / P
-    moved = distance * np.sqrt(reach**2 @ (1.0 / h)) * (1 + SAFETY)
-    uncertainty = residual.uncertainty + moved
+    coupled = distance * np.sqrt(reach**2 @ (1.0 / h)) * (1 + SAFETY)
+    uncertainty = residual.uncertainty + coupled
     sticks = known.sure & (distances < 0.5 * (problem.scalar.loads - sizes))
-    change = local_change(problem.scalar, sizes, own, distances)
+    change = own_change(problem.scalar, sizes, own, distances)
     at_each = residual.mapped + uncertainty + change
     rise_error = float(at_each.min(where=sticks, initial=np.inf))
     slip_errors = uncertainty + rise_error + ceilings * known.relative
@@ -171,7 +171,7 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
     beyond = length - ceilings
     sliding = known.sure & (beyond > slip_errors)
     partial = known.sure & (sticks | (-beyond > slip_errors))
-    # From the mapped state back to the one that is judged.
+    # From the mapped state back to the one that is given.
     increments = distances + image.carried + np.hypot(*(q - state.increments).T)
     # What a vector has beyond a ball changes by no more than the vector does.
     slips = along(np.maximum(beyond, 0.0), available, length)
