@@ -1,23 +1,31 @@
-"""Pressed scenes with friction that the tests of shear share."""
+"""Pressed scenes with friction, and their states by definition, that the tests of shear share."""
 
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
-from scenes import NAMED
+import numpy as np
+from flint import arb, ctx
+from numpy.testing import assert_allclose
+from scenes import NAMED, solve_exactly
 
 import convexrough as cr
+from convexrough import FrictionConic, VectorShearState, shear_vector
 
 FRICTION = 0.5
 DIGITS = 80
 FRACTIONS = [1e-9, 1e-6, 1e-3, 0.1, 0.35, 0.37, 0.5, 0.7, 0.9, 0.999]
 NAMES = ["paper", "rough"]
 KINDS = ["dense", "lattice"]
+VECTOR_FRACTIONS = [1e-9, 1e-3, 0.1, 0.3, 0.5, 0.8, 0.99]
+VECTOR_NAMES = ["paper", "rough", "steel", "rough, closest"]
 
 
 @cache
-def pressed(name: str, influence: Any = "dense", control: str = "approach") -> cr.Contact:
+def pressed(
+    name: str, influence: Any = "dense", control: str = "approach", nu: float = 0.3
+) -> cr.Contact:
     scene, approach = NAMED[name]
-    contact = cr.press(with_friction(scene), approach=approach, influence=influence)
+    contact = cr.press(with_friction(scene, nu=nu), approach=approach, influence=influence)
     if control == "load":
         return cr.press(contact.scene, load=contact.load, influence=influence)
     return contact
@@ -26,3 +34,122 @@ def pressed(name: str, influence: Any = "dense", control: str = "approach") -> c
 def with_friction(scene: cr.Scene, friction: float = FRICTION, nu: float = 0.3) -> cr.Scene:
     material = cr.Material(scene.material.contact_modulus, nu)
     return cr.Scene(scene.sphere_radius, scene.asperities, material, friction, scene.geometry)
+
+
+class Exact(NamedTuple):
+    """A friction state in 80 digits; lists of arb."""
+
+    forces: list[Any]
+    displacement: Any
+    slips: list[Any]
+    energy: Any  # of the cycle between +-Q
+    loads: list[Any]
+
+
+@cache
+def exact(name: str, fraction: float, control: str = "approach") -> Exact:
+    """Ciavarella-Jaeger by definition: Q_i = f (P_i - p_i(L)), L = P - Q / f, by the normal oracle.
+
+    Nothing of the increment form is used. The differences lose digits as Q -> 0: 80 can afford it.
+    """
+    contact = pressed(name)
+    scene, E, nu = contact.scene, arb(contact.scene.material.contact_modulus), arb(0.3)
+    with ctx.workdps(DIGITS + 30):
+        f, force = arb(FRICTION), arb(fraction * FRICTION * contact.load)
+        given = {control: getattr(contact, control)}
+        full = solve_exactly(scene, **given, digits=DIGITS, start=contact.loads)
+        near = cr.press(scene, load=(1 - fraction) * contact.load).loads
+        left = (full.load - force / f).mid()
+        reduced = solve_exactly(scene, load=left, digits=DIGITS, start=near)
+        travel = f * (2 - nu) / (2 * (1 - nu))
+        forces = [f * (a - b) for a, b in zip(full.loads, reduced.loads, strict=True)]
+        slips = [
+            travel * gap if load > 0 else arb(0)
+            for load, gap in zip(full.loads, reduced.gaps, strict=True)
+        ]
+        energy = arb(0)
+        rho = scene.asperities.tip_radii
+        for i, (load, q, slip) in enumerate(zip(full.loads, forces, slips, strict=True)):
+            if load > 0:
+                t = q / (f * load)
+                left = 1 - t if not slip > 0 else arb(0)
+                e = 1 - root(left) ** 5 - 5 * t / 6 * (1 + root(left) ** 2)
+                R = 1 / (1 / arb(scene.sphere_radius) + 1 / arb(float(rho[i])))
+                a = (3 * load * R / (4 * E)).root(3)
+                G = E * (1 - nu)
+                energy += 9 * (2 - nu) * f * f * load * load / (5 * G * a) * e + 4 * f * load * slip
+        displacement = travel * (full.approach - reduced.approach)
+        return Exact(forces, displacement, slips, energy, list(full.loads))
+
+
+def root(x: Any) -> Any:
+    return arb(0) if x == 0 else x.root(3)
+
+
+def off(value: float, true: Any) -> float:
+    """|value - true|."""
+    with ctx.workdps(DIGITS):
+        return abs(float(arb(float(value)) - true))
+
+
+@cache
+def found(name: str, nu: float, fraction: float, conic: bool = False) -> VectorShearState:
+    contact = pressed(name, nu=nu)
+    solver = FrictionConic() if conic else None
+    return shear_vector(contact, force=fraction * FRICTION * contact.load, solver=solver)
+
+
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    return np.hypot(*vectors.T)
+
+
+@cache
+def cerruti(scene: cr.Scene) -> np.ndarray:
+    """(n, n, 2, 2) C_ij for both bodies, entry by entry from physics."""
+    G, nu = scene.material.shear_modulus, scene.material.poisson_ratio
+    points = scene.contact_points
+    C = np.zeros((len(points), len(points), 2, 2))
+    for i, here in enumerate(points):
+        for j, there in enumerate(points):
+            if i != j:
+                r = float(np.hypot(*(here - there)))
+                d = (here - there) / r
+                C[i, j] = ((1 - nu) * np.eye(2) + nu * np.outer(d, d)) / (np.pi * G * r)
+    return C
+
+
+def own_displacements(contact: cr.Contact, forces: np.ndarray) -> np.ndarray:
+    """(n, 2) Mindlin: 3 (2 - nu) f P / (8 G a) [1 - (1 - |Q|/(f P))^(2/3)] along Q."""
+    scene, G = contact.scene, contact.scene.material.shear_modulus
+    own = np.zeros_like(forces)
+    for i in np.flatnonzero(contact.loads):
+        limit, size = FRICTION * contact.loads[i], float(np.hypot(*forces[i]))
+        if size > 0:
+            share = min(size / limit, 1.0)
+            share = 1.0 if share > 1 - 1e-14 else share
+            phi = -np.expm1(2 / 3 * np.log1p(-share)) if share < 1 else 1.0
+            most = 3 * (2 - scene.material.poisson_ratio) * limit / (8 * G)
+            own[i] = most / contact.contact_radii[i] * phi * (forces[i] / size)
+    return own
+
+
+def assert_solves(state: VectorShearState, tolerance: float) -> None:
+    """Balance of displacements, the friction law and the direction of slip, from their formulas."""
+    contact = state.contact
+    loaded = contact.loads > 0
+    limit = FRICTION * contact.loads
+    size = lengths(state.forces)
+    assert (size <= limit * (1 + 1e-14)).all()
+    travel = np.hypot(*state.displacement)
+    assert_allclose(state.forces.sum(axis=0), state.force, atol=tolerance * np.hypot(*state.force))
+    moved = np.einsum("ijab,jb->ia", cerruti(contact.scene), state.forces)
+    there = own_displacements(contact, state.forces) + moved + state.slips
+    off = lengths(there - state.displacement)[loaded]
+    assert off.max() <= tolerance * travel
+    slides = lengths(state.slips) > 0
+    assert_allclose(size[slides], limit[slides], rtol=tolerance)
+    cross = state.slips[:, 0] * state.forces[:, 1] - state.slips[:, 1] * state.forces[:, 0]
+    assert (np.abs(cross) <= tolerance * travel * size).all()
+    assert ((state.slips * state.forces).sum(axis=1) >= 0).all()
+    assert (state.stick_radii[slides] == 0).all()
+    assert (state.forces[~loaded] == 0).all()

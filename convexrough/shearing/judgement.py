@@ -1,16 +1,16 @@
 """Judge friction states: bounds on their forces and slips, and which asperities slide.
 
-The normal loads are known only to their certified bounds b. A state u of the computed loads P is
-carried over to the true ones P* at equal u_i / P_i, and its total mended where it sticks; that
-changes its residual by terms of the order (b_i / P_i) u_i, which are added to it. From there the
-argument is that of `convexrough.normal.certificate`: on |u| <= P* the energy is strictly convex
-with H = diag(1 / (2 E* a_i)), so
+The proofs are those of docs/theory/shear.md, "Proof" (by convexity, in six steps) and "Close to
+gross sliding" (by exhaustion). All bounds shrink with the shear force. Arrays are (m, n): m states
+of n loaded asperities. In the letters of that page, all displacements over c_t f:
 
-    || u - u* ||_H  <=  || e ||_{H^-1} / (1 - theta),
+    loads P, errors b, ceilings k P^(2/3)     increments u, used t = |u| / P, totals T
+    stiffness h of H, convexity_number theta  rises Delta, available Delta - A u
+    shifts tau, coupled A |tau|               own k P^(2/3) phi(t), signed as u
+    carried_norm || t (P* - P) ||_H           residual e, distance || d ||_H
 
-and an asperity slides if the slip that A u* leaves it is proved positive. All bounds shrink with
-the shear force. Arrays are (m, n): m states of n loaded asperities. What is known of the rounding
-of A u only in the 2-norm stays apart until it enters a norm, or a single component.
+What is known of the rounding of A u only in the 2-norm stays apart until it enters a norm, or a
+single component.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.normal.certificate import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.load_errors import LoadErrors
+from convexrough.shearing.energy import TangentialEnergy
+from convexrough.shearing.load_errors import LoadErrors, couple_above
 from convexrough.shearing.normal_map import States
 from convexrough.shearing.problem import TangentialProblem
 
@@ -45,6 +46,13 @@ class Bounds(NamedTuple):
     sliding: NDArray[np.bool_]  # (m, n)
     partial: NDArray[np.bool_]  # (m, n) proved not to slide
 
+    @classmethod
+    def unproved(cls, m: int, n: int) -> Bounds:
+        """Nothing is known of m states of n asperities."""
+        unknown, no = np.full((m, n), np.inf), np.zeros((m, n), dtype=bool)
+        nowhere, unproved = np.full(m, np.inf), np.zeros(m, dtype=bool)
+        return cls(unproved, unknown, unknown.copy(), nowhere, no, no.copy())
+
 
 def judge_states(problem: TangentialProblem, states: States) -> Bounds:
     """Bounds on friction states of a contact, whose loads are known to its certificate only."""
@@ -64,13 +72,12 @@ def judge_in_turn(problem: TangentialProblem, states: States) -> Iterator[tuple[
 
 def _judge(problem: TangentialProblem, states: States) -> Bounds:
     if problem.certificate.scope == "none":
-        return _nothing(states)
-    known = LoadErrors.of(problem)
-    product = _product(problem, states)
-    bounds = _by_convexity(problem, known, states, product)
+        return Bounds.unproved(*states.increments.shape)
+    given = _given(problem, states)
+    known, bounds = given.known, _by_convexity(given)
     others = np.flatnonzero(~bounds.proved)
     if len(others):
-        near_gross = _by_exhaustion(problem, known, states.take(others), product.take(others))
+        near_gross = _by_exhaustion(given.take(others))
         for field, values in zip(bounds, near_gross, strict=True):
             field[others] = values
     bounds.slips[:, ~known.sure] = np.inf
@@ -80,19 +87,29 @@ def _judge(problem: TangentialProblem, states: States) -> Bounds:
     return bounds
 
 
-class _Product(NamedTuple):
-    """A u of m states, and its rounding."""
+class _Given(NamedTuple):
+    """What the proofs start from: m states, A u of each, and its rounding."""
 
+    problem: TangentialProblem
+    known: LoadErrors
+    states: States
     displacement: Array  # (m, n) A u
     magnitude: Array  # (m, n) upper bounds on A |u|
     rounding: Array  # (m, n) bounds on the error of A u, less a remainder
     remainder: Array  # (m,) bounds on the 2-norm of that
 
-    def take(self, rows: Indices) -> _Product:
-        return _Product(*(field[rows] for field in self))
+    @property
+    def available(self) -> Array:
+        """(m, n) the displacement left to each asperity, its own deflection and its slip."""
+        return self.states.rises[:, None] - self.displacement
+
+    def take(self, rows: Indices) -> _Given:
+        """Some of the states."""
+        rest = (field[rows] for field in self[3:])
+        return _Given(self.problem, self.known, self.states.take(rows), *rest)
 
 
-def _product(problem: TangentialProblem, states: States) -> _Product:
+def _given(problem: TangentialProblem, states: States) -> _Given:
     u, A = states.increments, problem.influence
     displacement = problem.couple(u)
     noise = [A.rounding(each) for each in u]
@@ -105,115 +122,166 @@ def _product(problem: TangentialProblem, states: States) -> _Product:
         magnitude[back] = problem.couple(np.abs(u[back]))
     # The relative part is of the true product, which the computed one may miss by all of it.
     magnitude = (np.maximum(magnitude, 0.0) + remainder[:, None]) * (1.0 + 2.0 * relative)
-    return _Product(displacement, magnitude, relative * magnitude, remainder)
+    known, rounding = LoadErrors.of(problem), relative * magnitude
+    return _Given(problem, known, states, displacement, magnitude, rounding, remainder)
 
 
-def _couple_above(problem: TangentialProblem, values: Array) -> Array:
-    """(m, n) upper bounds on A times values that are not negative."""
-    product = np.maximum(problem.couple(values), 0.0)
-    for row, each in zip(product, values, strict=True):
-        row += problem.influence.rounding(each).of(row)
-    return product
+def _by_convexity(given: _Given) -> Bounds:
+    """The steps of docs/theory/shear.md, "Proof", in their order."""
+    known = given.known
+    if not known.convexity_number < 1 or not known.sure.any():
+        return Bounds.unproved(*given.states.increments.shape)
+    image = _image(given)
+    residual = _residual(given, image)
+    distance = _distance(given, image, residual)
+    return _words(given, image, residual, distance)
 
 
-def _by_convexity(
-    problem: TangentialProblem, known: LoadErrors, states: States, product: _Product
-) -> Bounds:
-    P, ceilings, h, theta = problem.loads, problem.ceilings, known.stiffness, known.convexity_number
-    u, rises = states.increments, states.rises
-    size = np.abs(u)
-    if not theta < 1 or not known.sure.any():
-        return _nothing(states)
+class _Image(NamedTuple):
+    """States carried over to the true loads, t P* + tau: steps 1 and 2."""
 
-    # The image on the true loads misses the total; a shift of eta where it sticks mends that.
-    shares = np.where(known.sure, size / P, 0.0)
-    missing = known.distance * np.sqrt((shares**2 / h).sum(axis=1))
+    carried_norm: Array  # (m,) bounds on || t (P* - P) ||_H
+    restored: NDArray[np.bool_]  # (m,) whether shifts can restore the total
+    shifts: Array  # (m, n) bounds on |tau|, 0 where they cannot
+    coupled: Array  # (m, n) bounds on A |tau|
+
+
+def _image(given: _Given) -> _Image:
+    """Steps 1 and 2: t P* misses the total by `missing`, and tau restores it where it sticks.
+
+    The shifts are in proportion to du/deta, where |tau_i| < (P_i - |u_i|) / 2 leaves room for them.
+    """
+    problem, known, states = given.problem, given.known, given.states
+    P, u, size = problem.loads, states.increments, np.abs(states.increments)
+    used = np.where(known.sure, size / P, 0.0)  # t
+    missing = known.distance * np.sqrt((used**2 / known.stiffness).sum(axis=1))
     missing = np.minimum((size * known.relative).sum(axis=1), missing)
     missing += np.where(known.sure, 0.0, P + known.errors + size).sum(axis=1)
     missing += np.abs(u.sum(axis=1) - states.totals)
     missing += len(P) * ROUNDOFF * size.sum(axis=1) + known.stray
     slopes = np.where(known.sure & (size < P), problem.slopes(states.deflections), 0.0)
-    slopes[missing[:, None] * _shares(slopes) >= 0.25 * (P - size)] = 0.0  # no room to mend
-    mended = missing[:, None] * _shares(slopes)
-    proved = slopes.any(axis=1) & ((slopes == 0) | (mended < 0.5 * (P - size))).all(axis=1)
-    mended[~proved] = 0.0
-    pushed = _couple_above(problem, mended)
-    local = problem.deflections(u)
-    bent = 1.5 * (problem.deflections(size + mended) - np.abs(local))  # 1.5: for P* in place of P
-
-    # The residual of the mended image on the true loads, with rounding. What the loads' errors make
-    # of the local law, and of A w with w the image less u, is said in the norms of H and H + A.
-    asked = rises[:, None] - product.displacement  # the deflection left to each asperity
-    unsure = SUM_ROUNDOFFS * ROUNDOFF * (np.abs(local) + product.magnitude + rises[:, None])
-    unsure += product.rounding + known.stray_effect + known.loose_effect
-    surplus = asked * np.sign(u) - ceilings
-    residual = np.where(
-        size < P, np.abs(asked - local) + unsure + bent, np.maximum(unsure - surplus, 0.0)
-    )
-    residual = np.where(known.sure, residual, 0.0)
-    norm = np.sqrt((residual**2 / h).sum(axis=1)) + product.remainder / np.sqrt(h.min())
-    scaled = np.array([known.scaled(each) for each in shares])
-    own = np.where(known.sure, h, 0.0) * mended**2
-    coupled = np.sqrt(1.0 + known.coupling) * scaled + np.sqrt((own + mended * pushed).sum(axis=1))
-    norm += (1.0 + LOCAL) * scaled + np.sqrt(own.sum(axis=1))
-    norm = (norm / np.sqrt(1.0 - theta) + coupled) / np.sqrt(1.0 - theta) * (1 + SAFETY)
-    off = norm[:, None] / np.sqrt(h) + mended  # from the image
-
-    # The rise, known at every asperity sure to stick; and from it the slips.
-    unsure += np.abs(local) * known.relative + pushed + product.remainder[:, None]
-    unsure += (norm + scaled)[:, None] * known.reach * (1 + SAFETY)
-    held = known.sure & (off < 0.5 * (P - size))
-    bent = 1.5 * (problem.deflections(np.minimum(size + off, P)) - np.abs(local))
-    each = np.where(held, np.abs(asked - local) + unsure + bent, np.inf)
-    rise_errors = each.min(axis=1)
-    slip_errors = unsure + rise_errors[:, None] + ceilings * known.relative
-    sliding = known.sure & (np.abs(asked) - ceilings > slip_errors)
-    partial = known.sure & (held | (ceilings - np.abs(asked) > slip_errors))
-    proved &= np.isfinite(rise_errors)
-    increments = off + known.moved(P, u)
-    return Bounds(proved, increments, slip_errors, rise_errors, sliding, partial)
+    slopes[missing[:, None] * _parts(slopes) >= 0.25 * (P - size)] = 0.0  # no room
+    shifts = missing[:, None] * _parts(slopes)
+    restored = slopes.any(axis=1) & ((slopes == 0) | (shifts < 0.5 * (P - size))).all(axis=1)
+    shifts[~restored] = 0.0
+    norm = np.array([known.image_norm(each) for each in used])
+    return _Image(norm, restored, shifts, couple_above(problem, shifts))
 
 
-def _shares(weights: Array) -> Array:
+def _parts(weights: Array) -> Array:
     """(m, n) parts of 1, as the weights of each state; 0 where all are 0."""
     total = weights.sum(axis=1, keepdims=True)
     return weights / np.where(total > 0, total, 1.0)
 
 
-def _by_exhaustion(
-    problem: TangentialProblem, known: LoadErrors, states: States, product: _Product
-) -> Bounds:
-    """Near gross sliding: |u| <= P and sum u = T leave each asperity within sum P - T of P.
+class _Residual(NamedTuple):
+    """How far the law is from holding for the image on the true loads: step 3."""
 
-    The last asperity to slide, i, then fixes the rise: it is at most k_i P_i^(2/3) + (A P)_i, and
-    at least what u_i = P_i - (sum P - T) asks.
+    own: Array  # (m, n) own deflections at u, not at the image
+    uncertainty: Array  # (m, n) of `available`: rounding, and what asperities not sure do to it
+    values: Array  # (m, n) bounds on |e|, less what `_distance` adds in norms
+
+
+def _residual(given: _Given, image: _Image) -> _Residual:
+    """Step 3: |e| <= |Delta - A u - own|, or what Delta - A u lacks of the ceiling if t = 1.
+
+    With rounding, and with what the shifts change in own deflections.
     """
+    problem, known, u = given.problem, given.known, given.states.increments
+    size, available, own = np.abs(u), given.available, problem.deflections(u)
+    sums = np.abs(own) + given.magnitude + given.states.rises[:, None]
+    uncertainty = SUM_ROUNDOFFS * ROUNDOFF * sums
+    uncertainty += given.rounding + known.stray_effect + known.loose_effect
+    change = own_change(problem, size, np.abs(own), image.shifts)
+    beyond = available * np.sign(u) - problem.ceilings
+    sticks = np.abs(available - own) + uncertainty + change
+    values = np.where(size < problem.loads, sticks, np.maximum(uncertainty - beyond, 0.0))
+    return _Residual(own, uncertainty, np.where(known.sure, values, 0.0))
+
+
+def own_change(energy: TangentialEnergy, size: Array, own: Array, change: Array) -> Array:
+    """Bounds on how far own deflections turn or grow if |u| or |q|, now `size`, change by so much.
+
+    Step 3: phi' grows with t, and 1.5 is for P* in place of P while `change` is at most half of
+    P - size. `own` are the lengths of the deflections now.
+    """
+    farther = np.minimum(size + change, energy.loads)
+    bound: Array = 1.5 * (energy.deflections(farther) - own)
+    return bound
+
+
+def _distance(given: _Given, image: _Image, residual: _Residual) -> Array:
+    """Step 4, (m,): || d ||_H, d from the image to the solution, with root^2 = 1 - theta,
+
+        || d ||_H <= ((|| e ||_{H^-1} + || w ||_H) / root + || w ||_N) / root.
+
+    Here w = t (P* - P) + tau, and || e || has LOCAL || t (P* - P) ||_H for ceiling* in it.
+    """
+    known, h, carried, tau = given.known, given.known.stiffness, image.carried_norm, image.shifts
+    norm = np.sqrt((residual.values**2 / h).sum(axis=1)) + given.remainder / np.sqrt(h.min())
+    squares = np.where(known.sure, h, 0.0) * tau**2  # || tau ||_H^2
+    coupled = np.sqrt((squares + tau * image.coupled).sum(axis=1))  # || tau ||_N
+    coupled = np.sqrt(1.0 + known.coupling) * carried + coupled
+    norm += (1.0 + LOCAL) * carried + np.sqrt(squares.sum(axis=1))
+    root = np.sqrt(1.0 - known.convexity_number)
+    distance: Array = (norm / root + coupled) / root * (1 + SAFETY)
+    return distance
+
+
+def _words(given: _Given, image: _Image, residual: _Residual, distance: Array) -> Bounds:
+    """Steps 5 and 6: the rise, known at every asperity sure to stick; the slips; and who slides.
+
+    |Delta - Delta*| <= |Delta - A u - own| + the changes of both, the least of those that stick;
+    i slides if |Delta - A u| - ceiling exceeds its error, and does not if it falls short by that.
+    """
+    problem, known, u = given.problem, given.known, given.states.increments
+    P, ceilings, size, own = problem.loads, problem.ceilings, np.abs(u), residual.own
+    distances = distance[:, None] / np.sqrt(known.stiffness) + image.shifts  # u* from t P*
+    uncertainty = residual.uncertainty + (
+        np.abs(own) * known.relative + image.coupled + given.remainder[:, None]
+    )
+    uncertainty += (distance + image.carried_norm)[:, None] * known.reach * (1 + SAFETY)
+    sticks = known.sure & (distances < 0.5 * (P - size))
+    change = own_change(problem, size, np.abs(own), distances)
+    available = given.available
+    at_each = np.where(sticks, np.abs(available - own) + uncertainty + change, np.inf)
+    rise_errors = at_each.min(axis=1)
+    slip_errors = uncertainty + rise_errors[:, None] + ceilings * known.relative
+    return Bounds(
+        proved=image.restored & np.isfinite(rise_errors),
+        increments=distances + known.image_distances(P, u),
+        slips=slip_errors,
+        rises=rise_errors,
+        sliding=known.sure & (np.abs(available) - ceilings > slip_errors),
+        partial=known.sure & (sticks | (ceilings - np.abs(available) > slip_errors)),
+    )
+
+
+def _by_exhaustion(given: _Given) -> Bounds:
+    """docs/theory/shear.md, "Close to gross sliding": each u_i is within sum P - T of P_i.
+
+    The last asperity to slide then fixes the rise: with c = Delta - A u - ceiling, no c* is less
+    than -`shortfall`, and the least c* is not positive.
+    """
+    problem, known, states = given.problem, given.known, given.states
     if known.stray > 0 or not known.sure.all():
-        return _nothing(states)
+        return Bounds.unproved(*states.increments.shape)
     P, ceilings = problem.loads, problem.ceilings
-    u, rises = states.increments, states.rises
-    left = (P.sum() - states.totals + known.errors.sum())[:, None]
-    left += 2 * len(P) * ROUNDOFF * P.sum()
-    errors = left + known.errors + (P - u)
-    asked = rises[:, None] - product.displacement
-    blur = _couple_above(problem, errors) + product.rounding + product.remainder[:, None]
-    blur += SUM_ROUNDOFFS * ROUNDOFF * (product.magnitude + ceilings + rises[:, None])
-    blur += ceilings * known.relative
-    lowest = ceilings * np.minimum(1.5 * left / P, 1.0) ** (2 / 3)
-    last = np.argmin(asked - ceilings, axis=1)
-    every = np.arange(len(rises))
-    rise_errors = (np.abs(asked - ceilings) + lowest + blur)[every, last] + blur.max(axis=1)
-    slip_errors = blur + rise_errors[:, None]
-    sliding = asked - ceilings > slip_errors
+    unused = (P.sum() - states.totals + known.errors.sum())[:, None]
+    unused += 2 * len(P) * ROUNDOFF * P.sum()
+    errors = unused + known.errors + (P - states.increments)
+    uncertainty = couple_above(problem, errors) + given.rounding + given.remainder[:, None]
+    sums = given.magnitude + ceilings + states.rises[:, None]
+    uncertainty += SUM_ROUNDOFFS * ROUNDOFF * sums
+    uncertainty += ceilings * known.relative
+    shortfall = ceilings * np.minimum(1.5 * unused / P, 1.0) ** (2 / 3)
+    beyond = given.available - ceilings  # c
+    every, last = np.arange(len(beyond)), np.argmin(beyond, axis=1)
+    rise_errors = (np.abs(beyond) + shortfall + uncertainty)[every, last] + uncertainty.max(axis=1)
+    slip_errors = uncertainty + rise_errors[:, None]
+    sliding = beyond > slip_errors
     # Where all but one are sure to slide, and not all can, that one does not.
     short = P.sum() * (1 - 2 * len(P) * ROUNDOFF) - known.errors.sum() - states.totals > 0
     alone = short & (sliding.sum(axis=1) == len(P) - 1)
-    proved = np.ones(len(rises), dtype=bool)
+    proved = np.ones(len(beyond), dtype=bool)
     return Bounds(proved, errors, slip_errors, rise_errors, sliding, ~sliding & alone[:, None])
-
-
-def _nothing(states: States) -> Bounds:
-    m, n = states.increments.shape
-    unknown, no = np.full((m, n), np.inf), np.zeros((m, n), dtype=bool)
-    nowhere, unproved = np.full(m, np.inf), np.zeros(m, dtype=bool)
-    return Bounds(unproved, unknown, unknown.copy(), nowhere, no, no.copy())

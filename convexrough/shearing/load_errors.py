@@ -1,13 +1,13 @@
 """What the certificate of a contact says of its loads, as friction needs it: known to some digits.
 
-Each load is known to its certified bound b. All of them together are known better than that: with
-d = P* - P, the gaps e that the loads leave, h = 2/3 k (P + b)^(-1/3), H = diag(h) and N = H + A,
-complementarity gives
+Each load is known to its certified bound b. All of them together are known better than that: by
+docs/theory/shear.md, "The pressed loads". In the letters of that page:
 
-    d'N d <= d'e,    so    || d ||_H <= || e ||_{H^-1} / (1 - theta),
+    loads P, errors b, distance || P* - P ||_H    stiffness h of H, convexity_number theta
+    coupling Lambda                               reach_i (sum_j A_ij^2 / h_j)^(1/2)
 
-as in docs/theory/certificate.md, once more for those that touch. Where the approach D0 is known to
-an error only (load control), that adds  |dD0| || 1 ||_{N^-1}  to || d ||_N.
+An asperity is sure if it is proved to touch and its load is known to a tenth; loose if it is not. A
+stray has no load here and is not proved open.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence import couple, fitted_shells, spread
+from convexrough.influence import Coupling, couple, fitted_shells, spread
 from convexrough.normal.certificate import FIT_FROM, SUM_ROUNDOFFS
 from convexrough.normal.problem import FITTED
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -72,27 +72,34 @@ class LoadErrors(NamedTuple):
             distance=min(by_component, _distance(problem, errors, effect)) * (1 + SAFETY),
         )
 
-    def moved(self, loads: Array, increments: Array) -> Array:
+    def image_distances(self, loads: Array, increments: Array) -> Array:
         """How far each u can be from its image on the true loads; |u| <= P is all known of some."""
         size = np.abs(increments)
         return size * self.relative + np.where(self.sure, 0.0, loads + self.errors + size)
 
-    def scaled(self, shares: Array) -> float:
-        """Bound on || t (P - P*) ||_H for shares 0 <= t <= 1 (n,) of the loads.
+    def image_norm(self, used: Array) -> float:
+        """Bound on || t (P* - P) ||_H for parts 0 <= t <= 1 (n,) of the loads.
 
         The largest t count by components, all others by the norm.
         """
-        order = np.argsort(shares)[::-1]
-        t = np.append(shares[order], 0.0)
+        order = np.argsort(used)[::-1]
+        t = np.append(used[order], 0.0)
         h = np.where(self.sure, self.stiffness, 0.0)
-        largest = np.append(0.0, np.cumsum((h * (shares * self.errors) ** 2)[order]))
+        largest = np.append(0.0, np.cumsum((h * (used * self.errors) ** 2)[order]))
         return float(np.sqrt((largest + (t * self.distance) ** 2).min())) * (1 + SAFETY)
 
 
 def couple_above(problem: TangentialProblem, values: Array) -> Array:
-    """(n,) upper bounds on A times values (n,) that are not negative."""
-    product = np.maximum(problem.couple(values), 0.0)
-    return product + problem.influence.rounding(values).of(product)
+    """(..., n) upper bounds on A times values, one state or m, that are not negative."""
+    return _above(problem.couple(values), problem.influence, values)
+
+
+def _above(product: Array, coupling: Coupling, values: Array) -> Array:
+    """The product of values that are not negative, and its rounding."""
+    above = np.maximum(product, 0.0)
+    for row, each in zip(np.atleast_2d(above), np.atleast_2d(values), strict=True):
+        row += coupling.rounding(each).of(row)
+    return above
 
 
 def _convexity_number(problem: TangentialProblem, stiffness: Array) -> float:
@@ -119,15 +126,14 @@ def _effect(problem: TangentialProblem, strays: Indices, most: Array) -> Array:
     scene = problem.scene
     apart = couple(scene, strays, problem.influence.scale, problem.influence.name)
     coupling = apart.onto(scene.contact_points[problem.touching])
-    effect = np.maximum(coupling.apply(most), 0.0)
-    return effect + coupling.rounding(most).of(effect)
+    return _above(coupling.apply(most), coupling, most)
 
 
 def _distance(problem: TangentialProblem, errors: Array, stray_effect: Array) -> float:
-    """|| P - P* ||_H; infinite where convexity does not show it."""
+    """|| P* - P ||_H by docs/theory/shear.md, "The pressed loads"; infinite where not convex."""
     P, ceilings, length = problem.loads, problem.ceilings, problem.units.length
-    bent = np.cbrt(P / (P + errors))
-    h = bent / problem.stiffest
+    softening = np.cbrt(P / (P + errors))
+    h = softening / problem.stiffest
     theta = _convexity_number(problem, h)
     if not theta < 1:
         return np.inf
@@ -141,25 +147,25 @@ def _distance(problem: TangentialProblem, errors: Array, stray_effect: Array) ->
     norm = float(np.sqrt(np.sum(residual**2 / h))) + noise.norm / np.sqrt(float(h.min()))
     norm /= np.sqrt(1.0 - theta)  # || d ||_N
     if problem.certificate.approach_error > 0:
-        bend = (1.0 - float(bent.min())) / (1.0 - theta)  # N >= (1 - bend) N at P itself
-        if not bend < 1:
+        lost = (1.0 - float(softening.min())) / (1.0 - theta)  # N >= (1 - lost) N at P itself
+        if not lost < 1:
             return np.inf
-        flat = np.sqrt(_flatness(problem, theta) / (1.0 - bend))
+        flat = np.sqrt(_flatness(problem, theta) / (1.0 - lost))
         norm += problem.certificate.approach_error / length * flat
     return float(norm / np.sqrt(1.0 - theta))
 
 
 def _flatness(problem: TangentialProblem, theta: float) -> float:
-    """Bound on 1'N^-1 1, N = H + A at the loads P.
+    """Bound on 1'N^-1 1, N = H + A at the loads P: docs/theory/shear.md, "The pressed loads".
 
     For any x, with r = 1 - N x:  1'N^-1 1 = 1'x + r'x + r'N^-1 r.  Elastic shares make r small.
     """
     q, H = problem.elastic, 1.0 / problem.stiffest
     coupled = problem.couple(q)
     level = H * q + coupled
-    middle = float(level.mean())
-    blur = problem.influence.rounding(q).of(couple_above(problem, np.abs(q)))
-    blur += SUM_ROUNDOFFS * ROUNDOFF * (np.abs(H * q) + np.abs(coupled))
-    left = float((np.abs(level - middle) + blur).max()) / middle
-    plain = (float(q.sum()) + left * float(np.abs(q).sum())) / middle
-    return (plain + left**2 * float(problem.stiffest.sum()) / (1.0 - theta)) * (1 + SAFETY)
+    mean = float(level.mean())
+    rounding = problem.influence.rounding(q).of(couple_above(problem, np.abs(q)))
+    rounding += SUM_ROUNDOFFS * ROUNDOFF * (np.abs(H * q) + np.abs(coupled))
+    r = float((np.abs(level - mean) + rounding).max()) / mean
+    first = (float(q.sum()) + r * float(np.abs(q).sum())) / mean
+    return (first + r**2 * float(problem.stiffest.sum()) / (1.0 - theta)) * (1 + SAFETY)

@@ -245,14 +245,14 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
 
 
 def _too_dense(problem: VectorProblem) -> SolverError:
-    touching = problem.scalar.touching
-    worst = np.argsort(-problem.crowding)[:5]
-    named = ", ".join(f"{touching[i]} ({problem.crowding[i]:.4g})" for i in worst)
+    touching, numbers = problem.scalar.touching, problem.convexity_numbers
+    worst = np.argsort(-numbers)[:5]
+    named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
     return SolverError(
         f"too dense for a convex program: the least shift of the tangential kernel is "
-        f"{problem.shift.shares.max():.4g} of the local stiffness, and at most 1 is convex. Most "
-        f"crowded, by their indices, with their contact radii over (pi/4) times the distance to "
-        f"the nearest neighbour: {named}",
+        f"{problem.shift.shares.max():.4g} of the local stiffness, and at most 1 is convex. "
+        f"Largest convexity numbers, contact radii over (pi/4) times the distance to the nearest "
+        f"neighbour, by their indices: {named}",
         solver="friction (conic)",
         advice="use a smaller load, sharper tips, or asperities further apart",
     )

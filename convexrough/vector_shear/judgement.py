@@ -1,15 +1,12 @@
 """Judge vector friction states: bounds on forces and slips, and which asperities slide.
 
-The argument is that of `convexrough.shearing.judgement`, for vectors. The local energy is radial
-and its Hessian at least h_i I, so on the true loads P* the energy is strictly convex with
-H = diag(h_i I), and for a state q with the residual e
+The proof is that of docs/theory/friction.md, "Words that are proofs", step by step. Arrays are (n,)
+or (n, 2). In the letters of that page, forces over f and displacements over c_t f:
 
-    || q - q* ||_H  <=  || e ||_{H^-1} / margin,    margin I <= I + H^-1/2 B H^-1/2,
-
-where a Cholesky factorisation proves the margin. The residual of an asperity that uses all its
-friction is what the displacement left to it, X - (B q)_i, is off the ray from the ceiling along
-q_i. The pressed loads P are known to their certified bounds b: a state is carried over to the true
-loads at equal q_i / P_i, its total mended where asperities stick, and both enter the residual.
+    loads P, errors b, ceilings kappa     forces q = Q, rise X, kernel B = C
+    stiffness h of H, margin mu           available X - C Q
+    shifts tau                            own |u(Q)|, slips s
+    residual e, distance || d ||_H        reach_ij |C_ij v| <= reach_ij |v|
 
 Nothing is proved where no asperity is sure to stick, close to gross sliding, and all words there
 are "undecided"; except at |Q| = f P itself, where |Q_i| <= f P_i leaves one state.
@@ -17,13 +14,14 @@ are "undecided"; except at |Q| = f P itself, where |Q_i| <= f P_i leaves one sta
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.normal.certificate import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.judgement import Bounds
+from convexrough.shearing.judgement import Bounds, own_change
 from convexrough.shearing.load_errors import LoadErrors
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
@@ -36,83 +34,157 @@ def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) ->
 
     gross : |Q| = f P
     """
+    unproved = Bounds.unproved(1, len(problem))
     if problem.scalar.certificate.scope == "none":
-        return _nothing(len(problem))
+        return unproved
     known = LoadErrors.of(problem.scalar)
     if gross:
-        return _at_limit(problem, known, state)
-    if known.stray > 0:  # an asperity may touch that the problem leaves out
-        return _nothing(len(problem))
-    margin = _margin(problem, known)
-    if margin == 0.0:
-        return _nothing(len(problem))
-    P, ceilings = problem.scalar.loads, problem.scalar.ceilings
-    A = problem.scalar.influence
-    reach = A.matrix * (1.0 + problem.bias)  # |B_ij v| <= reach_ij |v|
-    h = np.where(known.sure, 2.0 / 3.0 * ceilings / (P + known.errors), np.inf)
+        # Every force is f P_i along the total, whatever the displacements.
+        errors = known.errors + 8 * ROUNDOFF * problem.scalar.loads
+        proved, sliding = np.array([True]), known.sure[None]
+        return unproved._replace(proved=proved, increments=errors[None], sliding=sliding)
+    # An asperity may touch that the problem leaves out; or the energy may not be convex.
+    if known.stray > 0 or (margin := _margin(problem, known)) == 0.0:
+        return unproved
+    given = _mapped(problem, known, state)
+    image = _image(given)
+    if image is None:
+        return unproved
+    residual = _residual(given, image)
+    distance = _distance(given, residual, margin)
+    return _words(given, image, residual, distance)
 
-    # The same state through the normal map: it tells sliding from sticking.
+
+class _Given(NamedTuple):
+    """What the proof starts from: a state, and what the normal map makes of it (step 1).
+
+    state : as given, of a total T and a rise X;  forces : (n, 2) q, mapped from X - B q of that
+    sizes : (n,) lengths of `forces`;  own : (n,) their own deflections
+    available : (n, 2) the displacement X - B q that `forces` leave to each asperity
+    reach : (n, n) |B_ij v| <= reach_ij |v|
+    """
+
+    problem: VectorProblem
+    known: LoadErrors
+    state: VectorState
+    forces: Array
+    sizes: Array
+    own: Array
+    available: Array
+    reach: Array
+
+
+def _mapped(problem: VectorProblem, known: LoadErrors, state: VectorState) -> _Given:
+    """Step 1: the same state through the normal map, which tells sliding from sticking."""
     q = problem.local_forces(state.rise - problem.couple(state.increments))
-    size = problem.sizes(q)
-    local = problem.scalar.deflections(size)
-    coupling = problem.couple(q)
+    sizes = problem.sizes(q)
+    own = problem.scalar.deflections(sizes)
+    reach = problem.scalar.influence.matrix * (1.0 + problem.bias)
+    return _Given(problem, known, state, q, sizes, own, state.rise - problem.couple(q), reach)
 
-    # The image on the true loads misses the total; a shift of eta where it sticks mends that.
-    moved = known.moved(P, size) + 16 * ROUNDOFF * size
-    missing = moved.sum() + float(np.hypot(*(q.sum(axis=0) - state.total)))
-    missing += len(P) * ROUNDOFF * float(size.sum()) + 4 * ROUNDOFF * float(np.hypot(*state.total))
-    sticking = known.sure & (size < P)
-    slopes = np.where(sticking, problem.scalar.slopes(local), 0.0)
+
+class _Image(NamedTuple):
+    """The state carried over to the true loads, q P* / P + tau: step 2.
+
+    carried : (n,) bounds on how far q is from that without tau;  shifts : (n,) bounds on |tau|
+    """
+
+    carried: Array
+    shifts: Array
+
+
+def _image(given: _Given) -> _Image | None:
+    """Step 2: q P* / P misses the total by `missing`, and tau restores it where asperities stick.
+
+    The shifts are in proportion to the slopes of the scalar law. None where |tau_i| is not below
+    (P_i - |q_i|) / 2, or where none is sure to stick.
+    """
+    problem, known, state, q, sizes, own, *_ = given
+    P, total = problem.scalar.loads, state.total
+    carried = known.image_distances(P, sizes) + 16 * ROUNDOFF * sizes
+    missing = carried.sum() + float(np.hypot(*(q.sum(axis=0) - total)))
+    missing += len(P) * ROUNDOFF * float(sizes.sum()) + 4 * ROUNDOFF * float(np.hypot(*total))
+    sticking = known.sure & (sizes < P)
+    slopes = np.where(sticking, problem.scalar.slopes(own), 0.0)
     if slopes.sum() == 0:
-        return _nothing(len(problem))
-    mended = missing * slopes / slopes.sum()
-    if not (~sticking | (mended < 0.5 * (P - size))).all():
-        return _nothing(len(problem))
+        return None
+    shifts = missing * slopes / slopes.sum()
+    room = (~sticking | (shifts < 0.5 * (P - sizes))).all()
+    return _Image(carried, shifts) if room else None
 
-    # The residual of the mended image on the true loads, with rounding. Along a segment the local
-    # Hessian is at most the slope of the deflection at the larger end: `bent` bounds its change.
-    asked = state.rise - coupling
-    far = float(np.hypot(*state.rise))
-    unsure = (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * (local + reach @ size + far)
-    unsure += reach @ (moved + mended) + local * known.relative
-    bent = _bent(problem, size, local, mended)
-    along_q = (asked * along(np.ones(len(P)), q, np.hypot(*q.T))).sum(axis=1)
-    taken = np.where(size < P, local, np.maximum(along_q, ceilings))
-    off_ray = np.hypot(*(asked - along(taken, q, np.hypot(*q.T))).T)
-    residual = np.where(known.sure, off_ray + unsure + bent, 0.0)
-    norm = float(np.sqrt((residual**2 / h).sum())) / margin * (1 + SAFETY)
-    off = norm / np.sqrt(h) + mended  # from the image
 
-    # The rise, known at every asperity sure to stick; and from it the slips.
-    unsure += norm * np.sqrt(reach**2 @ (1.0 / h)) * (1 + SAFETY)
-    held = known.sure & (off < 0.5 * (P - size))
-    each = off_ray + unsure + _bent(problem, size, local, off)
-    rise_error = float(each.min(where=held, initial=np.inf))
-    slip_errors = unsure + rise_error + ceilings * known.relative
-    left = np.hypot(*asked.T) - ceilings
-    sliding = known.sure & (left > slip_errors)
-    partial = known.sure & (held | (-left > slip_errors))
-    # From the mapped state back to the one that is reported.
-    increments = off + moved + np.hypot(*(q - state.increments).T)
+class _Residual(NamedTuple):
+    """How far the law is from holding: step 3.
+
+    mapped : (n,) for the mapped state on the computed loads
+    uncertainty : (n,) rounding of that, and what the true loads and tau change besides
+    values : (n,) bounds on |e| for the image on the true loads, 0 where not sure
+    """
+
+    mapped: Array
+    uncertainty: Array
+    values: Array
+
+
+def _residual(given: _Given, image: _Image) -> _Residual:
+    """Step 3: e is how far X - B q is off the own deflection, or off the ray from it if it slides.
+
+    With rounding, and with what true loads and shifts change: a ceiling by at most b / P of itself.
+    """
+    problem, known, state, q, sizes, own, available, reach = given
+    length = np.hypot(*q.T)
+    along_q = (available * along(np.ones(len(q)), q, length)).sum(axis=1)
+    beyond = np.maximum(along_q, problem.scalar.ceilings)
+    nearest = np.where(sizes < problem.scalar.loads, own, beyond)
+    mapped = np.hypot(*(available - along(nearest, q, length)).T)
+    sums = own + reach @ sizes + float(np.hypot(*state.rise))
+    uncertainty = (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * sums
+    uncertainty += reach @ (image.carried + image.shifts) + own * known.relative
+    change = own_change(problem.scalar, sizes, own, image.shifts)
+    values = np.where(known.sure, mapped + uncertainty + change, 0.0)
+    return _Residual(mapped, uncertainty, values)
+
+
+def _distance(given: _Given, residual: _Residual, margin: float) -> float:
+    """Step 4: || d ||_H <= || e ||_{H^-1} / mu, d from the image to the solution."""
+    norm = float(np.sqrt((residual.values**2 / given.known.stiffness).sum()))
+    return norm / margin * (1 + SAFETY)
+
+
+def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -> Bounds:
+    """Steps 5 and 6: the rise, known at every asperity sure to stick; the slips; and who slides.
+
+    |X - X*| <= |e| + the change of the own deflection + |B (q - q*)|, the least of those that
+    stick; i slides if |X - B q| - ceiling exceeds its error.
+    """
+    problem, known, state, q, sizes, own, available, reach = given
+    h, ceilings = known.stiffness, problem.scalar.ceilings
+    distances = distance / np.sqrt(h) + image.shifts  # q* from q P* / P
+    coupled = distance * np.sqrt(reach**2 @ (1.0 / h)) * (1 + SAFETY)
+    uncertainty = residual.uncertainty + coupled
+    sticks = known.sure & (distances < 0.5 * (problem.scalar.loads - sizes))
+    change = own_change(problem.scalar, sizes, own, distances)
+    at_each = residual.mapped + uncertainty + change
+    rise_error = float(at_each.min(where=sticks, initial=np.inf))
+    slip_errors = uncertainty + rise_error + ceilings * known.relative
+    length = np.hypot(*available.T)
+    beyond = length - ceilings
+    sliding = known.sure & (beyond > slip_errors)
+    partial = known.sure & (sticks | (-beyond > slip_errors))
+    # From the mapped state back to the one that is given.
+    increments = distances + image.carried + np.hypot(*(q - state.increments).T)
     # What a vector has beyond a ball changes by no more than the vector does.
-    mapped = along(np.maximum(left, 0.0), asked, np.hypot(*asked.T))
-    slips = np.hypot(*(mapped - state.slips).T) + slip_errors
-    slips = np.where(partial, np.hypot(*state.slips.T), slips)
+    slips = along(np.maximum(beyond, 0.0), available, length)
+    errors = np.hypot(*(slips - state.slips).T) + slip_errors
+    errors = np.where(partial, np.hypot(*state.slips.T), errors)
     return Bounds(
         proved=np.array([np.isfinite(rise_error)]),
         increments=increments[None],
-        slips=np.where(known.sure, slips, np.inf)[None],
+        slips=np.where(known.sure, errors, np.inf)[None],
         rises=np.array([rise_error]),
         sliding=sliding[None],
         partial=partial[None],
     )
-
-
-def _bent(problem: VectorProblem, size: Array, local: Array, change: Array) -> Array:
-    """How far the local deflection can turn or grow when the force changes by so much."""
-    farther = np.minimum(size + change, problem.scalar.loads)
-    bent: Array = 1.5 * (problem.scalar.deflections(farther) - local)  # 1.5: P* in place of P
-    return bent
 
 
 def _margin(problem: VectorProblem, known: LoadErrors) -> float:
@@ -137,24 +209,3 @@ def _margin(problem: VectorProblem, known: LoadErrors) -> float:
             continue
         return margin
     return 0.0
-
-
-def _at_limit(problem: VectorProblem, known: LoadErrors, state: VectorState) -> Bounds:
-    """Gross sliding: every force is f P_i along the total, whatever the displacements."""
-    n = len(problem)
-    unknown = np.full(n, np.inf)
-    errors = known.errors + 8 * ROUNDOFF * problem.scalar.loads
-    return Bounds(
-        proved=np.array([True]),
-        increments=errors[None],
-        slips=unknown[None],
-        rises=np.array([np.inf]),
-        sliding=known.sure[None],
-        partial=np.zeros((1, n), dtype=bool),
-    )
-
-
-def _nothing(n: int) -> Bounds:
-    unknown, no = np.full((1, n), np.inf), np.zeros((1, n), dtype=bool)
-    proved: NDArray[np.bool_] = np.array([False])
-    return Bounds(proved, unknown, unknown, np.array([np.inf]), no, no)

@@ -3,7 +3,7 @@
 A shear force Q on the pressed contact is carried as Q_i = f q_i with vectors |q_i| <= P_i in the
 plane. A tangential point force moves the surface by Cerruti's tensor, here for both bodies,
 
-    T_ij = 1 / (pi G r) [(1 - nu) I + nu d d'],    d the unit vector from j to i, r the distance.
+    C_ij = 1 / (pi G r) [(1 - nu) I + nu d d'],    d the unit vector from j to i, r the distance.
 
 With c_t Mindlin's ratio, A the normal coupling and bias = nu / (2 - nu), that is c_t B_ij with
 
@@ -18,7 +18,8 @@ the multipliers of |q_i| <= P_i times the direction of q_i, with
 
     X = own(q_i) + (B q)_i + slip_i,    own(q) = ceiling_i deflection(|q| / P_i) q / |q|.
 
-Averaging d d' over all directions leaves B = A: that is Ciavarella and Jaeger's problem.
+Averaging d d' over all directions leaves B = A: that is Ciavarella and Jaeger's problem. Derived in
+docs/theory/friction.md, "The kernel" and "The program".
 """
 
 from __future__ import annotations
@@ -56,6 +57,8 @@ class Shift(NamedTuple):
     """What makes the kernel semidefinite: B + diag(shift_i I) >= 0.
 
     shares : (n,) S_i, the shift over the least local stiffness; convex where all S_i <= 1
+
+    docs/theory/friction.md, "Convexity".
     """
 
     values: Array
@@ -105,16 +108,17 @@ class VectorProblem:
     def stiffness(self) -> Array:
         """(n,) h_i = (2/3) ceiling_i / P_i = 1 / (2 E* a_i): the local Hessian is at least h_i I.
 
-        Its eigenvalues, along q and across, are ceiling/P times deflection'(t) and deflection(t)/t.
+        Its eigenvalues, along q and across, are ceiling/P times deflection'(t) and deflection(t)/t:
+        docs/theory/friction.md, "Convexity".
         """
         h: Array = (2.0 / 3.0) * self.scalar.ceilings / self.scalar.loads
         return h
 
     @property
-    def crowding(self) -> Array:
-        """(n,) contact radii over (pi/2) s_i: the convexity numbers of the pressed state."""
-        ratio: Array = self.scalar.shells / self.stiffness
-        return ratio
+    def convexity_numbers(self) -> Array:
+        """(n,) a_i / ((pi/2) s_i) of the pressed state, s_i half the distance to the nearest."""
+        numbers: Array = self.scalar.shells / self.stiffness
+        return numbers
 
     @property
     def product_error(self) -> float:
@@ -157,7 +161,8 @@ class VectorProblem:
 
         The largest of: what displacements fail to balance by at an asperity, the part of a slip
         that is not along the force, the slip where friction is not used up times the share of it
-        that is left (all over |X|); the force beyond P_i over P_i; the missing total over |T|.
+        that is left (all over |X|); the force beyond P_i over P_i; the missing total over |T|. The
+        conditions are those of docs/theory/friction.md, "The program".
         """
         if not np.isfinite(state.rise).all():
             return np.inf
@@ -180,7 +185,7 @@ class VectorProblem:
     def shift(self) -> Shift:
         """A shift for the cones and the dual bound, confirmed by Cholesky.
 
-        By the neighbours' distances, as proved in docs/theory/friction.md, 2 / (2 - nu) times
+        By the neighbours' distances, (3) of docs/theory/friction.md, "Convexity": 2 / (2 - nu) of
 
             1 / (pi E* s_i) at nu = 0,    (9/4) (1 - 2 nu / 3) / (pi E* s_i) for 0 < nu <= 1/2.
 
@@ -234,35 +239,44 @@ class VectorProblem:
             least energy >= X'T - q'Mq / 2 + sum_i min over |x| <= P_i of [h_i(x) + (M q - X)_i x],
 
         and the energy less that is a sum of terms that are not negative. Infinite where a share
-        of the shift exceeds 1, or X is.
+        of the shift exceeds 1, or X is. docs/theory/friction.md, "The least energy from below".
         """
         shift, shares = self.shift
         if shares.max() > 1 or not np.isfinite(state.rise).all():
             return np.inf
-        P, ceilings, q = self.scalar.loads, self.scalar.ceilings, state.increments
-        size = np.hypot(*q.T)
-        asked = state.rise - self.couple(q) - shift[:, None] * q
-        slope = np.hypot(*asked.T)
-        # The minimum is along `asked`, where x = deflection(|x| / P) solves
-        # ceiling [x - (2/3) S force(x)] = slope: a convex, growing function; Newton from the right.
-        most = ceilings * (1.0 - 2.0 / 3.0 * shares)
-        left = np.maximum(1.0 - shares, 1e-300)
-        x = np.minimum(np.minimum(slope, most) / (ceilings * left), 1.0)
+        q = state.increments
+        pull = state.rise - self.couple(q) - shift[:, None] * q  # X - M q
+        slope = np.hypot(*pull.T)
+        best = self._best_sizes(slope)
+        terms = self._convex_part(np.hypot(*q.T)) - (pull * q).sum(axis=1)
+        terms = terms - self._convex_part(best) + slope * best
+        missing = abs(float(state.rise @ (q.sum(axis=0) - state.total)))
+        return float(np.maximum(terms, 0.0).sum()) + missing
+
+    def _convex_part(self, sizes: Array) -> Array:
+        """(n,) h_i of forces of these sizes: the local energy less shift |q|^2 / 2."""
+        P, ceilings, shift = self.scalar.loads, self.scalar.ceilings, self.shift.values
+        return np.asarray(P * ceilings * mindlin.potential(sizes / P) - shift * sizes**2 / 2.0)
+
+    def _best_sizes(self, slope: Array) -> Array:
+        """(n,) the size |q| <= P_i at which h_i(q) - slope_i |q| is least.
+
+        With x = deflection(|q| / P) that is where  ceiling [x - (2/3) S force(x)] = slope, or 1: a
+        convex, growing function of x, so Newton's method runs down to it from its tangent at 0.
+        docs/theory/friction.md, "The least energy from below".
+        """
+        ceilings, shares = self.scalar.ceilings, self.shift.shares
+        slope = np.minimum(slope, ceilings * (1.0 - 2.0 / 3.0 * shares))
+        x = np.minimum(slope / (ceilings * np.maximum(1.0 - shares, 1e-300)), 1.0)
         for _ in range(60):
-            value = ceilings * (x - 2.0 / 3.0 * shares * mindlin.force(x)) - np.minimum(slope, most)
+            value = ceilings * (x - 2.0 / 3.0 * shares * mindlin.force(x)) - slope
             rate = ceilings * (1.0 - shares * np.sqrt(1.0 - x))
             step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
             x = np.clip(x - step, 0.0, 1.0)
             if (np.abs(step) <= 1e-15 * x).all():
                 break
-        best = P * mindlin.force(x)
-
-        def convex_part(size: Array) -> Array:
-            return np.asarray(P * ceilings * mindlin.potential(size / P) - shift * size**2 / 2.0)
-
-        terms = convex_part(size) - (asked * q).sum(axis=1) - convex_part(best) + slope * best
-        missing = abs(float(state.rise @ (q.sum(axis=0) - state.total)))
-        return float(np.maximum(terms, 0.0).sum()) + missing
+        best: Array = self.scalar.loads * mindlin.force(x)
+        return best
 
 
 def along(lengths: Array, vectors: Array, sizes: Array) -> Array:

@@ -1,0 +1,183 @@
+"""The words and bounds of friction under attack: wrong states, and loads in doubt."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_scenes import FRICTION, KINDS, NAMES, exact, off, pressed
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import MATERIAL, PAPER_APPROACH
+
+import convexrough as cr
+from convexrough.shearing.judgement import judge_states
+from convexrough.shearing.load_errors import LoadErrors
+from convexrough.shearing.problem import TangentialProblem
+from convexrough.sphere import hertz
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.sampled_from(NAMES),
+    st.floats(1e-6, 0.999),
+    st.sampled_from(["swap", "perturb", "drop", "zero"]),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from(KINDS),
+)
+def test_attacks_on_the_words(
+    name: str, fraction: float, kind: str, seed: int, influence: str
+) -> None:
+    """States that are wrong must not be given a wrong word, nor a bound that is too small."""
+    contact = pressed(name, influence)
+    problem = TangentialProblem.of(contact)
+    good = problem.solve(np.array([fraction * problem.loads.sum()]))
+    rng = np.random.default_rng(seed)
+    u = good.increments.copy()
+    if kind == "swap":
+        i, j = rng.integers(u.shape[1], size=2)
+        u[0, [i, j]] = u[0, [j, i]]
+    elif kind == "perturb":
+        u *= 1 + 10.0 ** rng.uniform(-14, -1) * rng.standard_normal(u.shape)
+    elif kind == "drop":
+        u[0, rng.integers(u.shape[1])] = 0.0
+    else:
+        u[:] = 0.0
+    u = np.clip(u, -problem.loads, problem.loads)
+    eta = np.where(u < problem.loads, problem.deflections(u), good.deflections)
+    wrong = good._replace(
+        increments=u, deflections=eta, slips=np.maximum(eta - problem.ceilings, 0)
+    )
+    bounds = judge_states(problem, wrong)
+    truly_sliding = good.slips > 0
+    assert not (bounds.sliding & ~truly_sliding).any()
+    assert not (bounds.partial & truly_sliding).any()
+    assert (np.abs(u - good.increments) <= bounds.increments * (1 + 1e-9)).all()
+    assert (np.abs(wrong.rises - good.rises) <= bounds.rises * (1 + 1e-9)).all()
+
+
+def in_doubt(contact: cr.Contact, digits: int, control: str) -> cr.Contact:
+    """The contact with rounded loads, and the certificate of those."""
+    rounded = np.array([float(f"{load:.{digits - 1}e}") for load in contact.loads])
+    # Not symmetric: every other load is off the other way.
+    rounded[1::2] += 10.0 ** (-digits) * rounded[1::2]
+    given: Any = {control: getattr(contact, control)}
+    return replace(
+        contact,
+        loads=rounded,
+        load=float(rounded.sum()),
+        contact_radii=hertz.contact_radius(rounded, 1.0, contact.scene.relative_radii),
+        certificate=cr.certify(contact.scene, rounded, **given, influence=contact.influence),
+    )
+
+
+@pytest.mark.parametrize("digits", [3, 5, 8, 12])
+@pytest.mark.parametrize("fraction", [1e-6, 0.1, 0.37, 0.6, 0.999])
+@pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize("influence", KINDS)
+def test_doubt_about_the_loads_is_counted(
+    influence: Any, control: str, fraction: float, digits: int
+) -> None:
+    """Starting from rounded loads, with the certificate of those, the bounds cover the truth."""
+    contact, truth = pressed("paper", influence, control), exact("paper", fraction, control)
+    doubtful = in_doubt(contact, digits, control)
+    problem = TangentialProblem.of(doubtful)
+    known = LoadErrors.of(problem)
+    missed = doubtful.loads[problem.touching] - contact.loads[problem.touching]
+    missed[~known.sure] = 0.0
+    weights = np.where(known.sure, known.stiffness, 0.0)
+    distance = np.sqrt(np.sum(weights * (missed / problem.units.force) ** 2))
+    assert distance <= known.distance * (1 + 1e-9) + 1e-13
+    assert known.image_norm(np.ones(len(problem))) <= known.distance * (1 + 1e-9)
+    state = cr.shear(doubtful, force=fraction * FRICTION * contact.load)
+    certificate = state.certificate
+    for i, true in enumerate(truth.forces):
+        assert off(state.forces[i], true) <= certificate.force_errors[i]
+        assert off(state.slips[i], truth.slips[i]) <= certificate.slip_errors[i]
+        assert certificate.status[i] != ("partial" if truth.slips[i] > 0 else "sliding")
+    assert off(state.displacement, truth.displacement) <= certificate.displacement_error
+
+
+@pytest.mark.parametrize("kind", ["approach", "load", "random", "one", "fringe"])
+@pytest.mark.parametrize("fraction", [1e-6, 0.1, 0.3, 0.6, 0.95])
+@pytest.mark.parametrize("influence", KINDS)
+def test_all_that_wrong_loads_can_do_is_counted(influence: Any, fraction: float, kind: str) -> None:
+    """A certificate that leaves the loads no room beyond what they are off by."""
+    contact = pressed("rough", influence, "load" if kind == "load" else "approach")
+    off_by, loaded, approach = 1e-6, contact.loads > 0, contact.approach
+    if kind in ("approach", "load"):
+        near = cr.press(contact.scene, approach=approach * (1 + off_by), influence=influence)
+        loads, approach = near.loads, near.approach
+    else:
+        size = np.random.default_rng(5).choice([-1, 1], len(loaded)).astype(float)
+        if kind != "random":
+            order = np.argsort(np.where(loaded, contact.loads, np.inf))
+            chosen = order[:6] if kind == "fringe" else order[int(loaded.sum()) - 1 :]
+            size = np.isin(np.arange(len(loaded)), chosen).astype(float)
+        loads = contact.loads * (1 + off_by * size)
+    wrong = replace(
+        contact,
+        loads=loads,
+        load=float(loads.sum()),
+        contact_radii=hertz.contact_radius(loads, 1.0, contact.scene.relative_radii),
+        certificate=replace(
+            contact.certificate,
+            load_errors=np.abs(loads - contact.loads) * (1 + 1e-9) + 1e-14 * contact.loads,
+            approach=approach if kind == "load" else contact.approach,
+            approach_error=abs(approach - contact.approach) if kind == "load" else 0.0,
+        ),
+    )
+    problem = TangentialProblem.of(wrong)
+    known = LoadErrors.of(problem)
+    missed = (loads - contact.loads)[problem.touching] / problem.units.force
+    distance = np.sqrt(known.stiffness @ missed**2)
+    assert distance <= known.distance * (1 + 1e-9)
+    assert known.distance < 2 * distance
+    force = fraction * FRICTION * contact.load
+    state, truth = cr.shear(wrong, force=force), cr.shear(contact, force=force)
+    proof = state.certificate
+    assert (np.abs(state.forces - truth.forces) <= proof.force_errors).all()
+    assert (np.abs(state.slips - truth.slips) <= proof.slip_errors).all()
+    assert abs(state.displacement - truth.displacement) <= proof.displacement_error
+    assert proof.force_errors.max() < 1e-3 * state.forces.max()
+    assert (state.status == truth.status).all()
+
+
+@pytest.mark.parametrize("ulps", [0, 2, -2, 8, -8])
+@pytest.mark.parametrize("fraction", [1e-12, 1e-9, 0.25, 0.9])
+def test_an_asperity_that_may_or_may_not_touch(fraction: float, ulps: int) -> None:
+    """Its slip is unknown, and what it could carry is in the bounds of the other."""
+    spacing, approach = 0.0025, 5e-5
+
+    def scene(height: float) -> cr.Scene:
+        asperities = cr.Asperities([[0, 0], [spacing, 0]], 0.02, [0, height])
+        return cr.Scene(1.0, asperities, MATERIAL, FRICTION)
+
+    alone = cr.press(scene(-1.0), approach=approach).loads[0]
+    height = alone / (np.pi * spacing) - approach + spacing**2 / 2
+    contact = cr.press(scene(height + ulps * np.spacing(height)), approach=approach)
+    state = cr.shear(contact, force=fraction * FRICTION * contact.load)
+    if contact.status[1] == "undecided":
+        assert state.status[1] == "undecided"
+        assert np.isinf(state.certificate.slip_errors[1])
+        lost = FRICTION * contact.certificate.load_errors[1]
+        assert state.certificate.force_errors[1] >= lost
+        assert state.certificate.force_errors[0] >= 0.5 * lost
+
+
+def test_just_before_gross_sliding_the_last_one_sticks() -> None:
+    contact = pressed("paper")
+    state = cr.shear(contact, force=FRICTION * contact.load * (1 - 1e-11))
+    assert (state.status == "sliding").sum() == 36
+    assert state.status[0] == "partial"
+    assert state.certificate.holds
+
+
+def test_an_uncertified_contact_gets_no_word() -> None:
+    lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=5.0, within=0.0102)
+    contact = cr.press(cr.Scene(1.0, lattice, MATERIAL, 0.5), approach=PAPER_APPROACH)
+    assert contact.certificate.scope == "none"
+    state = cr.shear(contact, force=0.1 * FRICTION * contact.load)
+    assert state.certificate.scope == "none"
+    assert not state.certificate.holds
+    assert (state.status == "undecided").all()

@@ -1,0 +1,95 @@
+"""The program of vector friction: its kernel and shift, its residual and its duality gap."""
+
+import numpy as np
+import pytest
+from friction_scenes import FRICTION, cerruti, pressed, with_friction
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import random_scenes
+
+import convexrough as cr
+from convexrough import FrictionNewton
+from convexrough.vector_shear.problem import VectorProblem, VectorState
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.floats(0, 0.5))
+def test_the_shift_makes_the_kernel_semidefinite(seed: int, count: int, nu: float) -> None:
+    """C + diag(c) >= 0 with the c of the neighbours' distances, over random layouts."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-1, 1, (count, 2))
+    if rng.random() < 0.5:  # rows and clusters
+        points = np.round(points * 3) / 3 + 1e-2 * rng.standard_normal(points.shape)
+    scene = cr.Scene(1.0, cr.Asperities(points, 0.01), cr.Material(1.0, nu), FRICTION)
+    C = cerruti(scene).transpose(0, 2, 1, 3).reshape(2 * count, 2 * count)
+    apart = np.hypot(*(points[:, None] - points).T)
+    np.fill_diagonal(apart, np.inf)
+    shells = apart.min(axis=1) / 2
+    c = (9 / 4 * (1 - 2 * nu / 3) if nu > 0 else 1.0) / (
+        np.pi * scene.material.shear_modulus * shells
+    )
+    root = np.repeat(1 / np.sqrt(c), 2)
+    lowest = np.linalg.eigvalsh(C * root * root[:, None] + np.eye(2 * count))[0]
+    assert lowest >= -1e-12
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
+def test_the_shift_that_the_cones_use(nu: float) -> None:
+    """0.34, 0.71, 0.67 on the paper's scene: the distances of neighbours; it is not the least."""
+    problem = VectorProblem.of(pressed("paper", nu=nu))
+    values, shares = problem.shift
+    assert shares.max() == pytest.approx({0.0: 0.335, 0.3: 0.709, 0.5: 0.670}[nu], abs=1e-3)
+    matrix = problem.kernel + np.diag(np.repeat(values, 2))
+    assert np.linalg.eigvalsh(matrix)[0] >= 0
+    assert problem.least_share < shares.max()
+    least = problem.kernel + np.diag(np.repeat(problem.least_share * problem.stiffness, 2))
+    assert abs(np.linalg.eigvalsh(least)[0]) < 1e-12 * np.abs(least).max()
+
+
+def test_the_residual_sees_every_fault() -> None:
+    """The judge itself is judged: one asperity that slides, one condition broken in its turn."""
+    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.01), cr.Material(1.0, 0.5), FRICTION)
+    problem = VectorProblem.of(cr.press(scene, approach=1e-4))
+    P, ceiling = problem.scalar.loads[0], problem.scalar.ceilings[0]
+    along_x = np.array([[1.0, 0.0]])
+
+    def residual(share: float, slip: tuple[float, float], off: float = 0.0) -> float:
+        """Of a state with displacements that balance, but for `off` across."""
+        q, slips = share * P * along_x, ceiling * np.array([slip])
+        rise = (problem.own(q) + slips)[0] + [0.0, off * ceiling]
+        return problem.residual(VectorState(q[0], q, rise, slips, 1))
+
+    assert residual(1.0, (0.5, 0.0)) < 1e-14
+    assert residual(0.7, (0.0, 0.0)) < 1e-14
+    assert residual(1.0, (0.5, 0.0), off=1e-3) > 1e-4  # balance
+    assert residual(1.0, (0.5, 1e-3)) > 1e-4  # slip across the force
+    assert residual(1.0, (-0.5, 0.0)) > 1e-4  # slip against it
+    assert residual(0.7, (1e-3, 0.0)) > 1e-4  # slip, though friction is left
+    assert residual(1.001, (0.5, 0.0)) > 1e-4  # more than friction
+    q = P * along_x
+    short = VectorState(1.001 * q[0], q, problem.own(q)[0], 0 * q, 1)
+    assert problem.residual(short) > 1e-4  # total
+
+
+@settings(max_examples=40, deadline=None)
+@given(random_scenes(crowding=0.9), st.floats(1e-3, 0.999), st.floats(0, 0.5))
+def test_the_duality_gap_bounds_what_forces_cost_too_much(
+    drawn: tuple[cr.Scene, float], fraction: float, nu: float
+) -> None:
+    scene, approach = drawn
+    contact = cr.press(with_friction(scene, nu=nu), approach=approach)
+    if contact.load == 0 or contact.certificate.scope == "none":
+        return
+    problem = VectorProblem.of(contact)
+    total = np.array([fraction * problem.scalar.loads.sum(), 0.0])
+    best = FrictionNewton().solve(problem, total)
+    least = problem.energy(best.increments, problem.couple(best.increments))
+    assert 0 <= problem.duality_gap(best) <= 1e-11 * least
+    short = best._replace(increments=0.99 * best.increments)
+    assert problem.duality_gap(short) > 5e-3 * least  # 1 % of the total is missing
+    # Forces in proportion to the loads are borne too, and have the right total.
+    other = best._replace(increments=fraction * np.outer(problem.scalar.loads, [1.0, 0.0]))
+    for scale in (0.5, 1.0, 2.0):
+        moved = other._replace(rise=scale * best.rise)
+        excess = problem.energy(other.increments, problem.couple(other.increments)) - least
+        assert problem.duality_gap(moved) >= excess * (1 - 1e-9) - 1e-11 * least
