@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.errors import SolverError
-from convexrough.influence import DenseInfluence, Influence, Smoother
-from convexrough.influence.dense import dense_matrix
+from convexrough.influence.coupling import Influence, Smoother
+from convexrough.influence.dense import DenseInfluence, dense_matrix
 
 #: Up to so many touching asperities, a Cholesky factor is cheapest: with a matrix at hand, ...
 FACTORISED = 1500

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.roundoff import SAFETY
 
 #: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points: differences 1,
 #: squares 3, their sum 4, its root 3, then a product with pi and a division.
@@ -143,30 +142,3 @@ def inverse_distances(points: Array, others: Array) -> Array:
         inverse: Array = 1.0 / np.sqrt(squares)
     inverse[squares == 0] = 0.0
     return inverse
-
-
-def shells(influence: Influence) -> Array:
-    """(n,) 1 / (pi E* s_i) of radii s_i with s_i + s_j <= r_ij: half the nearest distances.
-
-    With them A + diag(shells) is positive semidefinite (docs/theory/convexity.md). A single
-    asperity has no neighbour; infinite where rounding leaves no shell.
-    """
-    with np.errstate(divide="ignore"):
-        values: Array = 2.0 * influence.scale / influence.separations()
-    return values
-
-
-def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
-    """`shells` that fit contact radii a (n,) [length] where neighbours differ in size.
-
-    s_i = share a_i / c + (1 - share) d_i / 2  with c the crowding, the largest (a_i + a_j) / r_ij,
-    and d_i the distance to the nearest neighbour: each part keeps s_i + s_j <= r_ij, so their
-    mean does. Then every a_i / s_i is at most c / share.
-    """
-    crowding = influence.crowding(radii) * (1.0 + SAFETY + 2.0 * influence.entry_error)
-    s = (1.0 - share) * influence.separations() / 2.0
-    if 0 < crowding < np.inf:
-        s = s + share * (radii / crowding)
-    with np.errstate(divide="ignore"):
-        values: Array = influence.scale / s
-    return values

@@ -23,7 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
-from convexrough.influence import Coupling, DenseInfluence, Influence, Kind, spread
+from convexrough.influence import DenseInfluence, Influence, Kind
+from convexrough.influence.coupling import Coupling, spread
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene

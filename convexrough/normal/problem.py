@@ -18,37 +18,16 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices
-from convexrough.influence import Influence, Kind, couple, fitted_shells, shells
+from convexrough.influence import Influence, Kind, couple
+from convexrough.influence.shells import fitted_shells, shells
 from convexrough.normal.load_control import approach_bound, highest_approach, shifted_to_load
+from convexrough.normal.units import Units
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
 #: The part of the room between neighbours that fitted shells share out by size.
 FITTED = 0.9
-
-
-@dataclass(frozen=True)
-class Units:
-    """Units in which the problem's numbers are about 1.
-
-    Powers of two, and the force a power of eight, so that scaling a float64 number (and its 2/3
-    power) by them is exact.
-    """
-
-    length: float  # [length] of approach
-    force: float  # [force]
-
-    @property
-    def local(self) -> float:
-        """What a local coefficient k is multiplied by: force^(2/3) / length, a power of two."""
-        return float(2.0 ** np.round(np.log2(self.force) * 2 / 3) / self.length)
-
-    @classmethod
-    def of(cls, approach: float, coefficient: float) -> Units:
-        length = 2.0 ** np.round(np.log2(approach))
-        force = 8.0 ** np.round(np.log2(length / coefficient) / 2.0)
-        return cls(float(length), float(force))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
-from convexrough.influence import couple, fitted_shells, spread
+from convexrough.influence import couple
+from convexrough.influence.coupling import spread
+from convexrough.influence.shells import fitted_shells
 from convexrough.normal.certificate import FIT_FROM, SUM_ROUNDOFFS
 from convexrough.normal.problem import FITTED
 from convexrough.roundoff import ROUNDOFF, SAFETY

@@ -16,8 +16,9 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
-from convexrough.influence import couple, shells
-from convexrough.normal.problem import Units
+from convexrough.influence import couple
+from convexrough.influence.shells import shells
+from convexrough.normal.units import Units
 from convexrough.progress import Announce
 from convexrough.shearing.energy import TangentialEnergy
 from convexrough.shearing.newton import States, by_matrices, solve_in_turn, solve_together

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import paper, rough, scattered
 
-from convexrough.influence import DenseInfluence, inverse_distances, shells, spread
+from convexrough.influence.coupling import inverse_distances, spread
+from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.shells import shells
 
 SCALE = 0.37
 

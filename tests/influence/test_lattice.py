@@ -13,14 +13,11 @@ from scenes import paper, rough, steel
 
 import convexrough as cr
 from convexrough.convex.newton_step import correct
-from convexrough.influence import (
-    DenseInfluence,
-    LatticeInfluence,
-    fitted_shells,
-    inverse_distances,
-    shells,
-)
 from convexrough.influence.convolution import Box, _pass_roundoffs, neighbours
+from convexrough.influence.coupling import inverse_distances
+from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.lattice import LatticeInfluence
+from convexrough.influence.shells import fitted_shells, shells
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import BLUR, Lattice
 from convexrough.scene.neighbours import nearest_distances

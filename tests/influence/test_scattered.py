@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from convexrough.influence import DenseInfluence, inverse_distances
-from convexrough.influence.mesh import Product, within
+from convexrough.influence.coupling import inverse_distances
+from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.pair_sums import Product, within
 from convexrough.influence.scattered import ScatteredCoupling, ScatteredInfluence
 from convexrough.influence.softened import Softened, _steepest, lagrange, lebesgue
 from convexrough.influence.splitting import Plan

@@ -24,7 +24,7 @@ from scenes import (
 )
 
 import convexrough as cr
-from convexrough.influence import Influence, Kind, Rounding
+from convexrough.influence.coupling import Influence, Kind, Rounding
 from convexrough.normal.certificate import _convex_margin, _find_box, judge
 from convexrough.normal.problem import NormalProblem
 

@@ -22,7 +22,7 @@ from scenes import (
 )
 
 import convexrough as cr
-from convexrough.influence import Kind, inverse_distances
+from convexrough.influence.coupling import Kind, inverse_distances
 from convexrough.normal.load_control import highest_approach, shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Newton

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH
 
 import convexrough as cr
-from convexrough.influence import LatticeInfluence
+from convexrough.influence.lattice import LatticeInfluence
 from convexrough.run.stages import compute
 from convexrough.shearing.certificate import judge_in_turn, judge_states
 from convexrough.shearing.first_loading import Family

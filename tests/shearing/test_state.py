@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, random_scenes, solve_exactly
 
 import convexrough as cr
-from convexrough.influence import inverse_distances
+from convexrough.influence.coupling import inverse_distances
 from convexrough.shearing.certificate import judge_states
 from convexrough.shearing.load_errors import Known
 from convexrough.shearing.problem import TangentialProblem
