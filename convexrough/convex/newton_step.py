@@ -29,7 +29,7 @@ from convexrough.influence.dense import DenseInfluence, dense_matrix
 FACTORISED = 1500
 
 #: ... and without.
-FACTORISED_FEW = 100
+FACTORISED_UNSTORED = 100
 
 #: What conjugate gradients in single and double precision can still reduce the residual to.
 SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
@@ -68,7 +68,7 @@ def correct(
     if len(touching) == 0:
         return Correction(-defect, 0.0, 0)
     at_hand = isinstance(influence, DenseInfluence)
-    direct = len(touching) <= (FACTORISED if at_hand else FACTORISED_FEW)
+    direct = len(touching) <= (FACTORISED if at_hand else FACTORISED_UNSTORED)
     for extra in (None, shells):
         try:
             if direct:
@@ -113,9 +113,9 @@ def _factorise(
     if balanced:
         shift = float(w @ y) / float(w @ border)
         y = y - shift * border
-    spread = np.zeros(len(root))
-    spread[touching] = w * y
-    return Correction(shift - defect + influence.apply(spread), shift, 1)
+    pushed = np.zeros(len(root))
+    pushed[touching] = w * y
+    return Correction(shift - defect + influence.apply(pushed), shift, 1)
 
 
 def _iterate(
@@ -131,7 +131,7 @@ def _iterate(
     (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376.) The residual is kept on the
     plane, too, so that single precision does not lose it beside the shift.
     """
-    single = influence.single
+    single = influence.prefers_single
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
     tolerance = max(tolerance, limit)

@@ -38,7 +38,7 @@ class Rounding(NamedTuple):
 
     def of(self, displacement: Array) -> Array:
         """A bound for each component; `displacement` is A |P| as computed."""
-        return self.relative * np.maximum(displacement, 0.0) + self.single
+        return self.relative * np.maximum(displacement, 0.0) + self.component
 
     def negligible(self, displacement: Array) -> float:
         """2-norm of a residual that solvers need not reduce: small beside these bounds.
@@ -49,7 +49,7 @@ class Rounding(NamedTuple):
         return 0.1 * self.relative * float(np.linalg.norm(displacement)) + 0.05 * self.norm
 
     @property
-    def single(self) -> float:
+    def component(self) -> float:
         """Bound on each |r_i|, and on what it adds to the relative part."""
         return 1.01 * min(self.each, self.norm)
 
@@ -80,7 +80,7 @@ class Influence(Coupling, Protocol):
 
     name   : "dense", "lattice" or "scattered"
     points : (n, 2) [length];  scale : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
-    single : whether products of float32 loads are cheaper than those of float64 loads
+    prefers_single : products of float32 loads are cheaper than those of float64 loads
     """
 
     @property
@@ -90,7 +90,7 @@ class Influence(Coupling, Protocol):
     @property
     def scale(self) -> float: ...
     @property
-    def single(self) -> bool: ...
+    def prefers_single(self) -> bool: ...
 
     @property
     def matrix(self) -> Array:
@@ -129,7 +129,7 @@ class Influence(Coupling, Protocol):
         ...
 
 
-def spread(coupling: Coupling, scale: float, variances: Array) -> Array:
+def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
     """(m,) bounds on sqrt(sum_j A_ij^2 v_j): how far an error of the loads moves each point."""
     return scale * np.sqrt(coupling.falloff(variances, 2))
 

@@ -61,7 +61,7 @@ class DenseInfluence:
     entry_error: float
 
     name: ClassVar[Kind] = "dense"
-    single: ClassVar[bool] = False
+    prefers_single: ClassVar[bool] = False
 
     @classmethod
     def assemble(cls, points: Array, scale: float, point_error: float = 0.0) -> DenseInfluence:

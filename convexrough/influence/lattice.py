@@ -112,7 +112,7 @@ class LatticeInfluence(LatticeCoupling):
     point_error: float
 
     name: ClassVar[Kind] = "lattice"
-    single: ClassVar[bool] = True
+    prefers_single: ClassVar[bool] = True
 
     @classmethod
     def assemble(

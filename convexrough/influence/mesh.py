@@ -15,7 +15,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel
 from convexrough.influence.near_pairs import Order
 from convexrough.influence.softened import Softened, lagrange
-from convexrough.influence.splitting import Plan
+from convexrough.influence.splitting import Splitting
 from convexrough.roundoff import ROUNDOFF
 
 #: Points of one block at most: what keeps sums short, and a matrix product in the cache.
@@ -75,21 +75,23 @@ class Interpolation:
     shape: tuple[int, int]
 
     @classmethod
-    def assemble(cls, order: Order, plan: Plan, dtype: Any) -> Interpolation:
+    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> Interpolation:
         rows, columns = order.shape
         patches = []
-        corners = np.stack((order.keys // columns, order.keys % columns), axis=1) * plan.block
+        corners = np.stack((order.keys // columns, order.keys % columns), axis=1) * splitting.block
         for key, (i, j) in enumerate(corners.tolist()):
             start, stop = order.starts[key : key + 2].tolist()
             for first in range(start, stop, BLOCK):
                 patches.append((first, min(first + BLOCK, stop), i, j))
         offsets = order.cells - np.repeat(corners, np.diff(order.starts), axis=0)
-        factors = [_rows(order.shares[:, k], offsets[:, k], plan).astype(dtype) for k in (0, 1)]
-        extra = plan.kernel.order - 1
-        shape = (rows * plan.block + extra, columns * plan.block + extra)
+        factors = [
+            _rows(order.shares[:, k], offsets[:, k], splitting).astype(dtype) for k in (0, 1)
+        ]
+        extra = splitting.kernel.order - 1
+        shape = (rows * splitting.block + extra, columns * splitting.block + extra)
         return cls(factors[0], factors[1], patches, shape)
 
-    def spread(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
+    def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
         """W^T P on the mesh; of the sizes of the weights if `absolute`."""
         field = np.zeros(self.shape, dtype=loads.dtype)
         x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
@@ -100,7 +102,7 @@ class Interpolation:
             field[i : i + width, j : j + width] += x[mine].T @ (column[mine] * y[mine])
         return field
 
-    def gather(self, field: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
+    def from_nodes(self, field: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
         """W of a field on the mesh."""
         result = np.empty(len(self.x), dtype=field.dtype)
         x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
@@ -112,10 +114,10 @@ class Interpolation:
         return result
 
 
-def _rows(shares: Array, offsets: Indices, plan: Plan) -> Array:
+def _rows(shares: Array, offsets: Indices, splitting: Splitting) -> Array:
     """(n, width) weights of one direction, each set where its stencil is."""
-    order = plan.kernel.order
-    rows = np.zeros((len(shares), plan.width))
+    order = splitting.kernel.order
+    rows = np.zeros((len(shares), splitting.width))
     columns = offsets[:, None] + np.arange(order)
     np.put_along_axis(rows, columns, lagrange(shares, order), axis=1)
     return rows

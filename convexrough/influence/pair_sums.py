@@ -23,7 +23,7 @@ from convexrough.influence.coupling import Rounding
 from convexrough.influence.mesh import BLOCK, Interpolation, Mesh
 from convexrough.influence.near_pairs import Near, Order
 from convexrough.influence.softened import lebesgue, weight_roundoffs
-from convexrough.influence.splitting import Plan
+from convexrough.influence.splitting import Splitting
 from convexrough.roundoff import ROUNDOFF
 
 
@@ -31,7 +31,7 @@ from convexrough.roundoff import ROUNDOFF
 class Product:
     """P -> sum_j P_j / r_ij^q, and how far it is off."""
 
-    plan: Plan
+    splitting: Splitting
     order: Order
     near: Near
     weights: Interpolation | None
@@ -40,20 +40,20 @@ class Product:
     kernel_errors: tuple[float, float]
 
     @classmethod
-    def assemble(cls, points: Array, plan: Plan, dtype: Any) -> Product:
-        order = Order.of(points, plan)
-        near = Near.assemble(order, plan, dtype)
-        if not plan.meshed:
+    def assemble(cls, points: Array, splitting: Splitting, dtype: Any) -> Product:
+        order = Order.of(points, splitting)
+        near = Near.assemble(order, splitting, dtype)
+        if not splitting.meshed:
             nothing = Kernel(np.empty((0, 0)), 0.0, 0.0)
-            return cls(plan, order, near, None, Mesh((1, 1), np.eye(2)), nothing, (0.0, 0.0))
-        weights = Interpolation.assemble(order, plan, dtype)
+            return cls(splitting, order, near, None, Mesh((1, 1), np.eye(2)), nothing, (0.0, 0.0))
+        weights = Interpolation.assemble(order, splitting, dtype)
         rows, columns = weights.shape
-        mesh = Mesh((rows, columns), plan.spacing * np.eye(2))
+        mesh = Mesh((rows, columns), splitting.spacing * np.eye(2))
         size = float(mesh.padded[0]) * mesh.padded[1]
         checks.fits_in_memory("asperities that could touch", len(points), 32 * size / len(points))
-        kernel, *errors = mesh.softened(plan.kernel)
+        kernel, *errors = mesh.softened(splitting.kernel)
         kernel = Kernel(kernel.spectrum.astype(dtype, copy=False), kernel.total, kernel.norm)
-        return cls(plan, order, near, weights, mesh, kernel, (errors[0], errors[1]))
+        return cls(splitting, order, near, weights, mesh, kernel, (errors[0], errors[1]))
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         """The sparse part on another thread: both it and the transforms leave Python."""
@@ -72,8 +72,8 @@ class Product:
     def smooth(self, ordered: NDArray[Any]) -> NDArray[Any]:
         """W G W^T P."""
         assert self.weights is not None
-        field = self.mesh.convolve(self.weights.spread(ordered), self.kernel.spectrum)
-        return self.weights.gather(field)
+        field = self.mesh.convolve(self.weights.to_nodes(ordered), self.kernel.spectrum)
+        return self.weights.from_nodes(field)
 
     def interpolation(self, strengths: Array) -> Array:
         """(n,) bounds on the error of interpolation, for strengths that are not negative.
@@ -81,8 +81,8 @@ class Product:
         Of pairs within the reach and the sway of their stencils, which all count as the worst; that
         of the others is relative, and part of `rounding`.
         """
-        kernel, spacing = self.plan.kernel, self.plan.spacing
-        if not self.plan.meshed:
+        kernel, spacing = self.splitting.kernel, self.splitting.spacing
+        if not self.splitting.meshed:
             return np.zeros(len(strengths))
         points, ordered = self.order.points, strengths[self.order.places]
         near = within(points, ordered, kernel.reach + kernel.sway(spacing))
@@ -105,11 +105,11 @@ class Product:
     @cached_property
     def _rounding(self) -> tuple[float, float]:
         """Of everything but transforms and interpolation nearby, relative and in the 2-norm."""
-        kernel = self.plan.kernel
+        kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 8) * ROUNDOFF
         extent = float(np.ptp(self.order.points, axis=0).max()) if len(self.order.points) else 0.0
         relative += kernel.moved(2.0 * np.sqrt(2.0) * 2.0 * ROUNDOFF * extent)
-        relative += kernel.far_error(self.plan.spacing)
+        relative += kernel.far_error(self.splitting.spacing)
         own = (kernel.roundoffs + 8) * ROUNDOFF * kernel.centre
         return 1.01 * relative, 1.01 * own
 
@@ -119,24 +119,24 @@ class Product:
         norm, each = own * float(np.linalg.norm(loads)), own * float(np.abs(loads).max(initial=0.0))
         if self.weights is not None:
             ordered = loads[self.order.places]
-            field = float(np.linalg.norm(self.weights.spread(ordered)))
-            sizes = float(np.linalg.norm(self.weights.spread(np.abs(ordered), absolute=True)))
+            field = float(np.linalg.norm(self.weights.to_nodes(ordered)))
+            sizes = float(np.linalg.norm(self.weights.to_nodes(np.abs(ordered), absolute=True)))
             mesh, kernel, errors = self.mesh, self.kernel, self.kernel_errors
             to_mesh, from_mesh = self._weighing
             transforms = mesh.bound(kernel, ROUNDOFF) + errors[0] + from_mesh * kernel.total
             norm += self._stretch * (transforms * field + to_mesh * kernel.total * sizes)
             # One by one: Cauchy's inequality for a row of G, and the sum of a row of |W|.
             transforms = mesh.bound_each(kernel, ROUNDOFF) + errors[1] + from_mesh * kernel.norm
-            growth = lebesgue(self.plan.kernel.order) ** 2
+            growth = lebesgue(self.splitting.kernel.order) ** 2
             each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
         return Rounding(relative, 1.01 * norm, 1.01 * each)
 
     @property
     def _weighing(self) -> tuple[float, float]:
         """Rounding of sums with W, to the mesh and from it; adding zeros costs none."""
-        order, width = self.plan.kernel.order, self.plan.width
+        order, width = self.splitting.kernel.order, self.splitting.width
         weights = 2.0 * weight_roundoffs(order) + 2.0
-        overlaps = (-(-width // self.plan.block)) ** 2
+        overlaps = (-(-width // self.splitting.block)) ** 2
         crowded = float(np.diff(self.order.starts).max())
         to_mesh = min(crowded, BLOCK) + overlaps * np.ceil(crowded / BLOCK)
         return (weights + float(to_mesh)) * ROUNDOFF, (weights + 2.0 * order) * ROUNDOFF
@@ -148,7 +148,8 @@ class Product:
         vector = np.ones(len(self.order.points))
         least = np.inf
         for _ in range(3):
-            image = self.weights.gather(self.weights.spread(vector, absolute=True), absolute=True)
+            nodes = self.weights.to_nodes(vector, absolute=True)
+            image = self.weights.from_nodes(nodes, absolute=True)
             least = min(least, float((image / vector).max()))
             vector = np.sqrt(vector * image)
             vector /= vector.max()

@@ -17,7 +17,7 @@ from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered_smoother import coarse_inverse
-from convexrough.influence.splitting import Plan
+from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
 #: Error of a product, relative to its own size, that is left to interpolation.
@@ -46,7 +46,7 @@ class ScatteredInfluence:
     tolerance: float
 
     name: ClassVar[Kind] = "scattered"
-    single: ClassVar[bool] = True
+    prefers_single: ClassVar[bool] = True
 
     @classmethod
     def assemble(
@@ -135,8 +135,8 @@ class ScatteredInfluence:
         return self._product(3, FALLOFF_TOLERANCE, np.float64)
 
     def _product(self, power: int, tolerance: float, dtype: Any) -> Product:
-        plan = Plan.choose(self.points, power, tolerance)
-        return Product.assemble(self.points, plan, dtype)
+        splitting = Splitting.choose(self.points, power, tolerance)
+        return Product.assemble(self.points, splitting, dtype)
 
 
 @dataclass(frozen=True, eq=False)

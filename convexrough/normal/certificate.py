@@ -24,7 +24,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.influence import DenseInfluence, Influence, Kind
-from convexrough.influence.coupling import Coupling, spread
+from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
@@ -137,16 +137,16 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
         errors = norm / np.sqrt(h)
 
     duality_gap = problem.duality_gap(
-        loads, fit.displacement, fit.approach, near, fit.rounding + fit.single
+        loads, fit.displacement, fit.approach, near, fit.rounding + fit.component
     ) * (problem.units.force * problem.units.length)
 
     # What it says of A P and D0, and so of delta* = D - A P*.
     A = problem.influence
-    moved = norm * spread(A, A.scale, 1.0 / h) * (1 + SAFETY)
+    moved = norm * error_reach(A, A.scale, 1.0 / h) * (1 + SAFETY)
     approach_error = 0.0
     if problem.load is not None:
         approach_error = _approach_error(problem, loads, fit, errors, moved)
-    error = moved + fit.rounding + fit.single + approach_error
+    error = moved + fit.rounding + fit.component + approach_error
     touches = (loads > errors) | (fit.indentation > error)
 
     # delta* gives a second bound on each load, sharper where the load is small.
@@ -161,7 +161,7 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
     others, without = _screened(problem, loads, fit.approach)
     if without is not None:
         indentation[others] = without.indentation
-        moved = norm * spread(without.coupling, A.scale, 1.0 / h) * (1 + SAFETY)
+        moved = norm * error_reach(without.coupling, A.scale, 1.0 / h) * (1 + SAFETY)
         error[others] = moved + without.rounding + approach_error
     load_errors = scene_loads.copy()
     load_errors[problem.candidates] = errors * problem.units.force
@@ -189,7 +189,7 @@ class _Fit(NamedTuple):
     local: Array  # k P^(2/3)
     rounding: Array  # bound on the error of each of the above, less a remainder
     remainder: float  # bound on the 2-norm of that
-    single: float  # bound on each component of it
+    component: float  # bound on each component of it
     residual: Array  # bound on |e|, less the remainder: |gap| where loaded, else its negative part
     approach: float  # D0
 
@@ -231,11 +231,13 @@ def _fit(problem: NormalProblem, loads: Array) -> _Fit:
     gap = local - indentation
     off = problem.influence.rounding(loads)
     # The relative part is of the true product, which the computed one may miss by the remainder.
-    rounding = off.relative * (np.maximum(displacement, 0.0) + off.single) + problem.offset_errors
+    rounding = (
+        off.relative * (np.maximum(displacement, 0.0) + off.component) + problem.offset_errors
+    )
     rounding += SUM_ROUNDOFFS * ROUNDOFF * (local + np.abs(displacement) + abs(approach))
     residual = np.where(loads > 0, np.abs(gap) + rounding, np.maximum(rounding - gap, 0.0))
     return _Fit(
-        displacement, indentation, gap, local, rounding, off.norm, off.single, residual, approach
+        displacement, indentation, gap, local, rounding, off.norm, off.component, residual, approach
     )
 
 
@@ -296,7 +298,7 @@ def _approach_error(
 ) -> float:
     """|D0 - D0*|, as D0* = k_i P*_i^(2/3) + (A P*)_i - d_i at every asperity sure to touch."""
     least = hertz.indentation(np.maximum(loads - errors, 0.0), problem.coefficients)
-    each = np.abs(fit.gap) + fit.rounding + fit.single + (fit.local - least) + moved
+    each = np.abs(fit.gap) + fit.rounding + fit.component + (fit.local - least) + moved
     return float(each.min(where=loads > errors, initial=np.inf))
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.influence import couple
-from convexrough.influence.coupling import spread
+from convexrough.influence.coupling import error_reach
 from convexrough.influence.shells import fitted_shells
 from convexrough.normal.certificate import FIT_FROM, SUM_ROUNDOFFS
 from convexrough.normal.problem import FITTED
@@ -68,7 +68,7 @@ class Known(NamedTuple):
             convexity_number=_convexity_number(problem, h),
             # Collatz and Wielandt: by the trial vector H^-1/2.
             coupling=float(couple_above(problem, 1.0 / h).max(where=sure, initial=0.0)),
-            reach=spread(A, A.scale, 1.0 / h),
+            reach=error_reach(A, A.scale, 1.0 / h),
             distance=min(by_component, _distance(problem, contact, errors, effect)) * (1 + SAFETY),
         )
 

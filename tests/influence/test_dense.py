@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import paper, rough, scattered
 
-from convexrough.influence.coupling import inverse_distances, spread
+from convexrough.influence.coupling import error_reach, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.shells import shells
 
@@ -115,7 +115,7 @@ def test_matrix_spread_and_falloff() -> None:
     assert operator.name == "dense"
     assert_allclose(operator.matrix, operator.matrix.T)
     assert (np.diag(operator.matrix) == 0).all()
-    assert_allclose(spread(operator, SCALE, loads), np.sqrt(operator.matrix**2 @ loads))
+    assert_allclose(error_reach(operator, SCALE, loads), np.sqrt(operator.matrix**2 @ loads))
     inverse = inverse_distances(points, points)
     for power in (2, 3):
         sums = inverse**power @ loads

@@ -12,7 +12,7 @@ from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product, within
 from convexrough.influence.scattered import ScatteredCoupling, ScatteredInfluence
 from convexrough.influence.softened import Softened, _steepest, lagrange, lebesgue
-from convexrough.influence.splitting import Plan
+from convexrough.influence.splitting import Splitting
 
 SCALE = 0.37
 COUNT = 4000
@@ -72,7 +72,7 @@ def exact(points: np.ndarray, others: np.ndarray, values: np.ndarray, power: int
 
 
 def meshed(operator: ScatteredInfluence) -> bool:
-    return operator._double.plan.meshed
+    return operator._double.splitting.meshed
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -102,9 +102,9 @@ def test_interpolation_is_within_its_bound(tolerance: float) -> None:
     """Coarse enough that interpolation is all of the error."""
     rng = np.random.default_rng(2)
     points = _disc(rng)
-    plan = Plan.choose(points, 1, tolerance)
-    assert plan.meshed
-    product = Product.assemble(points, plan, np.float64)
+    splitting = Splitting.choose(points, 1, tolerance)
+    assert splitting.meshed
+    product = Product.assemble(points, splitting, np.float64)
     matrix = inverse_distances(points, points)
     for loads in (np.ones(len(points)), rng.standard_normal(len(points))):
         error = product.apply(loads) - matrix @ loads
@@ -126,16 +126,16 @@ def test_error_of_a_pair(power: int, order: int) -> None:
     """One load and one point, at distances where interpolation is at its worst."""
     rng = np.random.default_rng(order)
     kernel = Softened(power, order, 1.0)
-    plan = Plan(kernel, 1.0 / (1.2 * order), order)
+    splitting = Splitting(kernel, 1.0 / (1.2 * order), order)
     worst = 0.0
     for _ in range(30):
         points = rng.uniform(0, 1.2, (40, 2))
-        product = Product.assemble(points, plan, np.float64)
+        product = Product.assemble(points, splitting, np.float64)
         loads = np.zeros(len(points))
         loads[0] = 1.0
         error = product.apply(loads) - inverse_distances(points, points[:1])[:, 0] ** power
         worst = max(worst, float(np.abs(error).max()))
-    bound = kernel.pair_error(plan.spacing)
+    bound = kernel.pair_error(splitting.spacing)
     assert worst <= bound
     assert worst >= 1e-3 * bound
 
@@ -144,8 +144,8 @@ def test_upper_bounds_on_sums() -> None:
     """Also where what is computed is too low, as on a mesh that is coarse enough."""
     rng = np.random.default_rng(13)
     points = rng.uniform(0, 1.2, (300, 2))
-    plan = Plan(Softened(3, 16, 1.0), 1.0 / 20, 8)
-    product = Product.assemble(points, plan, np.float64)
+    splitting = Splitting(Softened(3, 16, 1.0), 1.0 / 20, 8)
+    product = Product.assemble(points, splitting, np.float64)
     inverse = inverse_distances(points, points) ** 3
     too_low = 0
     for i in range(20):
