@@ -80,6 +80,7 @@ class Influence(Coupling, Protocol):
 
     name   : "dense", "lattice" or "scattered"
     points : (n, 2) [length];  scale : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
+    at_hand : the matrix is stored, so that to use it, or a part of it, costs nothing
     prefers_single : products of float32 loads are cheaper than those of float64 loads
     """
 
@@ -90,11 +91,17 @@ class Influence(Coupling, Protocol):
     @property
     def scale(self) -> float: ...
     @property
+    def at_hand(self) -> bool: ...
+    @property
     def prefers_single(self) -> bool: ...
 
     @property
     def matrix(self) -> Array:
-        """(n, n) A itself; computed when asked for, if it fits in memory."""
+        """(n, n) A itself; computed when asked for, if it fits in memory, unless it is at hand."""
+        ...
+
+    def submatrix(self, which: Indices) -> Array:
+        """(m, m) A among some of the asperities, to be written into."""
         ...
 
     @property

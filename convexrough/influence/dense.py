@@ -61,6 +61,7 @@ class DenseInfluence:
     entry_error: float
 
     name: ClassVar[Kind] = "dense"
+    at_hand: ClassVar[bool] = True
     prefers_single: ClassVar[bool] = False
 
     @classmethod
@@ -96,8 +97,11 @@ class DenseInfluence:
         total: Array = raised @ strengths
         return total * ((1.0 + self._loss(power)) / self.scale**power)
 
+    def submatrix(self, which: Indices) -> Array:
+        return np.asarray(self.matrix[which[:, None], which])
+
     def among(self, which: Indices) -> DenseInfluence:
-        matrix = self.matrix[np.ix_(which, which)]
+        matrix = self.submatrix(which)
         return DenseInfluence(
             self.points[which], self.scale, matrix, self.point_error, self.entry_error
         )

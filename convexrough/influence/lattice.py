@@ -112,6 +112,7 @@ class LatticeInfluence(LatticeCoupling):
     point_error: float
 
     name: ClassVar[Kind] = "lattice"
+    at_hand: ClassVar[bool] = False
     prefers_single: ClassVar[bool] = True
 
     @classmethod
@@ -140,6 +141,9 @@ class LatticeInfluence(LatticeCoupling):
     @property
     def matrix(self) -> Array:
         return dense_matrix(self.points, self.scale)
+
+    def submatrix(self, which: Indices) -> Array:
+        return dense_matrix(self.points[which], self.scale)
 
     @property
     def entry_error(self) -> float:

@@ -46,6 +46,7 @@ class ScatteredInfluence:
     tolerance: float
 
     name: ClassVar[Kind] = "scattered"
+    at_hand: ClassVar[bool] = False
     prefers_single: ClassVar[bool] = True
 
     @classmethod
@@ -88,6 +89,9 @@ class ScatteredInfluence:
     @property
     def matrix(self) -> Array:
         return dense_matrix(self.points, self.scale)
+
+    def submatrix(self, which: Indices) -> Array:
+        return dense_matrix(self.points[which], self.scale)
 
     @property
     def entry_error(self) -> float:

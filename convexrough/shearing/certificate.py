@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
-from convexrough.normal.certificate import SUM_ROUNDOFFS
+from convexrough.normal.judgement import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.load_errors import Known
 from convexrough.shearing.problem import States, TangentialProblem

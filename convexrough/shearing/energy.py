@@ -133,6 +133,6 @@ class TangentialEnergy:
                 return best
             best, before = shares, size
             step = correct(self.influence, self.shells, root, defect, balanced=True, tolerance=1e-5)
-            eta = eta + step.change
+            eta = eta + step
             eta /= float(c @ eta)
         raise SolverError("the elastic state does not converge", solver="shear")

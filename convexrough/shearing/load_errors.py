@@ -23,7 +23,7 @@ from convexrough.contact import Contact
 from convexrough.influence import couple
 from convexrough.influence.coupling import error_reach
 from convexrough.influence.shells import fitted_shells
-from convexrough.normal.certificate import FIT_FROM, SUM_ROUNDOFFS
+from convexrough.normal.judgement import FIT_FROM, SUM_ROUNDOFFS
 from convexrough.normal.problem import FITTED
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.problem import TangentialProblem

@@ -201,7 +201,7 @@ def _advance(energy: TangentialEnergy, state: Iterate, totals: Array, tolerance:
         balanced=True,
         tolerance=tolerance,
     )
-    return _descend(energy, state, correction.change[None], totals)
+    return _descend(energy, state, correction[None], totals)
 
 
 def _gross(energy: TangentialEnergy) -> tuple[Array, Array, float, float]:

@@ -18,7 +18,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.normal.certificate import Scope
+from convexrough.normal.judgement import Scope
 from convexrough.progress import Announce
 from convexrough.shearing.certificate import judge_states
 from convexrough.shearing.newton import by_matrices

@@ -198,7 +198,7 @@ def _step(problem: NormalProblem, state: _State, forcing: float) -> _State:
     rounding = SAFETY * float(state.loads @ (np.abs(problem.offsets) + abs(state.approach)))
     length = 1.0
     while length > 1e-12:
-        moved = state.indentation + length * correction.change
+        moved = state.indentation + length * correction
         trial = _evaluate(problem, _on_constraint(problem, moved))
         slope = float(gap @ (trial.loads - state.loads))
         if trial.energy - state.energy <= 1e-4 * min(slope, 0.0) + rounding:

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.normal.certificate import SUM_ROUNDOFFS
+from convexrough.convex.definite import proves_margin
+from convexrough.normal.judgement import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.certificate import Bounds, Known
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
@@ -120,25 +121,17 @@ def _bent(problem: VectorProblem, size: Array, local: Array, change: Array) -> A
 def _margin(problem: VectorProblem, known: Known) -> float:
     """A proved lower bound on the least eigenvalue of I + H^-1/2 B H^-1/2; 0 where none is found.
 
-    As `certificate` does for the normal problem (Rump, BIT 46 (2006) 433), with H on loads no
-    smaller than the true ones. Asperities not sure to touch are not among the unknowns.
+    With H on loads no smaller than the true ones, so that a little more is proved than is said.
+    Asperities not sure to touch are not among the unknowns.
     """
     sure = known.sure
     h = np.where(sure, 2.0 / 3.0 * problem.scalar.ceilings, 1.0)
     h /= np.where(sure, problem.scalar.loads + known.errors, 1.0)
     root = np.repeat(np.where(sure, 1.0 / np.sqrt(h), 0.0), 2)
     scaled = problem.kernel * root * root[:, None]
-    n = len(scaled)
-    blur = (problem.product_error + 8 * ROUNDOFF) * float(np.abs(scaled).sum(axis=1).max())
-    slack = 1.1 * (blur + (n + 2) * n * ROUNDOFF) + SAFETY
-    for margin in MARGINS:
-        scaled[np.diag_indices(n)] = 1.0 - margin - slack
-        try:
-            np.linalg.cholesky(scaled)
-        except np.linalg.LinAlgError:
-            continue
-        return margin
-    return 0.0
+    error = problem.product_error + 8 * ROUNDOFF
+    proved = (margin for margin in MARGINS if proves_margin(scaled, margin + SAFETY, error))
+    return next(proved, 0.0)
 
 
 def _at_limit(problem: VectorProblem, known: Known, state: VectorState) -> Bounds:

@@ -25,7 +25,8 @@ from scenes import (
 
 import convexrough as cr
 from convexrough.influence.coupling import Influence, Kind, Rounding
-from convexrough.normal.certificate import _convex_margin, _find_box, judge
+from convexrough.normal.certificate import judge
+from convexrough.normal.judgement import _convex_margin, _find_box
 from convexrough.normal.problem import NormalProblem
 
 Array = NDArray[np.float64]
