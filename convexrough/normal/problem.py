@@ -26,7 +26,9 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: The part of the room between neighbours that fitted shells share out by size.
+#: The part of the room between neighbours that fitted shells share out by size. A heuristic: any
+#: part gives shells that hold, some of them sharper bounds (docs/theory/certificate.md, "Which
+#: box", 3).
 FITTED = 0.9
 
 
@@ -175,7 +177,8 @@ class NormalProblem:
     def convexity_number(self, loads: Array) -> float:
         """theta = max 2 a_i / (pi s_i) over the box 0 <= P <= loads; Phi is convex where < 1.
 
-        The smallest eigenvalue of the Hessian, relative to its diagonal, is at least 1 - theta.
+        The smallest eigenvalue of the Hessian, relative to its diagonal, is at least 1 - theta:
+        (3) of docs/theory/convexity.md.
         """
         ratio = self.shells / self.stiffness(loads)
         return float(ratio.max(initial=0.0)) * (1 + SAFETY)
@@ -190,8 +193,9 @@ class NormalProblem:
     ) -> float:
         """Upper bound on Phi(P) less its minimum over 0 <= P <= box, from the loads alone.
 
-        With M = A + diag(shells), positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2,
-        convex on the box where its convexity number is at most 1, any P gives a dual bound:
+        docs/theory/exact-cones.md, "A dual bound that trusts no solver": with M = A + diag(shells),
+        positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2, convex on the box where
+        its convexity number is at most 1, any P gives a dual bound:
 
             min Phi >= -P'MP / 2 + sum min over 0 <= x <= box_i of [h_i(x) - (D - M P)_i x].
 
@@ -205,25 +209,12 @@ class NormalProblem:
             return np.inf
         k, shells = self.coefficients, self.shells
         slope = approach + self.offsets - displacement - shells * loads  # (D - M P)_i
-        top = hertz.indentation(box, k) - shells * box  # h' at the box's upper end
-        # s = (x / box)^(1/3) solves k box^(2/3) s^2 - shell box s^3 = slope, by Newton's method
-        # from a lower bound.
-        k_box, shell_box = hertz.indentation(box, k), shells * box
-        target = np.clip(slope, 0.0, top)
-        s = np.sqrt(np.where(k_box > 0, target / np.where(k_box > 0, k_box, 1.0), 0.0))
-        for _ in range(60):
-            value = s * s * (k_box - shell_box * s) - target
-            rate = s * (2.0 * k_box - 3.0 * shell_box * s)
-            step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
-            s = np.clip(s - step, 0.0, 1.0)
-            if np.abs(step).max(initial=0.0) < 1e-15:
-                break
-        best = box * s**3
+        best = self._loads_at_slope(slope, box)
 
         def charge(x: Array) -> Array:
             return np.asarray(x * (0.6 * hertz.indentation(x, k) - shells * x / 2.0 - slope))
 
-        size = 0.6 * k_box + shell_box + np.abs(slope)
+        size = 0.6 * hertz.indentation(box, k) + shells * box + np.abs(slope)
         rounding = 32 * ROUNDOFF * float(((loads + best) * size).sum())
         # A slope off by e moves a term by e times the distance from P to the best x at most, and
         # the best x by e over the least curvature there.
@@ -233,8 +224,28 @@ class NormalProblem:
         rounding += float((error * distance).sum()) * (1 + SAFETY)
         return float(np.maximum(charge(loads) - charge(best), 0.0).sum()) + rounding
 
+    def _loads_at_slope(self, slope: Array, box: Array) -> Array:
+        """(n,) the x from 0 to box_i with h_i'(x) = slope_i, or the nearer end: h_i of the above.
+
+        s = (x / box)^(1/3) solves k box^(2/3) s^2 - shell box s^3 = slope: by Newton's method, from
+        a lower bound.
+        """
+        k_box, shell_box = hertz.indentation(box, self.coefficients), self.shells * box
+        target = np.clip(slope, 0.0, k_box - shell_box)
+        s = np.sqrt(np.where(k_box > 0, target / np.where(k_box > 0, k_box, 1.0), 0.0))
+        for _ in range(60):
+            value = s * s * (k_box - shell_box * s) - target
+            rate = s * (2.0 * k_box - 3.0 * shell_box * s)
+            step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
+            s = np.clip(s - step, 0.0, 1.0)
+            if np.abs(step).max(initial=0.0) < 1e-15:
+                break
+        return np.asarray(box * s**3)
+
     def overhang(self, weights: Array, displacement: Array) -> float:
         """Upper bound on D0 at every solution of load control, from any trial loads.
+
+        (2) of docs/theory/certificate.md, "Prescribed load".
 
         weights      : (n,) trial loads, not negative, not all zero
         displacement : A times weights
