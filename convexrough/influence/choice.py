@@ -44,4 +44,4 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
         )
     if kind is None and n <= FEW_SCATTERED:
         return DenseInfluence.assemble(points, scale, error)
-    return ScatteredInfluence.assemble(points, scale, error)
+    return ScatteredInfluence(points, scale, error)

@@ -29,7 +29,8 @@ Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
 class Rounding(NamedTuple):
     """How far a computed product A P can be from the true one, for loads of either sign.
 
-    Component i is off by at most  relative * (A |P|)_i + r_i,  |r_i| <= each,  ||r||_2 <= norm.
+    Component i is off by at most  relative * (A |P|)_i + r_i,  |r_i| <= each,  ||r||_2 <= norm:
+    eta, rho_inf and rho_2 of docs/theory/operators.md.
     """
 
     relative: float
@@ -141,10 +142,18 @@ def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
     return scale * np.sqrt(coupling.falloff(variances, 2))
 
 
+def squared_distances(points: Array, others: Array) -> Array:
+    """(n, m) [length^2] r_ij^2."""
+    squares, y = (np.subtract.outer(points[:, k], others[:, k]) for k in (0, 1))
+    squares *= squares
+    y *= y
+    squares += y
+    return np.asarray(squares)
+
+
 def inverse_distances(points: Array, others: Array) -> Array:
     """(n, m) [1/length]  1 / r_ij, and 0 where the two points are one."""
-    squares = np.subtract.outer(points[:, 0], others[:, 0]) ** 2
-    squares += np.subtract.outer(points[:, 1], others[:, 1]) ** 2
+    squares = squared_distances(points, others)
     with np.errstate(divide="ignore"):
         inverse: Array = 1.0 / np.sqrt(squares)
     inverse[squares == 0] = 0.0

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices
+from convexrough.influence.coupling import squared_distances
 from convexrough.influence.splitting import Splitting
 
 #: Pairs looked at together, and how many such pieces are held at once.
@@ -125,19 +126,14 @@ def _pairs(order: Order, splitting: Splitting, piece: Piece) -> _Pairs:
     others = np.concatenate(
         [np.arange(a, b, dtype=np.int32) for a, b in zip(firsts, lasts, strict=True)]
     )
-    mine, theirs = order.points[rows], order.points[others]
-    squares = np.subtract.outer(mine[:, 0], theirs[:, 0])
-    squares *= squares
-    y = np.subtract.outer(mine[:, 1], theirs[:, 1])
-    y *= y
-    squares += y
+    squares = squared_distances(order.points[rows], order.points[others])
     wanted = squares < splitting.cut**2
     own = lasts[0] - firsts[0]  # each pair once
     wanted[:, :own] &= others[:own] > np.arange(rows.start, rows.stop)[:, None]
     row, column = np.nonzero(wanted)
+    counts = np.bincount(row, minlength=len(squares))
     squares = squares[wanted]
     closest = float(np.sqrt(squares[squares > 0].min(initial=np.inf)))
-    counts = np.bincount(row, minlength=len(mine))
     return _Pairs(rows, counts, others[column], splitting.kernel.local(squares), closest)
 
 

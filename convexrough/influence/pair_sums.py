@@ -104,7 +104,10 @@ class Product:
 
     @cached_property
     def _rounding(self) -> tuple[float, float]:
-        """Of everything but transforms and interpolation nearby, relative and in the 2-norm."""
+        """Of everything but transforms and interpolation nearby, relative and in the 2-norm.
+
+        docs/theory/operators.md, "Anywhere: a mesh and near pairs", "Rounding".
+        """
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 8) * ROUNDOFF
         extent = float(np.ptp(self.order.points, axis=0).max()) if len(self.order.points) else 0.0

@@ -6,7 +6,7 @@ What happens on the mesh, and the bounds, are in `pair_sums`, `mesh`, `near_pair
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -26,7 +26,7 @@ TOLERANCE = 1e-13
 #: The same where loads are in single precision, and for sums that need not be sharp.
 SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
 
-#: Up to so many pairs (asperity, other point) are coupled one by one.
+#: Up to so many pairs (asperity, other point) are coupled one by one: a heuristic, for speed only.
 FEW_PAIRS = 10**8
 
 
@@ -42,22 +42,12 @@ class ScatteredInfluence:
 
     points: Array
     scale: float
-    point_error: float
-    tolerance: float
+    point_error: float = 0.0
+    tolerance: float = TOLERANCE
 
     name: ClassVar[Kind] = "scattered"
     at_hand: ClassVar[bool] = False
     prefers_single: ClassVar[bool] = True
-
-    @classmethod
-    def assemble(
-        cls,
-        points: Array,
-        scale: float,
-        point_error: float = 0.0,
-        tolerance: float = TOLERANCE,
-    ) -> ScatteredInfluence:
-        return cls(points, scale, point_error, tolerance)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -98,15 +88,13 @@ class ScatteredInfluence:
         return entry_error(self.point_error, float(self.separations().min(initial=np.inf)))
 
     def among(self, which: Indices) -> ScatteredInfluence:
-        return self.assemble(self.points[which], self.scale, self.point_error, self.tolerance)
+        return replace(self, points=self.points[which])
 
     def onto(self, points: Array) -> Coupling:
         if len(points) * len(self) <= FEW_PAIRS:
             return DenseCoupling(self.points, points, self.scale, self.point_error)
         together = np.concatenate((self.points, points))
-        return ScatteredCoupling(
-            self.assemble(together, self.scale, self.point_error, self.tolerance), len(self)
-        )
+        return ScatteredCoupling(replace(self, points=together), len(self))
 
     def separations(self) -> Array:
         return separations(self.points, self.point_error)

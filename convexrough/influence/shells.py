@@ -26,6 +26,8 @@ def shells(influence: Influence) -> Array:
 def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
     """`shells` that fit contact radii a (n,) [length] where neighbours differ in size.
 
+    docs/theory/certificate.md, "Which box", 3:
+
     s_i = share a_i / c + (1 - share) d_i / 2  with c the crowding, the largest (a_i + a_j) / r_ij,
     and d_i the distance to the nearest neighbour: each part keeps s_i + s_j <= r_ij, so their
     mean does. Then every a_i / s_i is at most c / share.

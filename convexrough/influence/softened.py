@@ -4,7 +4,8 @@ Beyond the reach a it is 1 / r^q itself. Within, the series of 1 / r^q in t = 1 
 after t^p: a polynomial in r^2 with p continuous derivatives across the reach. (For q = 1 it is the
 potential of a charge spread over a ball of radius a as (1 - (r/a)^2)^(p-1), so that Newton's
 theorem holds.) All terms of the series are positive, so nothing cancels. Derived in
-docs/theory/operators.md.
+docs/theory/operators.md, "Anywhere: a mesh and near pairs": "The smooth part", "How steep it is",
+"Interpolation".
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ import numpy as np
 
 from convexrough.arrays import Array
 
-#: Near pairs whose part would be less than so much of the error of interpolation are left out.
+#: Near pairs whose part would be less than so much of the error of interpolation are left out. A
+#: heuristic: what is left out is part of the bound.
 CUT_SHARE = 0.1
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough.arrays import Array
+from convexrough.influence.coupling import squared_distances
 from convexrough.influence.softened import Softened
 
 #: Numbers of nodes to interpolate from, in each direction.
@@ -93,7 +94,9 @@ class _Sums(NamedTuple):
 
     @classmethod
     def of(cls, points: Array, power: int) -> _Sums:
-        distances, share = _sampled(points)
+        chosen = np.random.default_rng(0).permutation(len(points))
+        some, more = points[np.resize(chosen, SAMPLE)], points[chosen[-MORE:]]
+        distances, share = np.sqrt(squared_distances(some, more)), len(more) / len(points)
         ordered = np.sort(distances.ravel())
         # But for the nearest few: one close pair is not to stand for all.
         nearest = float(ordered[min(int(NEAREST * SAMPLE * share), ordered.size - 1)])
@@ -120,12 +123,3 @@ def _block(order: int, nodes_per_point: float) -> int:
     """Some tens of points to a block, but no row of the interpolation too empty."""
     wanted = int(np.ceil(np.sqrt(48.0 * nodes_per_point)))
     return int(np.clip(wanted, order // 2, 2 * order))
-
-
-def _sampled(points: Array) -> tuple[Array, float]:
-    """Distances from some of the points to more of them, and what share of all those are."""
-    chosen = np.random.default_rng(0).permutation(len(points))
-    some, more = points[np.resize(chosen, SAMPLE)], points[chosen[-MORE:]]
-    squares = np.subtract.outer(some[:, 0], more[:, 0]) ** 2
-    squares += np.subtract.outer(some[:, 1], more[:, 1]) ** 2
-    return np.sqrt(squares), len(more) / len(points)

@@ -9,9 +9,10 @@ H = diag(2/3 k B^(-1/3)), and mu > 0 with Hessian >= mu H on that box,
 so |P_i - P*_i| <= eps / sqrt(h_i), and A P is off by at most eps sqrt(sum_j A_ij^2 / h_j). At the
 solution delta* = D - A P* is the indentation where positive and minus the gap where negative.
 
-    docs/theory/certificate.md     here
+Headings in quotes below are of that page. Its letters, and the names here:
+
     P^, the loads judged           loads
-    e, rho                         residual (|e| + rho, but for a remainder), rounding
+    |e| + rho, rho                 residual, rounding; both less a remainder known by its norm
     B, h, mu                       box.loads, box.stiffness, 1 - box.convexity_number
     eps                            ball.radius
     theta, s_i                     convexity_number, shells (1 / (pi E* s_i))
@@ -37,14 +38,14 @@ from convexrough.sphere import hertz
 
 Scope = Literal["global", "local", "none"]
 
-#: Roundoffs lost in k P^(2/3) and in adding it, A P and D up.
+#: Roundoffs lost in k P^(2/3) and in adding it, A P and D up: "Rounding".
 SUM_ROUNDOFFS = 16
 
 #: Convexity number of the loads themselves from which shells fitted to them are tried. A heuristic:
 #: if it is off, work is wasted, or a bound is less sharp than it could be.
 FIT_FROM = 0.8
 
-#: Margins mu that Cholesky's factorisation is tried with, the best first. Any will do where the
+#: Margins mu that Cholesky's factorisation is tried with, the best first. Any will do, as the
 #: bounds are sharpened afterwards on a smaller box.
 MARGINS = (0.1, 1e-3)
 
@@ -70,12 +71,15 @@ class Judgement(NamedTuple):
         """Of loads (n,) of the candidates, not negative."""
         loads = given if problem.load is None else _scaled_to(problem.load, given)
         fit = _fit(problem, loads)
+        screened = _screened(problem, loads, fit.approach)
+        indentation = problem.to_scene(fit.indentation)
+        indentation[screened.which] = screened.indentation
         box = _find_box(problem, loads, fit.displacement)
         if box is None:
-            return _unproved(problem, loads, fit)
+            return _unproved(problem, loads, fit, indentation)
         problem, ball = box.problem, _ball(box, fit, loads)
         if ball is None:
-            return _unproved(problem, loads, fit)
+            return _unproved(problem, loads, fit, indentation)
         errors = ball.load_errors
 
         # What it says of A P and D0, and so of delta* = D - A P*.
@@ -92,20 +96,17 @@ class Judgement(NamedTuple):
         load_errors = np.minimum(errors, np.maximum(loads - low, high - loads))
         load_errors += np.abs(loads - given) + 4 * ROUNDOFF * loads
 
-        others, without = _screened(problem, loads, fit.approach)
-        indentation = problem.to_scene(fit.indentation)
-        all_errors = problem.to_scene(error)
-        if without is not None:
-            indentation[others] = without.indentation
-            moved = ball.moves(without.coupling, A.scale)
-            all_errors[others] = moved + without.rounding + approach_error
+        everywhere = problem.to_scene(error)
+        if screened.coupling is not None:
+            moved = ball.moves(screened.coupling, A.scale)
+            everywhere[screened.which] = moved + screened.rounding + approach_error
         return cls(
             scope=box.scope,
             convexity_number=box.convexity_number,
             load_errors=load_errors,
             touches=(loads > errors) | (fit.indentation > error),
             indentation=indentation,
-            errors=all_errors,
+            errors=everywhere,
             approach=fit.approach,
             approach_error=approach_error,
             duality_gap=problem.duality_gap(
@@ -174,13 +175,14 @@ def _ball(box: _Box, fit: _Fit, loads: Array) -> _Ball | None:
 
 
 def _norm(fit: _Fit, stiffness: Array, convexity_number: float) -> float:
-    """|| e ||_{H^-1} / (1 - theta)."""
+    """eps = || e ||_{H^-1} / (1 - theta), the right side of (1)."""
     squared = float(np.sum(fit.residual**2 / stiffness))
     remainder = fit.remainder / np.sqrt(float(stiffness.min(initial=np.inf)))
     return float(np.sqrt(squared) + remainder) / (1.0 - convexity_number) * (1 + SAFETY)
 
 
 def _scaled_to(load: float, given: Array) -> Array:
+    """Loads that add up to what is prescribed: "Prescribed load"."""
     total = float(given.sum())
     if total == 0.0:
         expected = "a load on some asperity that could touch, as the total is prescribed"
@@ -189,6 +191,7 @@ def _scaled_to(load: float, given: Array) -> Array:
 
 
 def _fit(problem: NormalProblem, loads: Array) -> _Fit:
+    """The residual e, with its "Rounding"; D0 as "Prescribed load" says."""
     displacement = problem.influence.apply(loads)
     local = hertz.indentation(loads, problem.coefficients)
     approach = problem.approach
@@ -210,7 +213,10 @@ def _fit(problem: NormalProblem, loads: Array) -> _Fit:
 
 
 def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box | None:
-    """Global from the a priori bound by shells, then by Cholesky; else local; else None."""
+    """Global from the a priori bound by shells, then by Cholesky; else local; else None.
+
+    "Which box", 1 to 4.
+    """
     ceiling = problem.ceiling
     if problem.load is not None:
         ceiling = min(ceiling, problem.overhang(loads, displacement))
@@ -252,43 +258,38 @@ def _convex_margin(influence: Influence, stiffness: Array) -> float:
 def _approach_error(
     problem: NormalProblem, loads: Array, fit: _Fit, errors: Array, moved: Array
 ) -> float:
-    """|D0 - D0*|, as D0* = k_i P*_i^(2/3) + (A P*)_i - d_i at every asperity sure to touch."""
+    """|D0 - D0*|, as D0* = k_i P*_i^(2/3) + (A P*)_i - d_i at every asperity sure to touch.
+
+    "Prescribed load".
+    """
     least = hertz.indentation(np.maximum(loads - errors, 0.0), problem.coefficients)
     each = np.abs(fit.gap) + fit.rounding + fit.component + (fit.local - least) + moved
     return float(each.min(where=loads > errors, initial=np.inf))
 
 
 class _Screened(NamedTuple):
-    """Of the asperities that cannot touch."""
+    """The asperities that cannot touch."""
 
-    coupling: Coupling  # from the candidates
+    which: Indices  # in the scene
+    coupling: Coupling | None  # from the candidates; None if there are no others
     indentation: Array  # D - A P
     rounding: Array  # bound on its error
 
 
-def _screened(
-    problem: NormalProblem, loads: Array, approach: float
-) -> tuple[Indices, _Screened | None]:
-    """Indices in the scene, and what is known of them; None if there are none."""
+def _screened(problem: NormalProblem, loads: Array, approach: float) -> _Screened:
     scene, length = problem.scene, problem.units.length
-    if len(problem) == len(scene):
-        return np.zeros(0, dtype=np.intp), None
-    untouched = np.ones(len(scene), dtype=bool)
-    untouched[problem.candidates] = False
-    others = np.flatnonzero(untouched)
+    others = np.delete(np.arange(len(scene)), problem.candidates)
+    if len(others) == 0:
+        return _Screened(others, None, np.zeros(0), np.zeros(0))
     coupling = problem.influence.onto(scene.contact_points[others])
     product, offsets = coupling.apply(loads), scene.offsets[others] / length
     rounding = coupling.rounding(loads).of(product) + scene.offset_errors[others] / length
     rounding += SUM_ROUNDOFFS * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(approach))
-    return others, _Screened(coupling, approach + offsets - product, rounding)
+    return _Screened(others, coupling, approach + offsets - product, rounding)
 
 
-def _unproved(problem: NormalProblem, loads: Array, fit: _Fit) -> Judgement:
-    """ "Which box", 4: said plainly."""
-    indentation = problem.to_scene(fit.indentation)
-    others, without = _screened(problem, loads, fit.approach)
-    if without is not None:
-        indentation[others] = without.indentation
+def _unproved(problem: NormalProblem, loads: Array, fit: _Fit, indentation: Array) -> Judgement:
+    """Said plainly: "Which box", 4."""
     return Judgement(
         scope="none",
         convexity_number=max(1.0, problem.convexity_number(loads)),

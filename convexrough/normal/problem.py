@@ -1,5 +1,7 @@
 """The normal contact problem in its own units: energy, gap, residual, bounds, convexity.
 
+docs/theory/convexity.md, "The model", (1) and (2):
+
     minimise  Phi(P) = sum (3/5) k_i P_i^(5/3) + (1/2) P'AP - D'P   over P >= 0
 
 with D_i = D0 + d_i prescribed (approach control), or with sum P_i prescribed and D0 the multiplier

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import paper, rough, scattered
 
-from convexrough.influence.coupling import error_reach, inverse_distances
+from convexrough.influence.choice import couple
+from convexrough.influence.coupling import Kind, error_reach, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.shells import shells
 
@@ -176,3 +177,16 @@ def test_shells_do_not_overlap() -> None:
     radii = shell_radii(points)
     inverse = inverse_distances(points, points)
     assert ((radii[:, None] + radii) * inverse <= 1 + 1e-14).all()
+
+
+@pytest.mark.parametrize("kind", ["dense", "lattice", "scattered"])
+def test_a_part_of_the_matrix(kind: Kind) -> None:
+    """It may be written into: the operator keeps its own."""
+    scene, which = paper(), np.array([5, 0, 60, 17])
+    operator = couple(scene, np.arange(len(scene)), SCALE, kind)
+    assert operator.at_hand == (kind == "dense")
+    expected = operator.matrix[np.ix_(which, which)]
+    part = operator.submatrix(which)
+    assert (part == expected).all()
+    part[:] = 0.0
+    assert (operator.submatrix(which) == expected).all()

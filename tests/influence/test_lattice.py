@@ -477,6 +477,24 @@ def test_the_smoother_saves_products(kind: str, balanced: bool) -> None:
     assert np.linalg.norm(found - exact) <= 1e-3 * np.linalg.norm(exact)
 
 
+class _AtHand(_Counted):
+    """One whose matrix costs nothing."""
+
+    at_hand = True
+
+
+def test_a_matrix_at_hand_is_factorised_whatever_its_class() -> None:
+    points = patch(np.array(BASES["hexagonal"]), 300)
+    lattice = operator(points, scale=0.4)
+    root, defect = roots(points, "smooth"), np.random.default_rng(4).random(300)
+    options: Any = dict(balanced=False, tolerance=1e-4)
+    stored, other = _AtHand(lattice, smoothed=True), _Counted(lattice, smoothed=True)
+    for each in (stored, other):
+        correct(each, shells(lattice), root, defect, **options)  # type: ignore[arg-type]
+    assert stored.products == 1
+    assert other.products > 1
+
+
 def test_the_spacing_is_that_of_the_shortest_vector() -> None:
     """Also where b2 is shorter than b1 by less than the reduction of the basis can tell."""
     basis = np.array([[1.0, 0.0], [0.0, 1.0 - 4e-10]])

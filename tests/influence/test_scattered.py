@@ -80,7 +80,7 @@ def test_product_and_its_bound(layout: str) -> None:
     rng = np.random.default_rng(1)
     points = LAYOUTS[layout](rng)
     rows = rng.integers(0, len(points), 300)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     assert meshed(operator)
     smooth, rough = np.ones(len(points)), rng.standard_normal(len(points))
     few = np.where(rng.random(len(points)) < 0.01, rng.random(len(points)), 0.0)
@@ -224,7 +224,7 @@ def test_lagrange_polynomials() -> None:
 def test_single_precision(layout: str) -> None:
     rng = np.random.default_rng(4)
     points = LAYOUTS[layout](rng)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     loads = rng.random(len(points))
     single, double = operator.apply(loads.astype(np.float32)), operator.apply(loads)
     assert single.dtype == np.float32
@@ -237,7 +237,7 @@ def test_falloff(layout: str, power: int) -> None:
     rng = np.random.default_rng(5)
     points = LAYOUTS[layout](rng)
     rows = rng.integers(0, len(points), 300)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     for strengths in (rng.random(len(points)), np.where(rng.random(len(points)) < 0.1, 1.0, 0.0)):
         true = exact(points[rows], points, strengths, power)
         above = operator.falloff(strengths, power)[rows]
@@ -249,7 +249,7 @@ def test_falloff(layout: str, power: int) -> None:
 def test_among_and_onto() -> None:
     rng = np.random.default_rng(6)
     points = _disc(rng)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     which = np.flatnonzero(points[:, 0] > 0.1)
     loads = rng.random(len(which))
     part = operator.among(which)
@@ -260,7 +260,7 @@ def test_among_and_onto() -> None:
     few = operator.onto(others)
     true = SCALE * exact(others, points, loads)
     joint = ScatteredCoupling(
-        ScatteredInfluence.assemble(np.concatenate((points, others)), SCALE), len(points)
+        ScatteredInfluence(np.concatenate((points, others)), SCALE), len(points)
     )
     for coupling in (few, joint):
         rounding = coupling.rounding(loads)
@@ -275,7 +275,7 @@ def test_matrix_separations_and_crowding(layout: str) -> None:
     rng = np.random.default_rng(7)
     points = LAYOUTS[layout](rng)[rng.permutation(3000)]
     dense = DenseInfluence.assemble(points, SCALE)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     assert_allclose(operator.separations(), dense.separations(), rtol=1e-14)
     assert_allclose(operator.matrix, dense.matrix)
     assert operator.entry_error == pytest.approx(dense.entry_error)
@@ -285,7 +285,7 @@ def test_matrix_separations_and_crowding(layout: str) -> None:
 
 def test_the_most_crowded_pair_is_not_one_of_nearest_neighbours() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [-1.3, 0.0], [-2.2, 0.0]])
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     radii = np.array([1.0, 0.5, 1.0, 0.1])
     assert operator.crowding(radii) == pytest.approx(2.0 / 1.3)
 
@@ -295,27 +295,27 @@ def test_point_error_is_counted() -> None:
     points = _jittered(rng)
     blur = 1e-13
     moved = points + rng.choice([-blur, blur], points.shape)
-    operator = ScatteredInfluence.assemble(points, SCALE, blur)
+    operator = ScatteredInfluence(points, SCALE, blur)
     loads = rng.random(len(points))
     computed = operator.apply(loads)
     true = SCALE * exact(moved[:200], moved, loads)
     error = np.abs(computed[:200] - true)
     assert (error <= operator.rounding(loads).of(computed)[:200]).all()
-    exactly = ScatteredInfluence.assemble(points, SCALE).rounding(loads)
+    exactly = ScatteredInfluence(points, SCALE).rounding(loads)
     assert (operator.rounding(loads).of(computed) >= 10 * exactly.of(computed)).all()
     far = points + rng.choice([-2e-6, 2e-6], points.shape)
-    rough = ScatteredInfluence.assemble(points, SCALE, 2e-6)
+    rough = ScatteredInfluence(points, SCALE, 2e-6)
     for power in (2, 3):
         above = rough.falloff(loads, power)[:200]
         assert (above >= exact(far[:200], far, loads, power)).all()
-    assert (operator.separations() < ScatteredInfluence.assemble(points, SCALE).separations()).all()
+    assert (operator.separations() < ScatteredInfluence(points, SCALE).separations()).all()
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 50])
 def test_few_points(count: int) -> None:
     rng = np.random.default_rng(count)
     points = rng.uniform(-1, 1, (count, 2))
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     loads = rng.random(count)
     true = SCALE * exact(points, points, loads)
     error = np.abs(operator.apply(loads) - true)
@@ -344,7 +344,7 @@ def contact() -> tuple[ScatteredInfluence, np.ndarray]:
     """Jittered asperities; W of a Hertzian contact in the middle, at 0.45 of the convex range."""
     rng = np.random.default_rng(10)
     points = _jittered(rng) - 31 * 1e-4
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     inside = np.maximum(1 - (points**2).sum(axis=1) / 0.0025**2, 0.0)
     theta = 0.45 * np.sqrt(inside) * rng.uniform(0.5, 1.0, len(points))
     # theta = c scale / s with c = W^2 and s half the nearest distance

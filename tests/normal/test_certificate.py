@@ -217,6 +217,31 @@ def test_scopes() -> None:
         assert pressed(0.0025, 5.0, kind).scope == "none"
 
 
+class _AtHand:
+    """An operator of any class whose matrix costs nothing."""
+
+    at_hand = True
+
+    def __init__(self, influence: Influence) -> None:
+        self.influence = influence
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.influence, name)
+
+    def __len__(self) -> int:
+        return len(self.influence)
+
+
+def test_a_matrix_at_hand_is_used_whatever_its_class() -> None:
+    lattice = cr.Asperities.hexagonal(spacing=0.0012, tip_radius=0.03, within=0.0102)
+    scene = cr.Scene(1.0, lattice, MATERIAL)
+    loads = cr.press(scene, approach=PAPER_APPROACH).loads
+    problem = NormalProblem.assemble(scene, approach=PAPER_APPROACH, influence="lattice")
+    assert judge(problem, loads).scope == "local"
+    stored: Any = _AtHand(problem.influence)
+    assert judge(replace(problem, influence=stored), loads).scope == "global"
+
+
 @pytest.mark.parametrize("operator", OPERATORS)
 def test_shells_that_fit_the_contacts(operator: Kind) -> None:
     """Where neighbours differ in size, half the distance to each would prove nothing."""
