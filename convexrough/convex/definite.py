@@ -19,6 +19,8 @@ factor that is not: LAPACK need not see that, and no such factor counts.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from convexrough.arrays import Array
@@ -34,15 +36,21 @@ def is_definite(matrix: Array) -> bool:
     return not failed and bool(np.isfinite(factor.diagonal()).all())
 
 
-def proves_margin(couplings: Array, margin: float, entry_error: float) -> bool:
-    """Whether  I + M >= margin I  is proved, with all rounding counted; as above.
+def proved_margin(
+    couplings: Array, margins: Sequence[float], entry_error: float, spare: float = 0.0
+) -> float:
+    """The first of some margins mu for which  I + M >= (mu + spare) I  is proved, as above; else 0.
 
     couplings   : (n, n) M as computed, symmetric, 0 on its diagonal
-    margin      : mu, from 0 to 1
+    margins     : each from 0 to 1
     entry_error : e, bound on the error of each entry relative to it
     """
     n = len(couplings)
     blur = entry_error * float(np.abs(couplings).sum(axis=1).max())
+    slack = 1.1 * (blur + (n + 2) * n * ROUNDOFF)
     trial = couplings.copy()
-    np.fill_diagonal(trial, 1.0 - margin - 1.1 * (blur + (n + 2) * n * ROUNDOFF))
-    return is_definite(trial)
+    for margin in margins:
+        np.fill_diagonal(trial, 1.0 - (margin + spare) - slack)
+        if is_definite(trial):
+            return margin
+    return 0.0

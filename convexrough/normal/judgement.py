@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.convex.definite import proves_margin
+from convexrough.convex.definite import proved_margin
 from convexrough.errors import InputError
 from convexrough.influence.coupling import Coupling, Influence, error_reach
 from convexrough.normal.problem import NormalProblem
@@ -251,8 +251,7 @@ def _convex_margin(influence: Influence, stiffness: Array) -> float:
         return 0.0
     root = 1.0 / np.sqrt(stiffness)
     scaled = influence.matrix * root * root[:, None]
-    error = influence.entry_error + 8 * ROUNDOFF
-    return next((margin for margin in MARGINS if proves_margin(scaled, margin, error)), 0.0)
+    return proved_margin(scaled, MARGINS, influence.entry_error + 8 * ROUNDOFF)
 
 
 def _approach_error(

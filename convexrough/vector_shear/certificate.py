@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.convex.definite import proves_margin
+from convexrough.convex.definite import proved_margin
 from convexrough.normal.judgement import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.certificate import Bounds, Known
@@ -129,9 +129,7 @@ def _margin(problem: VectorProblem, known: Known) -> float:
     h /= np.where(sure, problem.scalar.loads + known.errors, 1.0)
     root = np.repeat(np.where(sure, 1.0 / np.sqrt(h), 0.0), 2)
     scaled = problem.kernel * root * root[:, None]
-    error = problem.product_error + 8 * ROUNDOFF
-    proved = (margin for margin in MARGINS if proves_margin(scaled, margin + SAFETY, error))
-    return next(proved, 0.0)
+    return proved_margin(scaled, MARGINS, problem.product_error + 8 * ROUNDOFF, spare=SAFETY)
 
 
 def _at_limit(problem: VectorProblem, known: Known, state: VectorState) -> Bounds:
