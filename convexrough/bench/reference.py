@@ -129,7 +129,7 @@ def _correction(problem: NormalProblem, P: LongArray, defect: LongArray) -> Long
         balanced=False,
         tolerance=MOST_LEFT,
     )
-    return step.change.astype(Long)
+    return step.astype(Long)
 
 
 def _product(problem: NormalProblem) -> tuple[Product, str]:

@@ -1,7 +1,7 @@
 """The linear system of a Newton step on a normal map, solved directly or by conjugate gradients.
 
 The normal maps of pressing and of shear have the Jacobian I + A diag(c), c >= 0. With
-W = diag(c)^(1/2) a step from the defect F is
+W = diag(c)^(1/2) a step from the defect F is (docs/theory/newton.md, "The normal map")
 
     d = beta - F - A W y,     (I + W A W) y = W (beta - F),
 
@@ -15,21 +15,18 @@ Where the matrix is not positive definite the shells are added, which makes it s
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.errors import SolverError
-from convexrough.influence import DenseInfluence, Influence, Smoother
-from convexrough.influence.dense import dense_matrix
+from convexrough.influence.coupling import Influence, Smoother
 
-#: Up to so many touching asperities, a Cholesky factor is cheapest: with a matrix at hand, ...
-FACTORISED = 1500
-
-#: ... and without.
-FACTORISED_FEW = 100
+#: Up to so many touching asperities, a Cholesky factor is cheapest: with a matrix at hand, and
+#: without. Heuristics, from timings: a step is the same to what it is asked for.
+FACTORISED, FACTORISED_UNSTORED = 1500, 100
 
 #: What conjugate gradients in single and double precision can still reduce the residual to.
 SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
@@ -37,14 +34,6 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 MOST_ITERATIONS = 500
 
 Values = NDArray[Any]  # of single or double precision
-
-
-class Correction(NamedTuple):
-    """change : (n,) d;  shift : beta;  products : with A, that it took"""
-
-    change: Array
-    shift: float
-    products: int
 
 
 def correct(
@@ -55,8 +44,8 @@ def correct(
     *,
     balanced: bool,
     tolerance: float,
-) -> Correction:
-    """One Newton step.
+) -> Array:
+    """(n,) d, one Newton step: (1) of docs/theory/newton.md.
 
     root      : (n,) W, 0 where open;  defect : (n,) F
     balanced  : keep the sum of the loads
@@ -66,9 +55,8 @@ def correct(
     """
     touching = np.flatnonzero(root)
     if len(touching) == 0:
-        return Correction(-defect, 0.0, 0)
-    at_hand = isinstance(influence, DenseInfluence)
-    direct = len(touching) <= (FACTORISED if at_hand else FACTORISED_FEW)
+        return -defect
+    direct = len(touching) <= (FACTORISED if influence.at_hand else FACTORISED_UNSTORED)
     for extra in (None, shells):
         try:
             if direct:
@@ -90,14 +78,11 @@ def _factorise(
     root: Array,
     defect: Array,
     balanced: bool,
-) -> Correction:
+) -> Array:
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
     w = root[touching]
-    if isinstance(influence, DenseInfluence):
-        matrix = influence.matrix[touching[:, None], touching]
-    else:
-        matrix = dense_matrix(influence.points[touching], influence.scale)
+    matrix = influence.submatrix(touching)
     matrix *= w
     matrix *= w[:, None]
     matrix.ravel()[:: len(w) + 1] = 1.0 if shells is None else 1.0 + w * shells[touching] * w
@@ -113,9 +98,9 @@ def _factorise(
     if balanced:
         shift = float(w @ y) / float(w @ border)
         y = y - shift * border
-    spread = np.zeros(len(root))
-    spread[touching] = w * y
-    return Correction(shift - defect + influence.apply(spread), shift, 1)
+    changes = np.zeros(len(root))
+    changes[touching] = w * y
+    return shift - defect + influence.apply(changes)
 
 
 def _iterate(
@@ -125,60 +110,61 @@ def _iterate(
     defect: Array,
     balanced: bool,
     tolerance: float,
-) -> Correction:
-    """Preconditioned conjugate gradients; on the plane sum W y = 0 where balanced.
-
-    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376.) The residual is kept on the
-    plane, too, so that single precision does not lose it beside the shift.
-    """
-    single = influence.single
+) -> Array:
+    """Preconditioned conjugate gradients: docs/theory/newton.md, "Many"."""
+    single = influence.prefers_single
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
-    tolerance = max(tolerance, limit)
     size = float(np.abs(defect).max()) or 1.0
+    enough = max(tolerance, limit) * float(np.linalg.norm(defect)) / size
     w: Values = root.astype(dtype)
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
-    smooth = influence.smoother(root) or _unsmoothed(influence, w)
+    smoothed = _Smoothed(influence.smoother(root) or _unsmoothed(influence, w), w, balanced)
     residual: Values = -w * (defect / size).astype(dtype)
-    shift = 0.0
-    if balanced:
-        border, _ = smooth(w)
-        weight = float(w @ border)
-
-    def smoothed() -> tuple[Values, float, float]:
-        """M r, once r is back on the plane; of r as it was, the 2-norm of A W r, and r' M r."""
-        nonlocal residual, shift
-        z, left = smooth(residual)
-        whole = float(residual @ z)
-        if balanced:
-            off = -float(w @ z) / weight
-            shift += off
-            residual += dtype(off) * w
-            z += dtype(off) * border
-        return z, left, whole
-
-    y_displacement = np.zeros_like(w)  # A W y
-    z, left, first = smoothed()
+    z, left, first = smoothed(residual)
     p = z.copy()
-    size_of = float(residual @ z)
-    enough = tolerance * float(np.linalg.norm(defect)) / size
+    squared = float(residual @ z)  # r' M r
+    y_displacement = np.zeros_like(w)  # A W y
     products = 0
-    while left > enough and size_of > limit**2 * first and products < MOST_ITERATIONS:
+    while left > enough and squared > limit**2 * first and products < MOST_ITERATIONS:
         q = influence.apply(w * p)
         products += 1
         bent = diagonal * p + w * q
         curvature = float(p @ bent)
         if curvature <= 0:
             raise _IndefiniteError
-        length = dtype(size_of / curvature)
+        length = dtype(squared / curvature)
         y_displacement += length * q
         residual -= length * bent
-        z, left, _ = smoothed()
-        before, size_of = size_of, float(residual @ z)
-        p *= dtype(size_of / before)
+        z, left, _ = smoothed(residual)
+        before, squared = squared, float(residual @ z)
+        p *= dtype(squared / before)
         p += z
-    change = size * (shift - y_displacement.astype(np.float64)) - defect
-    return Correction(change, size * shift, products)
+    return size * (smoothed.shift - y_displacement.astype(np.float64)) - defect
+
+
+class _Smoothed:
+    """The smoother M; where balanced, on the plane sum W y = 0.
+
+    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376.) The residual is kept on the
+    plane, too, so that single precision does not lose it beside the shift, the sum of what is off.
+    """
+
+    def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:
+        self.smooth, self.w, self.shift = smooth, w, 0.0
+        self.border = smooth(w)[0] if balanced else None
+        self.weight = 0.0 if self.border is None else float(w @ self.border)
+
+    def __call__(self, residual: Values) -> tuple[Values, float, float]:
+        """M r, once r is put back on the plane; of r as it was, the 2-norm of A W r, and r' M r."""
+        z, left = self.smooth(residual)
+        whole = float(residual @ z)
+        if self.border is not None:
+            off = -float(self.w @ z) / self.weight
+            self.shift += off
+            residual += self.w.dtype.type(off) * self.w
+            z += self.w.dtype.type(off) * self.border
+        return z, left, whole
 
 
 def _unsmoothed(influence: Influence, w: Values) -> Smoother:

@@ -14,11 +14,11 @@ from convexrough.scene.scene import Scene
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-#: Up to so many asperities the matrix costs less than anything else.
-FEW = 512
+#: Up to so many asperities the matrix costs less than anything else, ...
+FEW_ASPERITIES = 512
 
-#: Up to so many off a lattice the matrix costs less than meshes.
-SCATTERED_FEW = 3000
+#: ... and up to so many off a lattice. Both were timed on two cores: speed is all they decide.
+FEW_SCATTERED = 3000
 
 
 def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None) -> Influence:
@@ -34,7 +34,7 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
         raise InputError("influence", found=repr(kind), expected=f"one of {', '.join(KINDS)}")
     points, error = scene.contact_points[which], scene.point_error
     n = len(which)
-    if kind == "dense" or (kind is None and n <= FEW):
+    if kind == "dense" or (kind is None and n <= FEW_ASPERITIES):
         return DenseInfluence.assemble(points, scale, error)
     if kind != "scattered" and scene.lattice is not None:
         return LatticeInfluence.assemble(points, scene.lattice, scale, error)
@@ -42,6 +42,6 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
         raise InputError(
             "influence", found="lattice", expected="asperities on a two-dimensional lattice"
         )
-    if kind is None and n <= SCATTERED_FEW:
+    if kind is None and n <= FEW_SCATTERED:
         return DenseInfluence.assemble(points, scale, error)
-    return ScatteredInfluence.assemble(points, scale, error)
+    return ScatteredInfluence(points, scale, error)

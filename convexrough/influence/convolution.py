@@ -15,7 +15,8 @@ from convexrough.influence.lattice_smoother import differences
 
 #: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.2 for the
 #: twiddle factors and the products with them, and sqrt(p) ((p - 1) / 2 + 4) for the sums of p terms
-#: (1 for p = 2). Radices 4 and 8 cost less than two and three passes of radix 2.
+#: (1 for p = 2). Radices 4 and 8 cost less than two and three passes of radix 2. "One pass" of
+#: docs/theory/operators.md, "On a lattice: Fourier transforms".
 PASS_ROUNDOFFS = {2: 6, 3: 13, 5: 18, 7: 23, 11: 35}
 
 #: Transforms of more numbers than this use every core.
@@ -105,13 +106,16 @@ class Box:
         return result[:, : self.shape[1]]
 
     def bound(self, kernel: Kernel, roundoff: float) -> float:
-        """Bound on the 2-norm of the error of `convolve`, relative to that of the field."""
+        """Bound on the 2-norm of the error of `convolve`, relative to that of the field.
+
+        (1) of docs/theory/operators.md, "On a lattice: Fourier transforms".
+        """
         size = float(np.sqrt(float(self.padded[0]) * self.padded[1]))
         spectral = self.loss * size * kernel.norm
         return 1.01 * roundoff * ((2 * self.loss + 4) * kernel.total + spectral)
 
     def bound_each(self, kernel: Kernel, roundoff: float) -> float:
-        """Bound on each component of that error, relative to the 2-norm of the field.
+        """Bound on each component of that error, relative to the 2-norm of the field: (2) there.
 
         What the two forward transforms lose reaches a component through the other's 2-norm, and
         the inverse transform loses at most so much of the mean modulus of what it adds up, which

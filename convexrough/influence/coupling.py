@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.roundoff import SAFETY
 
 #: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points: differences 1,
 #: squares 3, their sum 4, its root 3, then a product with pi and a division.
@@ -30,7 +29,8 @@ Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
 class Rounding(NamedTuple):
     """How far a computed product A P can be from the true one, for loads of either sign.
 
-    Component i is off by at most  relative * (A |P|)_i + r_i,  |r_i| <= each,  ||r||_2 <= norm.
+    Component i is off by at most  relative * (A |P|)_i + r_i,  |r_i| <= each,  ||r||_2 <= norm:
+    eta, rho_inf and rho_2 of docs/theory/operators.md.
     """
 
     relative: float
@@ -39,7 +39,7 @@ class Rounding(NamedTuple):
 
     def of(self, displacement: Array) -> Array:
         """A bound for each component; `displacement` is A |P| as computed."""
-        return self.relative * np.maximum(displacement, 0.0) + self.single
+        return self.relative * np.maximum(displacement, 0.0) + self.component
 
     def negligible(self, displacement: Array) -> float:
         """2-norm of a residual that solvers need not reduce: small beside these bounds.
@@ -50,7 +50,7 @@ class Rounding(NamedTuple):
         return 0.1 * self.relative * float(np.linalg.norm(displacement)) + 0.05 * self.norm
 
     @property
-    def single(self) -> float:
+    def component(self) -> float:
         """Bound on each |r_i|, and on what it adds to the relative part."""
         return 1.01 * min(self.each, self.norm)
 
@@ -81,7 +81,8 @@ class Influence(Coupling, Protocol):
 
     name   : "dense", "lattice" or "scattered"
     points : (n, 2) [length];  scale : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
-    single : whether products of float32 loads are cheaper than those of float64 loads
+    at_hand : the matrix is stored, so that to use it, or a part of it, costs nothing
+    prefers_single : products of float32 loads are cheaper than those of float64 loads
     """
 
     @property
@@ -91,11 +92,17 @@ class Influence(Coupling, Protocol):
     @property
     def scale(self) -> float: ...
     @property
-    def single(self) -> bool: ...
+    def at_hand(self) -> bool: ...
+    @property
+    def prefers_single(self) -> bool: ...
 
     @property
     def matrix(self) -> Array:
-        """(n, n) A itself; computed when asked for, if it fits in memory."""
+        """(n, n) A itself; computed when asked for, if it fits in memory, unless it is at hand."""
+        ...
+
+    def submatrix(self, which: Indices) -> Array:
+        """(m, m) A among some of the asperities, to be written into."""
         ...
 
     @property
@@ -130,43 +137,24 @@ class Influence(Coupling, Protocol):
         ...
 
 
-def spread(coupling: Coupling, scale: float, variances: Array) -> Array:
+def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
     """(m,) bounds on sqrt(sum_j A_ij^2 v_j): how far an error of the loads moves each point."""
     return scale * np.sqrt(coupling.falloff(variances, 2))
 
 
+def squared_distances(points: Array, others: Array) -> Array:
+    """(n, m) [length^2] r_ij^2."""
+    squares, y = (np.subtract.outer(points[:, k], others[:, k]) for k in (0, 1))
+    squares *= squares
+    y *= y
+    squares += y
+    return np.asarray(squares)
+
+
 def inverse_distances(points: Array, others: Array) -> Array:
     """(n, m) [1/length]  1 / r_ij, and 0 where the two points are one."""
-    squares = np.subtract.outer(points[:, 0], others[:, 0]) ** 2
-    squares += np.subtract.outer(points[:, 1], others[:, 1]) ** 2
+    squares = squared_distances(points, others)
     with np.errstate(divide="ignore"):
         inverse: Array = 1.0 / np.sqrt(squares)
     inverse[squares == 0] = 0.0
     return inverse
-
-
-def shells(influence: Influence) -> Array:
-    """(n,) 1 / (pi E* s_i) of radii s_i with s_i + s_j <= r_ij: half the nearest distances.
-
-    With them A + diag(shells) is positive semidefinite (docs/theory/convexity.md). A single
-    asperity has no neighbour; infinite where rounding leaves no shell.
-    """
-    with np.errstate(divide="ignore"):
-        values: Array = 2.0 * influence.scale / influence.separations()
-    return values
-
-
-def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
-    """`shells` that fit contact radii a (n,) [length] where neighbours differ in size.
-
-    s_i = share a_i / c + (1 - share) d_i / 2  with c the crowding, the largest (a_i + a_j) / r_ij,
-    and d_i the distance to the nearest neighbour: each part keeps s_i + s_j <= r_ij, so their
-    mean does. Then every a_i / s_i is at most c / share.
-    """
-    crowding = influence.crowding(radii) * (1.0 + SAFETY + 2.0 * influence.entry_error)
-    s = (1.0 - share) * influence.separations() / 2.0
-    if 0 < crowding < np.inf:
-        s = s + share * (radii / crowding)
-    with np.errstate(divide="ignore"):
-        values: Array = influence.scale / s
-    return values

@@ -61,7 +61,8 @@ class DenseInfluence:
     entry_error: float
 
     name: ClassVar[Kind] = "dense"
-    single: ClassVar[bool] = False
+    at_hand: ClassVar[bool] = True
+    prefers_single: ClassVar[bool] = False
 
     @classmethod
     def assemble(cls, points: Array, scale: float, point_error: float = 0.0) -> DenseInfluence:
@@ -96,8 +97,11 @@ class DenseInfluence:
         total: Array = raised @ strengths
         return total * ((1.0 + self._loss(power)) / self.scale**power)
 
+    def submatrix(self, which: Indices) -> Array:
+        return np.asarray(self.matrix[which[:, None], which])
+
     def among(self, which: Indices) -> DenseInfluence:
-        matrix = self.matrix[np.ix_(which, which)]
+        matrix = self.submatrix(which)
         return DenseInfluence(
             self.points[which], self.scale, matrix, self.point_error, self.entry_error
         )

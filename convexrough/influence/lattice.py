@@ -2,7 +2,8 @@
 
 Free space: the smallest box of sites that holds the asperities is padded with zeros to twice its
 size, so that no asperity feels a periodic image of another. Heights and radii of the asperities
-play no part in it. The rounding of the transforms is bounded (docs/theory/operators.md).
+play no part in it. The rounding of the transforms is bounded in docs/theory/operators.md, "On a
+lattice: Fourier transforms".
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from convexrough.scene.neighbours import crowding, separations
 #: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
 ENTRY_ROUNDOFFS = 24
 
-#: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree.
+#: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree:
+#: a heuristic, which decides speed and how sharp shells are.
 FILLED = 0.2
 
 
@@ -112,7 +114,8 @@ class LatticeInfluence(LatticeCoupling):
     point_error: float
 
     name: ClassVar[Kind] = "lattice"
-    single: ClassVar[bool] = True
+    at_hand: ClassVar[bool] = False
+    prefers_single: ClassVar[bool] = True
 
     @classmethod
     def assemble(
@@ -140,6 +143,9 @@ class LatticeInfluence(LatticeCoupling):
     @property
     def matrix(self) -> Array:
         return dense_matrix(self.points, self.scale)
+
+    def submatrix(self, which: Indices) -> Array:
+        return dense_matrix(self.points[which], self.scale)
 
     @property
     def entry_error(self) -> float:

@@ -12,10 +12,13 @@ with A_b the mean of A over pairs of blocks: a lattice again, where D varies lit
     M  =  I - Q Q' + Q (1 + d A_b)^-1 Q',
 
 symmetric and positive definite. Where W is smooth m is 1, and Q Q' = I on the contact.
+(docs/theory/newton.md, "Many".) The constants are heuristics: conjugate gradients take more steps
+where they are off, and end at the same answer.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,6 +39,43 @@ WINDOW = 8
 LEAST = 0.2
 
 
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """Blocks of m x m sites that cover a box, and where asperities are.
+
+    shape  : (rows, columns) of blocks
+    places : (n,) of the asperities, in the box filled up to whole blocks
+    which  : (n,) blocks that they are in
+    """
+
+    m: int
+    shape: tuple[int, int]
+    places: Indices
+    which: Indices
+
+    @classmethod
+    def of(cls, shape: tuple[int, int], sources: Indices, m: int) -> _Blocks:
+        blocks = (-(-shape[0] // m), -(-shape[1] // m))
+        if m == 1:
+            return cls(m, blocks, sources, sources)
+        columns = blocks[1] * m
+        places = sources // shape[1] * columns + sources % shape[1]
+        return cls(m, blocks, places, places // columns // m * blocks[1] + places % columns // m)
+
+    def sums(self, values: NDArray[Any]) -> Single:
+        """Of values (n,) over each block."""
+        m = self.m
+        field = np.zeros((self.shape[0] * m, self.shape[1] * m), dtype=np.float32)
+        field.ravel()[self.places] = values
+        if m == 1:
+            return field
+        parts = (field[i::m, j::m] for i in range(m) for j in range(m))
+        total = next(parts).copy()
+        for part in parts:
+            total += part
+        return total
+
+
 def block_smoother(
     shape: tuple[int, int],
     basis: Array,
@@ -49,46 +89,30 @@ def block_smoother(
 
     squares = np.zeros(shape[0] * shape[1], dtype=np.float32)
     squares[sources] = root * root
-    m = _block_size(squares.reshape(shape))
-    blocks = (-(-shape[0] // m), -(-shape[1] // m))
-    padded = (blocks[0] * m, blocks[1] * m)
-    places = sources if m == 1 else sources // shape[1] * padded[1] + sources % shape[1]
-
-    def summed(values: NDArray[Any]) -> Single:
-        """Sums over the blocks."""
-        field = np.zeros(padded, dtype=np.float32)
-        field.ravel()[places] = values
-        if m == 1:
-            return field
-        parts = (field[i::m, j::m] for i in range(m) for j in range(m))
-        total = next(parts).copy()
-        for part in parts:
-            total += part
-        return total
-
-    which = places if m == 1 else (places // padded[1]) // m * blocks[1] + places % padded[1] // m
-    D = np.sqrt(summed(root * root))
+    blocks = _Blocks.of(shape, sources, _block_size(squares.reshape(shape)))
+    D = np.sqrt(blocks.sums(root * root))
     touching = D > 0
-    count = 1.0 if m == 1 else float(summed(root > 0)[touching].mean())
+    count = 1.0 if blocks.m == 1 else float(blocks.sums(root > 0)[touching].mean())
     w = root.astype(np.float32)
-    q = np.divide(w, D.ravel()[which], out=np.zeros_like(w), where=w > 0)
+    q = np.divide(w, D.ravel()[blocks.which], out=np.zeros_like(w), where=w > 0)
 
-    size, spectrum = _block_spectrum(blocks, basis, m, count, workers)
+    size, spectrum = _block_spectrum(blocks.shape, basis, blocks.m, count, workers)
     middle = np.float32(np.median(D[touching]))
     displacement = np.float32(scale) * middle * spectrum  # of A_b D
     removed = 1.0 - 1.0 / np.maximum(1.0 + middle * displacement, np.float32(LEAST))
     energies = displacement * displacement
     energies[:, 1 : (size[1] + 1) // 2] *= 2  # each wave stands for its conjugate, too
-    energies *= np.float32(m * m / (size[0] * size[1]))
+    energies *= np.float32(blocks.m * blocks.m / (size[0] * size[1]))
 
     def smooth(values: NDArray[Any]) -> tuple[NDArray[Any], float]:
-        waves = fft.rfft2(summed(q * values), size, workers=workers)
+        waves = fft.rfft2(blocks.sums(q * values), size, workers=workers)
         power = np.square(waves.real)
         power += np.square(waves.imag)
         left = float(np.sqrt(np.vdot(power, energies)))
         waves *= removed
-        field = fft.irfft2(waves, size, workers=workers)[: blocks[0], : blocks[1]]
-        smoothed: NDArray[Any] = np.where(w > 0, values - q * field.ravel()[which], np.float32(0))
+        field = fft.irfft2(waves, size, workers=workers)[: blocks.shape[0], : blocks.shape[1]]
+        averages = q * field.ravel()[blocks.which]
+        smoothed: NDArray[Any] = np.where(w > 0, values - averages, np.float32(0))
         return smoothed, left
 
     return smooth

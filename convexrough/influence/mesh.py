@@ -1,28 +1,21 @@
-"""Sums over pairs of points anywhere: smooth at a distance, by a mesh; pair by pair nearby.
+"""A square mesh of nodes with the softened kernel on it, and interpolation from it to points.
 
-1 / r^q is split into a part that is smooth everywhere (`softened`) and the rest, which ends at a
-reach. The first is interpolated from a square mesh and convolved on it by fast Fourier transforms;
-the second is a sparse matrix. Both errors, of interpolation and of rounding, are bounded
-(docs/theory/operators.md).
+Derived in docs/theory/operators.md, "Anywhere: a mesh and near pairs".
 """
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel
-from convexrough.influence.coupling import Rounding
-from convexrough.influence.near_pairs import Near, Order
-from convexrough.influence.softened import Softened, lagrange, lebesgue, weight_roundoffs
-from convexrough.influence.splitting import Plan
+from convexrough.influence.near_pairs import Order
+from convexrough.influence.softened import Softened, lagrange
+from convexrough.influence.splitting import Splitting
 from convexrough.roundoff import ROUNDOFF
 
 #: Points of one block at most: what keeps sums short, and a matrix product in the cache.
@@ -82,21 +75,23 @@ class Interpolation:
     shape: tuple[int, int]
 
     @classmethod
-    def assemble(cls, order: Order, plan: Plan, dtype: Any) -> Interpolation:
+    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> Interpolation:
         rows, columns = order.shape
         patches = []
-        corners = np.stack((order.keys // columns, order.keys % columns), axis=1) * plan.block
+        corners = np.stack((order.keys // columns, order.keys % columns), axis=1) * splitting.block
         for key, (i, j) in enumerate(corners.tolist()):
             start, stop = order.starts[key : key + 2].tolist()
             for first in range(start, stop, BLOCK):
                 patches.append((first, min(first + BLOCK, stop), i, j))
         offsets = order.cells - np.repeat(corners, np.diff(order.starts), axis=0)
-        factors = [_rows(order.shares[:, k], offsets[:, k], plan).astype(dtype) for k in (0, 1)]
-        extra = plan.kernel.order - 1
-        shape = (rows * plan.block + extra, columns * plan.block + extra)
+        factors = [
+            _rows(order.shares[:, k], offsets[:, k], splitting).astype(dtype) for k in (0, 1)
+        ]
+        extra = splitting.kernel.order - 1
+        shape = (rows * splitting.block + extra, columns * splitting.block + extra)
         return cls(factors[0], factors[1], patches, shape)
 
-    def spread(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
+    def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
         """W^T P on the mesh; of the sizes of the weights if `absolute`."""
         field = np.zeros(self.shape, dtype=loads.dtype)
         x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
@@ -107,7 +102,7 @@ class Interpolation:
             field[i : i + width, j : j + width] += x[mine].T @ (column[mine] * y[mine])
         return field
 
-    def gather(self, field: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
+    def from_nodes(self, field: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
         """W of a field on the mesh."""
         result = np.empty(len(self.x), dtype=field.dtype)
         x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
@@ -119,163 +114,10 @@ class Interpolation:
         return result
 
 
-def _rows(shares: Array, offsets: Indices, plan: Plan) -> Array:
+def _rows(shares: Array, offsets: Indices, splitting: Splitting) -> Array:
     """(n, width) weights of one direction, each set where its stencil is."""
-    order = plan.kernel.order
-    rows = np.zeros((len(shares), plan.width))
+    order = splitting.kernel.order
+    rows = np.zeros((len(shares), splitting.width))
     columns = offsets[:, None] + np.arange(order)
     np.put_along_axis(rows, columns, lagrange(shares, order), axis=1)
     return rows
-
-
-@dataclass(frozen=True, eq=False)
-class Product:
-    """P -> sum_j P_j / r_ij^q, and how far it is off."""
-
-    plan: Plan
-    order: Order
-    near: Near
-    weights: Interpolation | None
-    mesh: Mesh
-    kernel: Kernel
-    kernel_errors: tuple[float, float]
-
-    @classmethod
-    def assemble(cls, points: Array, plan: Plan, dtype: Any) -> Product:
-        order = Order.of(points, plan)
-        near = Near.assemble(order, plan, dtype)
-        if not plan.meshed:
-            nothing = Kernel(np.empty((0, 0)), 0.0, 0.0)
-            return cls(plan, order, near, None, Mesh((1, 1), np.eye(2)), nothing, (0.0, 0.0))
-        weights = Interpolation.assemble(order, plan, dtype)
-        rows, columns = weights.shape
-        mesh = Mesh((rows, columns), plan.spacing * np.eye(2))
-        size = float(mesh.padded[0]) * mesh.padded[1]
-        checks.fits_in_memory("asperities that could touch", len(points), 32 * size / len(points))
-        kernel, *errors = mesh.softened(plan.kernel)
-        kernel = Kernel(kernel.spectrum.astype(dtype, copy=False), kernel.total, kernel.norm)
-        return cls(plan, order, near, weights, mesh, kernel, (errors[0], errors[1]))
-
-    def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
-        """The sparse part on another thread: both it and the transforms leave Python."""
-        ordered = loads[self.order.places]
-        if self.weights is None:
-            total = self.near.apply(ordered)
-        else:
-            with ThreadPoolExecutor(1) as other:
-                near = other.submit(self.near.apply, ordered)
-                total = self.smooth(ordered)
-                total += near.result()
-        result = np.empty_like(total)
-        result[self.order.places] = total
-        return result
-
-    def smooth(self, ordered: NDArray[Any]) -> NDArray[Any]:
-        """W G W^T P."""
-        assert self.weights is not None
-        field = self.mesh.convolve(self.weights.spread(ordered), self.kernel.spectrum)
-        return self.weights.gather(field)
-
-    def interpolation(self, strengths: Array) -> Array:
-        """(n,) bounds on the error of interpolation, for strengths that are not negative.
-
-        Of pairs within the reach and the sway of their stencils, which all count as the worst; that
-        of the others is relative, and part of `rounding`.
-        """
-        kernel, spacing = self.plan.kernel, self.plan.spacing
-        if not self.plan.meshed:
-            return np.zeros(len(strengths))
-        points, ordered = self.order.points, strengths[self.order.places]
-        near = within(points, ordered, kernel.reach + kernel.sway(spacing))
-        bounds = np.empty_like(near)
-        bounds[self.order.places] = kernel.pair_error(spacing) * near
-        return bounds
-
-    @cached_property
-    def interpolation_norm(self) -> float:
-        """Bound on its 2-norm for loads of norm 1: the largest sum over a row."""
-        return float(self.interpolation(np.ones(len(self.order.points))).max(initial=0.0))
-
-    def above(self, strengths: Array) -> Array:
-        """(n,) upper bounds on the sums, for strengths that are not negative."""
-        total = self.apply(strengths)
-        rounding = self.rounding(strengths)
-        total += rounding.of(total) + self.interpolation(strengths)
-        return total / (1.0 - rounding.relative) if rounding.relative < 1 else total + np.inf
-
-    @cached_property
-    def _rounding(self) -> tuple[float, float]:
-        """Of everything but transforms and interpolation nearby, relative and in the 2-norm."""
-        kernel = self.plan.kernel
-        relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 8) * ROUNDOFF
-        extent = float(np.ptp(self.order.points, axis=0).max()) if len(self.order.points) else 0.0
-        relative += kernel.moved(2.0 * np.sqrt(2.0) * 2.0 * ROUNDOFF * extent)
-        relative += kernel.far_error(self.plan.spacing)
-        own = (kernel.roundoffs + 8) * ROUNDOFF * kernel.centre
-        return 1.01 * relative, 1.01 * own
-
-    def rounding(self, loads: Array) -> Rounding:
-        """Of `apply` in float64, without interpolation between points near to each other."""
-        relative, own = self._rounding
-        norm, each = own * float(np.linalg.norm(loads)), own * float(np.abs(loads).max(initial=0.0))
-        if self.weights is not None:
-            ordered = loads[self.order.places]
-            field = float(np.linalg.norm(self.weights.spread(ordered)))
-            sizes = float(np.linalg.norm(self.weights.spread(np.abs(ordered), absolute=True)))
-            mesh, kernel, errors = self.mesh, self.kernel, self.kernel_errors
-            to_mesh, from_mesh = self._weighing
-            transforms = mesh.bound(kernel, ROUNDOFF) + errors[0] + from_mesh * kernel.total
-            norm += self._stretch * (transforms * field + to_mesh * kernel.total * sizes)
-            # One by one: Cauchy's inequality for a row of G, and the sum of a row of |W|.
-            transforms = mesh.bound_each(kernel, ROUNDOFF) + errors[1] + from_mesh * kernel.norm
-            growth = lebesgue(self.plan.kernel.order) ** 2
-            each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
-        return Rounding(relative, 1.01 * norm, 1.01 * each)
-
-    @property
-    def _weighing(self) -> tuple[float, float]:
-        """Rounding of sums with W, to the mesh and from it; adding zeros costs none."""
-        order, width = self.plan.kernel.order, self.plan.width
-        weights = 2.0 * weight_roundoffs(order) + 2.0
-        overlaps = (-(-width // self.plan.block)) ** 2
-        crowded = float(np.diff(self.order.starts).max())
-        to_mesh = min(crowded, BLOCK) + overlaps * np.ceil(crowded / BLOCK)
-        return (weights + float(to_mesh)) * ROUNDOFF, (weights + 2.0 * order) * ROUNDOFF
-
-    @cached_property
-    def _stretch(self) -> float:
-        """Bound on the 2-norm of W and of |W|: the largest (|W| |W|^T v)_i / v_i, for any v > 0."""
-        assert self.weights is not None
-        vector = np.ones(len(self.order.points))
-        least = np.inf
-        for _ in range(3):
-            image = self.weights.gather(self.weights.spread(vector, absolute=True), absolute=True)
-            least = min(least, float((image / vector).max()))
-            vector = np.sqrt(vector * image)
-            vector /= vector.max()
-            vector = np.maximum(vector, 1e-3)
-        return 1.01 * float(np.sqrt(least))
-
-
-def within(points: Array, strengths: Array, distance: float) -> Array:
-    """(n,) upper bounds on the sums of strengths within a distance of each point, its own included.
-
-    By cells of a quarter of the distance, and a little for the rounding of places.
-    """
-    parts = 4
-    side = distance * (1.0 + 1e-9) / parts
-    cells = np.floor((points - points.min(axis=0)) / side).astype(np.int64)
-    rows, columns = (cells.max(axis=0) + 1).tolist()
-    if rows * columns > 16 * len(points) + 10**6:
-        return np.full(len(points), float(strengths.sum()))
-    place = cells[:, 0] * columns + cells[:, 1]
-    sums = np.zeros((rows + 1, columns + 1))
-    total = np.bincount(place, strengths, minlength=rows * columns).reshape(rows, columns)
-    sums[1:, 1:] = total.cumsum(axis=0).cumsum(axis=1)
-    low_i, high_i = (np.clip(np.arange(rows) + s, 0, rows) for s in (-parts, parts + 1))
-    low_j, high_j = (np.clip(np.arange(columns) + s, 0, columns) for s in (-parts, parts + 1))
-    boxes = sums[np.ix_(high_i, high_j)] - sums[np.ix_(low_i, high_j)]
-    boxes += sums[np.ix_(low_i, low_j)] - sums[np.ix_(high_i, low_j)]
-    slack = 1e-12 * sums[-1, -1]  # rounding of the differences
-    bounds: Array = boxes.ravel()[place] + slack
-    return bounds

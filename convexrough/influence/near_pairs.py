@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from functools import partial
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices
-from convexrough.influence.splitting import Plan
+from convexrough.influence.coupling import squared_distances
+from convexrough.influence.splitting import Splitting
 
 #: Pairs looked at together, and how many such pieces are held at once.
 PIECE, BATCH = 2**17, 32
@@ -37,11 +39,11 @@ class Order:
     shape: tuple[int, int]
 
     @classmethod
-    def of(cls, points: Array, plan: Plan) -> Order:
+    def of(cls, points: Array, splitting: Splitting) -> Order:
         low = points.min(axis=0) if len(points) else np.zeros(2)
-        away = (points - low) / plan.spacing if plan.meshed else np.zeros_like(points)
+        away = (points - low) / splitting.spacing if splitting.meshed else np.zeros_like(points)
         cells = np.floor(away).astype(np.intp)
-        blocks = cells // plan.block
+        blocks = cells // splitting.block
         rows, columns = (blocks.max(axis=0, initial=0) + 1).tolist()
         key = blocks[:, 0] * columns + blocks[:, 1]
         places = np.argsort(key, kind="stable")
@@ -57,9 +59,13 @@ class Order:
         )
 
 
+#: Points from and to, and where their neighbours begin and end in the order, row by row of blocks.
+Piece: TypeAlias = tuple[slice, Indices, Indices]
+
+
 @dataclass(frozen=True, eq=False)
 class Near:
-    """1 / r^q less its smooth part, for pairs of points nearer than the cut.
+    """S of docs/theory/operators.md: 1 / r^q less its smooth part, of pairs nearer than the cut.
 
     upper   : (n, n) sparse, pairs i < j;  own : what each point gets of itself
     terms   : the most that any sum has;  nearest : [length] the least distance that is not 0
@@ -71,55 +77,32 @@ class Near:
     nearest: float
 
     @classmethod
-    def assemble(cls, order: Order, plan: Plan, dtype: Any) -> Near:
+    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> Near:
         from scipy.sparse import csr_array
 
         n = len(order.points)
-        pieces = list(_neighbourhoods(order, plan))
+        pieces = list(_neighbourhoods(order, splitting))
         most = sum((rows.stop - rows.start) * int((b - a).sum()) for rows, a, b in pieces)
         # About half of them are near; memory is taken when written to, not here.
         checks.fits_in_memory("asperities that could touch", n, 6.0 * most / max(n, 1))
         index: Any = np.int32 if most < 2**31 else np.int64
         where, values = np.empty(most, dtype=index), np.empty(most, dtype=dtype)
         counts = np.zeros(n, dtype=np.int64)
-        nearest, done = plan.cut, 0
-
-        def found(piece: Piece) -> tuple[slice, Indices, NDArray[np.int32], Array, float]:
-            rows, firsts, lasts = piece
-            others = np.concatenate(
-                [np.arange(a, b, dtype=np.int32) for a, b in zip(firsts, lasts, strict=True)]
-            )
-            mine, theirs = order.points[rows], order.points[others]
-            squares = np.subtract.outer(mine[:, 0], theirs[:, 0])
-            squares *= squares
-            y = np.subtract.outer(mine[:, 1], theirs[:, 1])
-            y *= y
-            squares += y
-            wanted = squares < plan.cut**2
-            own = lasts[0] - firsts[0]  # each pair once
-            wanted[:, :own] &= others[:own] > np.arange(rows.start, rows.stop)[:, None]
-            row, column = np.nonzero(wanted)
-            squares = squares[wanted]
-            closest = float(np.sqrt(squares[squares > 0].min(initial=np.inf)))
-            number = np.bincount(row, minlength=len(mine))
-            return rows, number, others[column], plan.kernel.local(squares), closest
-
+        nearest, done = splitting.cut, 0
+        pairs_of = partial(_pairs, order, splitting)
         with ThreadPoolExecutor(2) as threads:
             for batch in range(0, len(pieces), BATCH):
-                for rows, number, mine, entries, closest in threads.map(
-                    found, pieces[batch : batch + BATCH]
-                ):
-                    counts[rows] = number
-                    where[done : done + len(mine)] = mine
-                    values[done : done + len(mine)] = entries
-                    done += len(mine)
-                    nearest = min(nearest, closest)
+                for found in threads.map(pairs_of, pieces[batch : batch + BATCH]):
+                    taken = slice(done, done + len(found.others))
+                    counts[found.rows] = found.counts
+                    where[taken], values[taken] = found.others, found.values
+                    done, nearest = taken.stop, min(nearest, found.closest)
         starts = np.concatenate(([0], np.cumsum(counts)))
         both = counts
         for start in range(0, done, 2**24):  # which makes a copy of each
             both = both + np.bincount(where[start : min(start + 2**24, done)], minlength=n)
         upper = csr_array((values[:done], where[:done], starts.astype(index)), shape=(n, n))
-        return cls(upper, -plan.kernel.centre, int(both.max(initial=0)), nearest)
+        return cls(upper, -splitting.kernel.centre, int(both.max(initial=0)), nearest)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         result: NDArray[Any] = self.upper @ loads
@@ -128,18 +111,42 @@ class Near:
         return result
 
 
-#: Points from and to, and where their neighbours begin and end in the order, row by row of blocks.
-Piece: TypeAlias = tuple[slice, Indices, Indices]
+class _Pairs(NamedTuple):
+    """Near pairs of some points with later ones, point by point."""
+
+    rows: slice  # the points
+    counts: Indices  # how many pairs each has
+    others: NDArray[np.int32]
+    values: Array  # S
+    closest: float  # [length] the least distance that is not 0
 
 
-def _neighbourhoods(order: Order, plan: Plan) -> Iterator[Piece]:
+def _pairs(order: Order, splitting: Splitting, piece: Piece) -> _Pairs:
+    rows, firsts, lasts = piece
+    others = np.concatenate(
+        [np.arange(a, b, dtype=np.int32) for a, b in zip(firsts, lasts, strict=True)]
+    )
+    squares = squared_distances(order.points[rows], order.points[others])
+    wanted = squares < splitting.cut**2
+    own = lasts[0] - firsts[0]  # each pair once
+    wanted[:, :own] &= others[:own] > np.arange(rows.start, rows.stop)[:, None]
+    row, column = np.nonzero(wanted)
+    counts = np.bincount(row, minlength=len(squares))
+    squares = squares[wanted]
+    closest = float(np.sqrt(squares[squares > 0].min(initial=np.inf)))
+    return _Pairs(rows, counts, others[column], splitting.kernel.local(squares), closest)
+
+
+def _neighbourhoods(order: Order, splitting: Splitting) -> Iterator[Piece]:
     """Points, and those of their own and later blocks that can be nearer than the cut.
 
     Blocks in a row are next to each other in the order, and so are their points.
     """
     rows, columns = order.shape
-    away = int(np.ceil(plan.cut / (plan.block * plan.spacing))) if plan.meshed else 0
-    away = min(away, max(rows, columns))
+    away = 0
+    if splitting.meshed:
+        side = splitting.block * splitting.spacing
+        away = min(int(np.ceil(splitting.cut / side)), max(rows, columns))
     i, j = order.keys // columns, order.keys % columns
     ahead = np.arange(min(away, rows - 1) + 1)
     left = np.where(ahead > 0, np.maximum(j[:, None] - away, 0), j[:, None])

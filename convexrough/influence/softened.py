@@ -4,7 +4,8 @@ Beyond the reach a it is 1 / r^q itself. Within, the series of 1 / r^q in t = 1 
 after t^p: a polynomial in r^2 with p continuous derivatives across the reach. (For q = 1 it is the
 potential of a charge spread over a ball of radius a as (1 - (r/a)^2)^(p-1), so that Newton's
 theorem holds.) All terms of the series are positive, so nothing cancels. Derived in
-docs/theory/operators.md.
+docs/theory/operators.md, "Anywhere: a mesh and near pairs": "The smooth part", "How steep it is",
+"Interpolation".
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ import numpy as np
 
 from convexrough.arrays import Array
 
-#: Near pairs whose part would be less than so much of the error of interpolation are left out.
-CUT = 0.1
+#: Near pairs whose part would be less than so much of the error of interpolation are left out. A
+#: heuristic: what is left out is part of the bound.
+CUT_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class Softened:
 
     def pair_error(self, spacing: float) -> float:
         """Bound on the error between any two points: of interpolating L, and of what is cut."""
-        return (1.0 + CUT) * self._interpolation_error(spacing)
+        return (1.0 + CUT_SHARE) * self._interpolation_error(spacing)
 
     def cut(self, spacing: float) -> float:
         """[length] where 1 / r^q - L has fallen to a small part of the error of interpolating L.
@@ -98,7 +100,7 @@ class Softened:
         if not np.isfinite(self.reach):
             return np.inf
         first = 2.3 * float(_series(self.order + 1, self.power)[-1])
-        error = CUT * self._interpolation_error(spacing) * self.reach**self.power
+        error = CUT_SHARE * self._interpolation_error(spacing) * self.reach**self.power
         t = min(0.5, (error / first) ** (1.0 / (self.order + 1)))
         return self.reach * math.sqrt(1.0 - t)
 

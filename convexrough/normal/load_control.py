@@ -19,8 +19,8 @@ def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Arr
     shift is counted from the highest, so that loads of any size come out to all digits.
     """
     indentation = indentation - indentation.max()
-    single = hertz.indentation(load, coefficients)  # one asperity alone would carry it all
-    shift = float((single - indentation).min())
+    alone = hertz.indentation(load, coefficients)  # one asperity alone would carry it all
+    shift = float((alone - indentation).min())
     for _ in range(200):
         loads = hertz.load(indentation + shift, coefficients)
         slope = float(np.sum(np.cbrt(loads) / coefficients)) * 1.5

@@ -1,5 +1,7 @@
 """The normal contact problem in its own units: energy, gap, residual, bounds, convexity.
 
+docs/theory/convexity.md, "The model", (1) and (2):
+
     minimise  Phi(P) = sum (3/5) k_i P_i^(5/3) + (1/2) P'AP - D'P   over P >= 0
 
 with D_i = D0 + d_i prescribed (approach control), or with sum P_i prescribed and D0 the multiplier
@@ -18,37 +20,18 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, among_zeros
-from convexrough.influence import Influence, Kind, couple, fitted_shells, shells
+from convexrough.influence import Influence, Kind, couple
+from convexrough.influence.shells import fitted_shells, shells
 from convexrough.normal.load_control import approach_bound, highest_approach, shifted_to_load
+from convexrough.normal.units import Units
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: The part of the room between neighbours that fitted shells share out by size.
+#: The part of the room between neighbours that fitted shells share out by size. A heuristic: any
+#: part gives shells that hold, some of them sharper bounds (docs/theory/certificate.md, "Which
+#: box", 3).
 FITTED = 0.9
-
-
-@dataclass(frozen=True)
-class Units:
-    """Units in which the problem's numbers are about 1.
-
-    Powers of two, and the force a power of eight, so that scaling a float64 number (and its 2/3
-    power) by them is exact.
-    """
-
-    length: float  # [length] of approach
-    force: float  # [force]
-
-    @property
-    def local(self) -> float:
-        """What a local coefficient k is multiplied by: force^(2/3) / length, a power of two."""
-        return float(2.0 ** np.round(np.log2(self.force) * 2 / 3) / self.length)
-
-    @classmethod
-    def of(cls, approach: float, coefficient: float) -> Units:
-        length = 2.0 ** np.round(np.log2(approach))
-        force = 8.0 ** np.round(np.log2(length / coefficient) / 2.0)
-        return cls(float(length), float(force))
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +179,8 @@ class NormalProblem:
     def convexity_number(self, loads: Array) -> float:
         """theta = max 2 a_i / (pi s_i) over the box 0 <= P <= loads; Phi is convex where < 1.
 
-        The smallest eigenvalue of the Hessian, relative to its diagonal, is at least 1 - theta.
+        The smallest eigenvalue of the Hessian, relative to its diagonal, is at least 1 - theta:
+        (3) of docs/theory/convexity.md.
         """
         ratio = self.shells / self.stiffness(loads)
         return float(ratio.max(initial=0.0)) * (1 + SAFETY)
@@ -211,8 +195,9 @@ class NormalProblem:
     ) -> float:
         """Upper bound on Phi(P) less its minimum over 0 <= P <= box, from the loads alone.
 
-        With M = A + diag(shells), positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2,
-        convex on the box where its convexity number is at most 1, any P gives a dual bound:
+        docs/theory/exact-cones.md, "A dual bound that trusts no solver": with M = A + diag(shells),
+        positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2, convex on the box where
+        its convexity number is at most 1, any P gives a dual bound:
 
             min Phi >= -P'MP / 2 + sum min over 0 <= x <= box_i of [h_i(x) - (D - M P)_i x].
 
@@ -226,25 +211,12 @@ class NormalProblem:
             return np.inf
         k, shells = self.coefficients, self.shells
         slope = approach + self.offsets - displacement - shells * loads  # (D - M P)_i
-        top = hertz.indentation(box, k) - shells * box  # h' at the box's upper end
-        # s = (x / box)^(1/3) solves k box^(2/3) s^2 - shell box s^3 = slope, by Newton's method
-        # from a lower bound.
-        k_box, shell_box = hertz.indentation(box, k), shells * box
-        target = np.clip(slope, 0.0, top)
-        s = np.sqrt(np.where(k_box > 0, target / np.where(k_box > 0, k_box, 1.0), 0.0))
-        for _ in range(60):
-            value = s * s * (k_box - shell_box * s) - target
-            rate = s * (2.0 * k_box - 3.0 * shell_box * s)
-            step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
-            s = np.clip(s - step, 0.0, 1.0)
-            if np.abs(step).max(initial=0.0) < 1e-15:
-                break
-        best = box * s**3
+        best = self._loads_at_slope(slope, box)
 
         def charge(x: Array) -> Array:
             return np.asarray(x * (0.6 * hertz.indentation(x, k) - shells * x / 2.0 - slope))
 
-        size = 0.6 * k_box + shell_box + np.abs(slope)
+        size = 0.6 * hertz.indentation(box, k) + shells * box + np.abs(slope)
         rounding = 32 * ROUNDOFF * float(((loads + best) * size).sum())
         # A slope off by e moves a term by e times the distance from P to the best x at most, and
         # the best x by e over the least curvature there.
@@ -254,8 +226,28 @@ class NormalProblem:
         rounding += float((error * distance).sum()) * (1 + SAFETY)
         return float(np.maximum(charge(loads) - charge(best), 0.0).sum()) + rounding
 
+    def _loads_at_slope(self, slope: Array, box: Array) -> Array:
+        """(n,) the x from 0 to box_i with h_i'(x) = slope_i, or the nearer end: h_i of the above.
+
+        s = (x / box)^(1/3) solves k box^(2/3) s^2 - shell box s^3 = slope: by Newton's method, from
+        a lower bound.
+        """
+        k_box, shell_box = hertz.indentation(box, self.coefficients), self.shells * box
+        target = np.clip(slope, 0.0, k_box - shell_box)
+        s = np.sqrt(np.where(k_box > 0, target / np.where(k_box > 0, k_box, 1.0), 0.0))
+        for _ in range(60):
+            value = s * s * (k_box - shell_box * s) - target
+            rate = s * (2.0 * k_box - 3.0 * shell_box * s)
+            step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
+            s = np.clip(s - step, 0.0, 1.0)
+            if np.abs(step).max(initial=0.0) < 1e-15:
+                break
+        return np.asarray(box * s**3)
+
     def overhang(self, weights: Array, displacement: Array) -> float:
         """Upper bound on D0 at every solution of load control, from any trial loads.
+
+        (2) of docs/theory/certificate.md, "Prescribed load".
 
         weights      : (n,) trial loads, not negative, not all zero
         displacement : A times weights

@@ -16,7 +16,7 @@ from convexrough.normal.load_control import highest_approach
 from convexrough.run.tables import read_summits, read_text
 from convexrough.scene.asperities import Asperities, largest_tip_radius
 from convexrough.scene.material import Material
-from convexrough.scene.patterns import CUT
+from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver
 from convexrough.sphere import hertz
@@ -143,7 +143,7 @@ def _lattice(
             approach,
             sphere_radius=tables.sphere.radius,
             tip_radius=largest_tip_radius(layout.tip_radius, layout.tip_radius_cv),
-            height=CUT * layout.height_std,
+            height=CUT_DEVIATIONS * layout.height_std,
             geometry=layout.geometry,
         )
 

@@ -18,7 +18,7 @@ BLUR = 32 * 2.0**-53
 #: ... and of the shortest distance between sites by this part: the bounds on products count it.
 CLOSEST = 1e-7
 
-#: A lattice is of use where its sites are at most so many times the points.
+#: A lattice is of use where its sites are at most so many times the points: a heuristic, for speed.
 SPARSEST = 50
 
 

@@ -7,7 +7,8 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.errors import InputError
 
-#: Asperities looked at together: between two batches fewer pairs come to be worth a look.
+#: Asperities looked at together: between two batches fewer pairs come to be worth a look. A
+#: heuristic, for speed only.
 BATCH = 256
 
 

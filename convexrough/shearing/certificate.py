@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, among_zeros, frozen
-from convexrough.normal.certificate import Certificate, Scope
+from convexrough.normal.certificate import Certificate
+from convexrough.normal.judgement import Scope
 from convexrough.shearing.judgement import Bounds
 from convexrough.shearing.problem import TangentialProblem
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.convex.newton_step import FACTORISED, correct
 from convexrough.errors import SolverError
-from convexrough.influence import DenseInfluence, Influence
+from convexrough.influence import Influence
 from convexrough.sphere import annulus
 
 
@@ -78,7 +78,7 @@ class TangentialEnergy:
         """A u, of one state or of each of m."""
         if increments.ndim == 1:
             return self.influence.apply(increments)
-        if isinstance(self.influence, DenseInfluence):
+        if self.influence.at_hand:
             return self.influence.apply(increments.T).T
         product = np.empty_like(increments)
         for row, u in zip(product, increments, strict=True):
@@ -119,7 +119,7 @@ class TangentialEnergy:
         linear, so each step leaves what its linear solver does.
         """
         c, root = self.stiffest, np.sqrt(self.stiffest)
-        if isinstance(self.influence, DenseInfluence) and len(self) <= FACTORISED:
+        if self.influence.at_hand and len(self) <= FACTORISED:
             stiffness = np.diag(1.0 / c) + self.influence.matrix
             shares = np.linalg.solve(stiffness, np.ones(len(self)))
             return np.asarray(shares / shares.sum())
@@ -133,6 +133,6 @@ class TangentialEnergy:
                 return best
             best, before = shares, size
             step = correct(self.influence, self.shells, root, defect, balanced=True, tolerance=1e-5)
-            eta = eta + step.change
+            eta = eta + step
             eta /= float(c @ eta)
         raise SolverError("the elastic state does not converge", solver="shear")

@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence import Coupling, couple, fitted_shells, spread
-from convexrough.normal.certificate import FIT_FROM, SUM_ROUNDOFFS
+from convexrough.influence import couple
+from convexrough.influence.coupling import Coupling, error_reach
+from convexrough.influence.shells import fitted_shells
+from convexrough.normal.judgement import FIT_FROM, SUM_ROUNDOFFS
 from convexrough.normal.problem import FITTED
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.problem import TangentialProblem
@@ -68,7 +70,7 @@ class LoadErrors(NamedTuple):
             convexity_number=_convexity_number(problem, h),
             # Collatz and Wielandt: by the trial vector H^-1/2.
             coupling=float(couple_above(problem, 1.0 / h).max(where=sure, initial=0.0)),
-            reach=spread(A, A.scale, 1.0 / h),
+            reach=error_reach(A, A.scale, 1.0 / h),
             distance=min(by_component, _distance(problem, errors, effect)) * (1 + SAFETY),
         )
 

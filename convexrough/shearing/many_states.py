@@ -12,7 +12,6 @@ from convexrough.arrays import Array
 from convexrough.convex.newton import falls
 from convexrough.convex.newton_step import FACTORISED
 from convexrough.errors import SolverError
-from convexrough.influence.dense import DenseInfluence
 from convexrough.roundoff import SAFETY
 from convexrough.shearing.energy import TangentialEnergy
 from convexrough.shearing.newton import ACCURATE, MOST_STEPS, advice
@@ -32,7 +31,7 @@ COARSE = 128
 
 def by_matrices(energy: TangentialEnergy) -> bool:
     """Whether states are solved by factorisations, many at once."""
-    return isinstance(energy.influence, DenseInfluence) and len(energy) <= FACTORISED
+    return energy.influence.at_hand and len(energy) <= FACTORISED
 
 
 def solve_together(energy: TangentialEnergy, totals: Array) -> States:

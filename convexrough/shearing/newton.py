@@ -128,7 +128,7 @@ class _Shearing:
             state.defect,
             balanced=True,
             tolerance=left,
-        ).change
+        )
 
     def gradient(self, state: _State) -> Array:
         return gradients(self.problem, state.unknown, state.coupling, state.scale)

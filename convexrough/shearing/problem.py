@@ -20,10 +20,10 @@ from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
 from convexrough.influence.choice import couple
-from convexrough.influence.coupling import shells
+from convexrough.influence.shells import shells
 from convexrough.kept import Keeper
 from convexrough.normal.certificate import Certificate
-from convexrough.normal.problem import Units
+from convexrough.normal.units import Units
 from convexrough.progress import Announce
 from convexrough.scene.scene import Scene
 from convexrough.shearing.energy import TangentialEnergy

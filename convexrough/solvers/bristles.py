@@ -39,6 +39,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array
+from convexrough.convex.definite import is_definite
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import Announce
@@ -207,9 +208,7 @@ def _positive_definite(problem: NormalProblem, box: Array) -> Array | None:
     root = np.sqrt(1.0 / problem.stiffness(box))
     scaled = problem.influence.matrix * root * root[:, None]
     np.fill_diagonal(scaled, 1.0 - MARGIN)
-    try:
-        np.linalg.cholesky(scaled)
-    except np.linalg.LinAlgError:
+    if not is_definite(scaled):
         return None
     hessian: Array = problem.influence.matrix + np.diag(problem.stiffness(box))
     return hessian

@@ -177,7 +177,7 @@ class _Pressing:
             state.defect,
             balanced=self.problem.load is not None,
             tolerance=left,
-        ).change
+        )
 
     def gradient(self, state: _State) -> Array:
         """The gap."""

@@ -5,7 +5,7 @@ t = |Q| / (f P) of friction and at the share phi of the largest deflection is
 
     t = 1 - s^3,    phi = 1 - s^2,
 
-and the energies of `convexrough.sphere.hertz` are polynomials. They are written so that no term is
+and the energies of `mindlin` are polynomials. They are written so that no term is
 subtracted from another: each keeps its relative accuracy down to x = 0. Sliding is x = 1.
 """
 

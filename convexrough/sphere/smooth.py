@@ -3,7 +3,7 @@
 The sphere of a scene on the same material without asperities, under the same load: Hertz's contact,
 and Cattaneo, Mindlin and Deresiewicz's under shear. With t = Q / (f P), P the load, f the friction,
 c_t Mindlin's ratio and delta the approach, all displacements are c_t f delta times functions of t
-alone: those of `convexrough.sphere.hertz`.
+alone: those of `convexrough.sphere.mindlin`.
 Source: Johnson, Contact Mechanics (1985), chapters 4 and 7; [12]-[16] of the source paper, which
 gives one body's displacements and losses, where these are both bodies'.
 """

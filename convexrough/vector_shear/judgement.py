@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.normal.certificate import SUM_ROUNDOFFS
+from convexrough.convex.definite import proved_margin
+from convexrough.normal.judgement import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.judgement import Bounds, own_change
 from convexrough.shearing.load_errors import LoadErrors
@@ -190,22 +191,12 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
 def _margin(problem: VectorProblem, known: LoadErrors) -> float:
     """A proved lower bound on the least eigenvalue of I + H^-1/2 B H^-1/2; 0 where none is found.
 
-    As `certificate` does for the normal problem (Rump, BIT 46 (2006) 433), with H on loads no
-    smaller than the true ones. Asperities not sure to touch are not among the unknowns.
+    With H on loads no smaller than the true ones, so that a little more is proved than is said.
+    Asperities not sure to touch are not among the unknowns.
     """
     sure = known.sure
     h = np.where(sure, 2.0 / 3.0 * problem.scalar.ceilings, 1.0)
     h /= np.where(sure, problem.scalar.loads + known.errors, 1.0)
     root = np.repeat(np.where(sure, 1.0 / np.sqrt(h), 0.0), 2)
     scaled = problem.kernel * root * root[:, None]
-    n = len(scaled)
-    blur = (problem.product_error + 8 * ROUNDOFF) * float(np.abs(scaled).sum(axis=1).max())
-    slack = 1.1 * (blur + (n + 2) * n * ROUNDOFF) + SAFETY
-    for margin in MARGINS:
-        scaled[np.diag_indices(n)] = 1.0 - margin - slack
-        try:
-            np.linalg.cholesky(scaled)
-        except np.linalg.LinAlgError:
-            continue
-        return margin
-    return 0.0
+    return proved_margin(scaled, MARGINS, problem.product_error + 8 * ROUNDOFF, spare=SAFETY)

@@ -33,8 +33,9 @@ import numpy as np
 from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact
+from convexrough.convex.definite import is_definite
 from convexrough.errors import SolverError
-from convexrough.normal.certificate import SUM_ROUNDOFFS
+from convexrough.normal.judgement import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.sphere import mindlin
@@ -225,11 +226,7 @@ class VectorProblem:
         """Whether a shift of these shares makes B semidefinite, up to rounding."""
         matrix = self._scaled
         matrix[np.diag_indices(len(matrix))] = np.repeat(shares, 2) + self._rounding
-        try:
-            np.linalg.cholesky(matrix)
-        except np.linalg.LinAlgError:
-            return False
-        return True
+        return is_definite(matrix)
 
     def duality_gap(self, state: VectorState) -> float:
         """Upper bound on the energy of the forces above the least, from q and X alone.

@@ -23,7 +23,8 @@ from convexrough.bench.measure import Attempt, CostRow, Row, Tally, counted
 from convexrough.bench.plan import Plan, attempts, full_plan, quick_plan
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, scene
 from convexrough.bench.suite import Bench, Panel
-from convexrough.influence import DenseInfluence, LatticeInfluence
+from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.lattice import LatticeInfluence
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, Conic, Newton
 

@@ -11,7 +11,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import paper, rough, scattered
 
-from convexrough.influence import DenseInfluence, inverse_distances, shells, spread
+from convexrough.influence.choice import couple
+from convexrough.influence.coupling import Kind, error_reach, inverse_distances
+from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.shells import shells
 
 SCALE = 0.37
 
@@ -113,7 +116,7 @@ def test_matrix_spread_and_falloff() -> None:
     assert operator.name == "dense"
     assert_allclose(operator.matrix, operator.matrix.T)
     assert (np.diag(operator.matrix) == 0).all()
-    assert_allclose(spread(operator, SCALE, loads), np.sqrt(operator.matrix**2 @ loads))
+    assert_allclose(error_reach(operator, SCALE, loads), np.sqrt(operator.matrix**2 @ loads))
     inverse = inverse_distances(points, points)
     for power in (2, 3):
         sums = inverse**power @ loads
@@ -174,3 +177,16 @@ def test_shells_do_not_overlap() -> None:
     radii = shell_radii(points)
     inverse = inverse_distances(points, points)
     assert ((radii[:, None] + radii) * inverse <= 1 + 1e-14).all()
+
+
+@pytest.mark.parametrize("kind", ["dense", "lattice", "scattered"])
+def test_a_part_of_the_matrix(kind: Kind) -> None:
+    """It may be written into: the operator keeps its own."""
+    scene, which = paper(), np.array([5, 0, 60, 17])
+    operator = couple(scene, np.arange(len(scene)), SCALE, kind)
+    assert operator.at_hand == (kind == "dense")
+    expected = operator.matrix[np.ix_(which, which)]
+    part = operator.submatrix(which)
+    assert (part == expected).all()
+    part[:] = 0.0
+    assert (operator.submatrix(which) == expected).all()

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from convexrough.influence import DenseInfluence, inverse_distances
-from convexrough.influence.mesh import Product, within
+from convexrough.influence.coupling import inverse_distances
+from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.pair_sums import Product, within
 from convexrough.influence.scattered import ScatteredCoupling, ScatteredInfluence
 from convexrough.influence.softened import Softened, _steepest, lagrange, lebesgue
-from convexrough.influence.splitting import Plan
+from convexrough.influence.splitting import Splitting
 
 SCALE = 0.37
 COUNT = 4000
@@ -71,7 +72,7 @@ def exact(points: np.ndarray, others: np.ndarray, values: np.ndarray, power: int
 
 
 def meshed(operator: ScatteredInfluence) -> bool:
-    return operator._double.plan.meshed
+    return operator._double.splitting.meshed
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -79,7 +80,7 @@ def test_product_and_its_bound(layout: str) -> None:
     rng = np.random.default_rng(1)
     points = LAYOUTS[layout](rng)
     rows = rng.integers(0, len(points), 300)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     assert meshed(operator)
     smooth, rough = np.ones(len(points)), rng.standard_normal(len(points))
     few = np.where(rng.random(len(points)) < 0.01, rng.random(len(points)), 0.0)
@@ -101,9 +102,9 @@ def test_interpolation_is_within_its_bound(tolerance: float) -> None:
     """Coarse enough that interpolation is all of the error."""
     rng = np.random.default_rng(2)
     points = _disc(rng)
-    plan = Plan.choose(points, 1, tolerance)
-    assert plan.meshed
-    product = Product.assemble(points, plan, np.float64)
+    splitting = Splitting.choose(points, 1, tolerance)
+    assert splitting.meshed
+    product = Product.assemble(points, splitting, np.float64)
     matrix = inverse_distances(points, points)
     for loads in (np.ones(len(points)), rng.standard_normal(len(points))):
         error = product.apply(loads) - matrix @ loads
@@ -125,16 +126,16 @@ def test_error_of_a_pair(power: int, order: int) -> None:
     """One load and one point, at distances where interpolation is at its worst."""
     rng = np.random.default_rng(order)
     kernel = Softened(power, order, 1.0)
-    plan = Plan(kernel, 1.0 / (1.2 * order), order)
+    splitting = Splitting(kernel, 1.0 / (1.2 * order), order)
     worst = 0.0
     for _ in range(30):
         points = rng.uniform(0, 1.2, (40, 2))
-        product = Product.assemble(points, plan, np.float64)
+        product = Product.assemble(points, splitting, np.float64)
         loads = np.zeros(len(points))
         loads[0] = 1.0
         error = product.apply(loads) - inverse_distances(points, points[:1])[:, 0] ** power
         worst = max(worst, float(np.abs(error).max()))
-    bound = kernel.pair_error(plan.spacing)
+    bound = kernel.pair_error(splitting.spacing)
     assert worst <= bound
     assert worst >= 1e-3 * bound
 
@@ -143,8 +144,8 @@ def test_upper_bounds_on_sums() -> None:
     """Also where what is computed is too low, as on a mesh that is coarse enough."""
     rng = np.random.default_rng(13)
     points = rng.uniform(0, 1.2, (300, 2))
-    plan = Plan(Softened(3, 16, 1.0), 1.0 / 20, 8)
-    product = Product.assemble(points, plan, np.float64)
+    splitting = Splitting(Softened(3, 16, 1.0), 1.0 / 20, 8)
+    product = Product.assemble(points, splitting, np.float64)
     inverse = inverse_distances(points, points) ** 3
     too_low = 0
     for i in range(20):
@@ -223,7 +224,7 @@ def test_lagrange_polynomials() -> None:
 def test_single_precision(layout: str) -> None:
     rng = np.random.default_rng(4)
     points = LAYOUTS[layout](rng)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     loads = rng.random(len(points))
     single, double = operator.apply(loads.astype(np.float32)), operator.apply(loads)
     assert single.dtype == np.float32
@@ -236,7 +237,7 @@ def test_falloff(layout: str, power: int) -> None:
     rng = np.random.default_rng(5)
     points = LAYOUTS[layout](rng)
     rows = rng.integers(0, len(points), 300)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     for strengths in (rng.random(len(points)), np.where(rng.random(len(points)) < 0.1, 1.0, 0.0)):
         true = exact(points[rows], points, strengths, power)
         above = operator.falloff(strengths, power)[rows]
@@ -248,7 +249,7 @@ def test_falloff(layout: str, power: int) -> None:
 def test_among_and_onto() -> None:
     rng = np.random.default_rng(6)
     points = _disc(rng)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     which = np.flatnonzero(points[:, 0] > 0.1)
     loads = rng.random(len(which))
     part = operator.among(which)
@@ -259,7 +260,7 @@ def test_among_and_onto() -> None:
     few = operator.onto(others)
     true = SCALE * exact(others, points, loads)
     joint = ScatteredCoupling(
-        ScatteredInfluence.assemble(np.concatenate((points, others)), SCALE), len(points)
+        ScatteredInfluence(np.concatenate((points, others)), SCALE), len(points)
     )
     for coupling in (few, joint):
         rounding = coupling.rounding(loads)
@@ -274,7 +275,7 @@ def test_matrix_separations_and_crowding(layout: str) -> None:
     rng = np.random.default_rng(7)
     points = LAYOUTS[layout](rng)[rng.permutation(3000)]
     dense = DenseInfluence.assemble(points, SCALE)
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     assert_allclose(operator.separations(), dense.separations(), rtol=1e-14)
     assert_allclose(operator.matrix, dense.matrix)
     assert operator.entry_error == pytest.approx(dense.entry_error)
@@ -284,7 +285,7 @@ def test_matrix_separations_and_crowding(layout: str) -> None:
 
 def test_the_most_crowded_pair_is_not_one_of_nearest_neighbours() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [-1.3, 0.0], [-2.2, 0.0]])
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     radii = np.array([1.0, 0.5, 1.0, 0.1])
     assert operator.crowding(radii) == pytest.approx(2.0 / 1.3)
 
@@ -294,27 +295,27 @@ def test_point_error_is_counted() -> None:
     points = _jittered(rng)
     blur = 1e-13
     moved = points + rng.choice([-blur, blur], points.shape)
-    operator = ScatteredInfluence.assemble(points, SCALE, blur)
+    operator = ScatteredInfluence(points, SCALE, blur)
     loads = rng.random(len(points))
     computed = operator.apply(loads)
     true = SCALE * exact(moved[:200], moved, loads)
     error = np.abs(computed[:200] - true)
     assert (error <= operator.rounding(loads).of(computed)[:200]).all()
-    exactly = ScatteredInfluence.assemble(points, SCALE).rounding(loads)
+    exactly = ScatteredInfluence(points, SCALE).rounding(loads)
     assert (operator.rounding(loads).of(computed) >= 10 * exactly.of(computed)).all()
     far = points + rng.choice([-2e-6, 2e-6], points.shape)
-    rough = ScatteredInfluence.assemble(points, SCALE, 2e-6)
+    rough = ScatteredInfluence(points, SCALE, 2e-6)
     for power in (2, 3):
         above = rough.falloff(loads, power)[:200]
         assert (above >= exact(far[:200], far, loads, power)).all()
-    assert (operator.separations() < ScatteredInfluence.assemble(points, SCALE).separations()).all()
+    assert (operator.separations() < ScatteredInfluence(points, SCALE).separations()).all()
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 50])
 def test_few_points(count: int) -> None:
     rng = np.random.default_rng(count)
     points = rng.uniform(-1, 1, (count, 2))
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     loads = rng.random(count)
     true = SCALE * exact(points, points, loads)
     error = np.abs(operator.apply(loads) - true)
@@ -343,7 +344,7 @@ def contact() -> tuple[ScatteredInfluence, np.ndarray]:
     """Jittered asperities; W of a Hertzian contact in the middle, at 0.45 of the convex range."""
     rng = np.random.default_rng(10)
     points = _jittered(rng) - 31 * 1e-4
-    operator = ScatteredInfluence.assemble(points, SCALE)
+    operator = ScatteredInfluence(points, SCALE)
     inside = np.maximum(1 - (points**2).sum(axis=1) / 0.0025**2, 0.0)
     theta = 0.45 * np.sqrt(inside) * rng.uniform(0.5, 1.0, len(points))
     # theta = c scale / s with c = W^2 and s half the nearest distance

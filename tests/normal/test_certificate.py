@@ -24,8 +24,9 @@ from scenes import (
 )
 
 import convexrough as cr
-from convexrough.influence import Influence, Kind, Rounding
-from convexrough.normal.certificate import _convex_margin, _find_box, judge
+from convexrough.influence.coupling import Influence, Kind, Rounding
+from convexrough.normal.certificate import judge
+from convexrough.normal.judgement import _convex_margin, _find_box
 from convexrough.normal.problem import NormalProblem
 
 Array = NDArray[np.float64]
@@ -214,6 +215,31 @@ def test_scopes() -> None:
         assert pressed(0.0012, 0.03, kind).scope == "local"
         assert pressed(0.0012, 0.2, kind).scope == "local"
         assert pressed(0.0025, 5.0, kind).scope == "none"
+
+
+class _AtHand:
+    """An operator of any class whose matrix costs nothing."""
+
+    at_hand = True
+
+    def __init__(self, influence: Influence) -> None:
+        self.influence = influence
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.influence, name)
+
+    def __len__(self) -> int:
+        return len(self.influence)
+
+
+def test_a_matrix_at_hand_is_used_whatever_its_class() -> None:
+    lattice = cr.Asperities.hexagonal(spacing=0.0012, tip_radius=0.03, within=0.0102)
+    scene = cr.Scene(1.0, lattice, MATERIAL)
+    loads = cr.press(scene, approach=PAPER_APPROACH).loads
+    problem = NormalProblem.assemble(scene, approach=PAPER_APPROACH, influence="lattice")
+    assert judge(problem, loads).scope == "local"
+    stored: Any = _AtHand(problem.influence)
+    assert judge(replace(problem, influence=stored), loads).scope == "global"
 
 
 @pytest.mark.parametrize("operator", OPERATORS)

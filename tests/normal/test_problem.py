@@ -23,7 +23,8 @@ from scenes import (
 
 import convexrough as cr
 from convexrough.convex.newton import descend
-from convexrough.influence import Kind, inverse_distances
+from convexrough.influence import Kind
+from convexrough.influence.coupling import inverse_distances
 from convexrough.normal.load_control import highest_approach, shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Newton

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, paper, random_scenes
 
 import convexrough as cr
-from convexrough.influence import inverse_distances
+from convexrough.influence.coupling import inverse_distances
 from convexrough.shearing.masing import remember
 from convexrough.sphere import hertz, mindlin
 

@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper
 
 import convexrough as cr
-from convexrough.influence import LatticeInfluence
+from convexrough.influence.lattice import LatticeInfluence
 from convexrough.run.stages import compute
 from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.judgement import judge_in_turn, judge_states

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, random_scenes
 
 import convexrough as cr
-from convexrough.influence import inverse_distances
+from convexrough.influence.coupling import inverse_distances
 from convexrough.sphere import mindlin
 
 

@@ -1,0 +1,30 @@
+"""The units that a normal problem and its friction are solved in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units in which the problem's numbers are about 1.
+
+    Powers of two, and the force a power of eight, so that scaling a float64 number (and its 2/3
+    power) by them is exact.
+    """
+
+    length: float  # [length] of approach
+    force: float  # [force]
+
+    @property
+    def local(self) -> float:
+        """What a local coefficient k is multiplied by: force^(2/3) / length, a power of two."""
+        return float(2.0 ** np.round(np.log2(self.force) * 2 / 3) / self.length)
+
+    @classmethod
+    def of(cls, approach: float, coefficient: float) -> Units:
+        length = 2.0 ** np.round(np.log2(approach))
+        force = 8.0 ** np.round(np.log2(length / coefficient) / 2.0)
+        return cls(float(length), float(force))

@@ -1,0 +1,135 @@
+"""Cholesky as a proof: judged by exact determinants."""
+
+import numpy as np
+import pytest
+from flint import fmpq, fmpq_mat
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from convexrough.convex.definite import is_definite, proved_margin
+from convexrough.roundoff import ROUNDOFF
+
+Array = NDArray[np.float64]
+
+
+def proves_margin(couplings: Array, margin: float, entry_error: float) -> bool:
+    return proved_margin(couplings, (margin,), entry_error) == margin
+
+
+def exact(value: float) -> fmpq:
+    return fmpq(*float(value).as_integer_ratio())
+
+
+def above(couplings: Array, margin: fmpq) -> bool:
+    """Whether I + M > margin I, by the signs of all leading minors: no rounding."""
+    n = len(couplings)
+    shifted = fmpq_mat(
+        [[1 - margin if i == j else exact(couplings[i, j]) for j in range(n)] for i in range(n)]
+    )
+    minors = (
+        fmpq_mat([[shifted[i, j] for j in range(m)] for i in range(m)]).det()
+        for m in range(1, n + 1)
+    )
+    return all(minor > 0 for minor in minors)
+
+
+def couplings(seed: int, count: int, least: float) -> Array:
+    """A random M of zero diagonal for which the least eigenvalue of I + M is about `least`."""
+    rng = np.random.default_rng(seed)
+    matrix = rng.standard_normal((count, count)) * 10.0 ** rng.uniform(-3, 0, count)
+    matrix = matrix + matrix.T
+    np.fill_diagonal(matrix, 0.0)
+    return np.asarray(matrix * ((least - 1.0) / np.linalg.eigvalsh(matrix)[0]))
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.integers(2, 14),
+    st.sampled_from([1e-3, 0.1, 0.6]),
+    st.floats(-16, -1),
+    st.booleans(),
+)
+def test_what_is_proved_is_true(
+    seed: int, count: int, margin: float, digits: float, below: bool
+) -> None:
+    """However close to the margin the least eigenvalue is; and it is proved where it is not."""
+    off = -(10.0**digits) if below else 10.0**digits
+    matrix = couplings(seed, count, margin * (1.0 + off))
+    proved = proves_margin(matrix, margin, 0.0)
+    assert not proved or above(matrix, exact(margin))
+    assert proved or margin * off < 2.0 * (count + 2) * count * ROUNDOFF
+
+
+def test_a_factorisation_alone_is_no_proof() -> None:
+    """Of matrices at the margin to rounding it takes some that are below; the proof takes none."""
+    wrong = 0
+    for seed in range(60):
+        matrix = couplings(seed, 12, 0.1)
+        assert not proves_margin(matrix, 0.1, 0.0)
+        wrong += is_definite(matrix + 0.9 * np.eye(12)) and not above(matrix, 1 - exact(0.9))
+    assert wrong > 0
+
+
+@pytest.mark.parametrize("count", [2, 10, 40])
+@pytest.mark.parametrize("margin", [1e-3, 0.1, 0.6])
+def test_just_below_the_margin_is_refused(count: int, margin: float) -> None:
+    """Equal couplings of 1 - mu have the least eigenvalue mu: a little more of each is too much."""
+    ones = np.ones((count, count)) - np.eye(count)
+    near = 4.0 * (count + 2) * count * ROUNDOFF
+    assert proves_margin(ones * (1.0 - margin - near), margin, 0.0)
+    for beyond in (0.0, ROUNDOFF, near, 1e-6):
+        matrix = ones * (1.0 - margin + beyond)
+        assert beyond == 0.0 or not above(matrix, exact(margin))
+        assert not proves_margin(matrix, margin, 0.0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 12), st.floats(-12, -2), st.floats(-3, 3))
+def test_errors_of_the_entries_are_counted(
+    seed: int, count: int, digits: float, room: float
+) -> None:
+    """Moved by all that they may be, in the worst direction, entries keep the margin."""
+    error = 10.0**digits
+    matrix = couplings(seed, count, 0.1 + error * 10.0**room)
+    if not proves_margin(matrix, 0.1, error):
+        return
+    worst = np.linalg.eigh(matrix)[1][:, 0]
+    moved = matrix - 0.999 * error * np.abs(matrix) * np.sign(np.outer(worst, worst))
+    assert above(moved, exact(0.1))
+
+
+def test_errors_of_the_entries_can_refuse() -> None:
+    matrix = 0.899 * (np.ones((5, 5)) - np.eye(5))
+    assert proves_margin(matrix, 0.1, 1e-4)
+    assert not proves_margin(matrix, 0.1, 1e-3)
+    assert not proves_margin(matrix, 0.1, np.inf)
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 100])
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_proves_nothing(count: int, wrong: float) -> None:
+    """LAPACK's own word is that all is well."""
+    for place in ((0, 0), (count - 1, 0), (count - 1, count - 1)):
+        matrix = np.eye(count)
+        assert is_definite(matrix)
+        matrix[place] = matrix[place[::-1]] = wrong
+        assert not is_definite(matrix)
+    huge = 1e200 * (np.ones((3, 3)) - np.eye(3))
+    assert not proves_margin(huge, 0.1, 0.0)
+    assert not proves_margin(np.zeros((2, 2)), 0.1, np.inf)
+
+
+def test_the_first_margin_that_is_proved() -> None:
+    matrix = 0.8 * (np.ones((6, 6)) - np.eye(6))
+    assert proved_margin(matrix, (0.6, 0.3, 0.1, 0.01), 0.0) == 0.1
+    assert proved_margin(matrix, (0.6, 0.3), 0.0) == 0.0
+    assert proved_margin(matrix, (0.19, 0.1), 0.0, spare=0.02) == 0.1
+    assert not matrix.diagonal().any()
+
+
+def test_is_definite() -> None:
+    assert is_definite(np.array([[1.0, 0.99], [0.99, 1.0]]))
+    assert not is_definite(np.array([[1.0, 1.01], [1.01, 1.0]]))
+    assert not is_definite(np.array([[1.0, 0.0], [0.0, -1.0]]))
