@@ -60,7 +60,7 @@ _SIZED = _expected(f"a size from {1 / LARGEST:g} to {LARGEST:g}; choose other un
 
 Finite = Annotated[float, _expected("a finite number"), _SIZED]
 Positive = Annotated[float, _expected("a positive number", lambda value: value > 0), _SIZED]
-Spread = Annotated[
+NonNegative = Annotated[
     float, _expected("a number that is not negative", lambda value: value >= 0), _SIZED
 ]
 Ratio = Annotated[float, _expected("a number from 0 to 0.5", lambda value: 0 <= value <= 0.5)]
@@ -122,9 +122,9 @@ class Lattice(Table):
     pattern: Pattern
     spacing: Positive
     tip_radius: TipRadius
-    within: Spread | None = None
-    height_std: Spread = 0.0
-    tip_radius_cv: Spread = 0.0
+    within: NonNegative | None = None
+    height_std: NonNegative = 0.0
+    tip_radius_cv: NonNegative = 0.0
     seed: Seed | None = None
     geometry: Geometry = "summit"
 

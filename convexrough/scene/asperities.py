@@ -14,7 +14,13 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.neighbours import refuse_coincident
-from convexrough.scene.patterns import CUT, checked_seed, cut_normal, hexagonal_sites, square_sites
+from convexrough.scene.patterns import (
+    CUT_DEVIATIONS,
+    checked_seed,
+    cut_normal,
+    hexagonal_sites,
+    square_sites,
+)
 
 #: Of more asperities than this, a lattice is looked for before the nearest neighbours of all.
 MANY = 5000
@@ -136,7 +142,7 @@ class Asperities:
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
     """The largest tip radius that `hexagonal` and `square` can draw [length]."""
     width = np.sqrt(np.log1p(tip_radius_cv**2))
-    return float(np.max(tip_radius) * np.exp(CUT * width - width**2 / 2))
+    return float(np.max(tip_radius) * np.exp(CUT_DEVIATIONS * width - width**2 / 2))
 
 
 def _points(positions: ArrayLike) -> Array:

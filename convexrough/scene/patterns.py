@@ -9,7 +9,7 @@ from convexrough.errors import InputError
 
 #: Random heights and log radii are normal, cut at this many standard deviations (a chance of
 #: 2e-9 per asperity), so that "every asperity that could touch" is a finite set.
-CUT = 6.0
+CUT_DEVIATIONS = 6.0
 
 
 def hexagonal_sites(limit: float) -> tuple[Array, Indices]:
@@ -45,4 +45,4 @@ def checked_seed(seed: int | None) -> int:
 def cut_normal(count: int, seed: int, *, stream: int) -> Array:
     """Standard normal numbers; heights and radii have a stream each, so one leaves the other."""
     numbers = np.random.default_rng([seed, stream]).standard_normal(count)
-    return np.clip(numbers, -CUT, CUT)
+    return np.clip(numbers, -CUT_DEVIATIONS, CUT_DEVIATIONS)

@@ -1,6 +1,7 @@
 """The command line as its users meet it: output, files, exit status."""
 
 import csv
+import importlib
 import json
 import os
 import re
@@ -16,7 +17,6 @@ import pytest
 from scene_files import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
-from convexrough import cli
 from convexrough.run.scene_file import read_scene
 
 
@@ -59,7 +59,8 @@ def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
 
 
 def test_what_new_comments_out_is_valid_too(command: Any, tmp_path: Path) -> None:
-    text = cli.NEW_SCENE
+    command("new", "new.toml")
+    text = (tmp_path / "new.toml").read_text()
     tables = text[text.index("# [units]") :]
     active = "\n".join(line.removeprefix("# ") for line in tables.splitlines())
     rough = re.sub(r"^# (height_std|tip_radius_cv|seed|within)", r"\1", text, flags=re.M)
@@ -147,7 +148,7 @@ def test_the_folder_is_refused_before_computing(
     def never(*_: Any, **__: Any) -> None:
         raise AssertionError("computed")
 
-    monkeypatch.setattr("convexrough.contact.press", never)
+    monkeypatch.setattr("convexrough.contact.solve", never)
     outcome = command("run", "a.toml", "--out", "file")
     assert outcome.status == 2
     assert outcome.err == "convexrough: error: file: cannot hold results: File exists\n"
@@ -197,6 +198,47 @@ def test_verify_rounded_and_shuffled_loads(command: Any, tmp_path: Path, digits:
     assert normal["open"] <= 24
     assert outcome.status == (0 if normal["undecided"] == 0 else 3)
     assert ("warning" in outcome.err) == (outcome.status == 3)
+
+
+def recorded(monkeypatch: pytest.MonkeyPatch, place: str, name: str) -> list[Any]:
+    """What a function of the package is called with from now on."""
+    calls: list[Any] = []
+    work = getattr(importlib.import_module(place), name)
+
+    def noted(*arguments: Any, **options: Any) -> Any:
+        calls.append((arguments, options))
+        return work(*arguments, **options)
+
+    monkeypatch.setattr(f"{place}.{name}", noted)
+    return calls
+
+
+@pytest.mark.parametrize("influence", ["dense", "lattice", "scattered"])
+def test_verify_couples_as_the_scene_says(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, influence: str
+) -> None:
+    """And so judges the loads of a run as the run did."""
+    text = scene_text(more=f'[solver]\ninfluence = "{influence}"')
+    (tmp_path / "a.toml").write_text(text)
+    ran = command("run", "a.toml", "--json", "--no-figures")
+    kinds = recorded(monkeypatch, "convexrough.normal.problem", "couple")
+    verified = command("verify", "a.toml", "a-results/asperities.csv", "--json")
+    assert [arguments[3] for arguments, _ in kinds] == [influence]
+    proofs = [json.loads(each.out)["normal"]["certificate"] for each in (ran, verified)]
+    assert proofs[0] == proofs[1]
+
+
+@pytest.mark.parametrize("within", ["", "within = 0.0102"])
+def test_the_approach_under_a_load_is_bounded_once(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, within: str
+) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + within, "load = 3.6e-7"))
+    loads = recorded(monkeypatch, "convexrough.normal.load_control", "highest_approach")
+    more = recorded(monkeypatch, "convexrough.normal.problem", "highest_approach")
+    assert command("run", "a.toml", "--no-figures").status == 0
+    assert len(loads + more) == 1
+    assert command("verify", "a.toml", "a-results/asperities.csv").status == 0
+    assert len(loads + more) == 2
 
 
 def test_verify_finds_loads_in_the_wrong_rows(command: Any, tmp_path: Path) -> None:
@@ -478,7 +520,7 @@ def test_an_interrupt(tmp_path: Path) -> None:
     interrupt = "lambda *a, **k: os.kill(os.getpid(), signal.SIGINT)"
     # A job in the background inherits a signal that is ignored; this one must not.
     before = "import os, signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    before += f"import convexrough.contact as c; c.press = {interrupt}\n"
+    before += f"import convexrough.contact as c; c.solve = {interrupt}\n"
     ran = shell("run", "a.toml", cwd=tmp_path, before=before)
     assert ran.returncode == 128 + signal.SIGINT
     assert "Traceback" not in ran.stderr

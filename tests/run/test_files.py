@@ -10,10 +10,10 @@ from scene_files import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
 from convexrough.run import results
-from convexrough.run.report import Summary, summarise, to_json
 from convexrough.run.results import beside, claim_folder, write_results
 from convexrough.run.scene_file import UnitNames, read_scene
-from convexrough.run.stages import Outcome
+from convexrough.run.stages import Findings
+from convexrough.run.summary import Summary, summarise, to_json
 from convexrough.run.tables import ASPERITY_COLUMNS, read_loads, read_summits, read_table
 
 
@@ -394,9 +394,9 @@ def test_wrong_loads(tmp_path: Path, content: str, expected: str) -> None:
 
 
 def written(folder: Path, contact: cr.Contact, *, figures: bool = False) -> list[str]:
-    outcome = Outcome(contact)
+    found = Findings(contact)
     paths = write_results(
-        folder, outcome, summarise(outcome), figures=figures, units=UnitNames("m", "N")
+        folder, found, summarise(found), figures=figures, units=UnitNames("m", "N")
     )
     assert all(path.stat().st_size > 0 for path in paths)
     assert {path.name for path in paths} == {path.name for path in folder.iterdir()}

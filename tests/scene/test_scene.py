@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 
 import convexrough as cr
 from convexrough.scene.asperities import largest_tip_radius
-from convexrough.scene.patterns import CUT
+from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import reach
 
 
@@ -68,7 +68,7 @@ def test_random_heights_and_radii() -> None:
     assert both.tip_radii.mean() == pytest.approx(2.0, rel=1.5 / np.sqrt(n))
     assert both.tip_radii.std() / both.tip_radii.mean() == pytest.approx(0.3, rel=0.05)
     assert both.tip_radii.max() <= largest_tip_radius(2.0, 0.3)
-    assert np.abs(both.heights).max() <= CUT * 0.1
+    assert np.abs(both.heights).max() <= CUT_DEVIATIONS * 0.1
 
 
 @settings(max_examples=20, deadline=None)
