@@ -18,7 +18,6 @@ from convexrough.version import __version__
 
 if TYPE_CHECKING:
     from convexrough.run.scene_file import UnitNames
-    from convexrough.run.stages import Findings
     from convexrough.run.summary import Summary
 
 DONE, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
@@ -58,9 +57,10 @@ def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: b
     Results go to the folder SCENE-results unless --out names another.
     """
     from convexrough.contact import solve
-    from convexrough.run.results import claim_folder
+    from convexrough.run.results import claim_folder, write_results
     from convexrough.run.scene_file import read_scene
     from convexrough.run.stages import compute
+    from convexrough.run.summary import summarise
 
     file = read_scene(scene)
     folder = out or Path(f"{scene.stem}-results")
@@ -72,7 +72,10 @@ def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: b
         )
     with _blamed_on(scene), _progress("shearing") as show:
         found = compute(contact, file, announce=lambda news: show(f"shearing: {news}"))
-    return _finish(folder, found, file.units, not no_figures, as_json)
+    summary = summarise(found)
+    with _progress("writing results"):
+        files = write_results(folder, found, summary, figures=not no_figures, units=file.units)
+    return _say(summary, as_json, _written(folder, files), file.units)
 
 
 @program.command()
@@ -91,8 +94,11 @@ def verify(scene: Path, loads: Path, as_json: bool) -> int:
 
     file = read_scene(scene)
     values = read_loads(loads, file.scene)
-    with _blamed_on(loads), _progress(f"judging the loads of {len(values)} asperities"):
-        certificate = judge(file.problem(), values)
+    with _progress(f"judging the loads of {len(values)} asperities"):
+        with _blamed_on(scene):
+            problem = file.problem()
+        with _blamed_on(loads):
+            certificate = judge(problem, values)
     summary = certificate_summary(certificate, values)
     return _say(summary, as_json, units=file.units)
 
@@ -222,17 +228,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for line in str(error).splitlines():
             _say_aside("error", line)
         return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
-
-
-def _finish(folder: Path, found: Findings, units: UnitNames, figures: bool, as_json: bool) -> int:
-    """Write and say the results of a run."""
-    from convexrough.run.results import write_results
-    from convexrough.run.summary import summarise
-
-    summary = summarise(found)
-    with _progress("writing results"):
-        files = write_results(folder, found, summary, figures=figures, units=units)
-    return _say(summary, as_json, _written(folder, files), units)
 
 
 def _written(folder: Path, files: Sequence[Path]) -> list[str]:

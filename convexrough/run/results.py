@@ -154,18 +154,21 @@ def _shear_columns(rows: tuple[Sheared, ...]) -> dict[str, NDArray[Any]]:
     states = [row.state for row in rows]
     count = len(states[0].forces)
     x, y = states[0].contact.scene.asperities.positions.T
-    arrays: dict[str, list[NDArray[Any]]] = {
-        "force": [state.forces for state in states],
-        "stick_radius": [state.stick_radii for state in states],
-        "slip": [state.slips for state in states],
-        "displacement": [state.displacements for state in states],
-        "status": [state.status for state in states],
+    fields = {
+        "force": "forces",
+        "stick_radius": "stick_radii",
+        "slip": "slips",
+        "displacement": "displacements",
+        "status": "status",
     }
     return {
         "fraction": np.repeat([row.fraction for row in rows], count),
         "x": np.tile(x, len(rows)),
         "y": np.tile(y, len(rows)),
-        **{name: np.concatenate(parts) for name, parts in arrays.items()},
+        **{
+            name: np.concatenate([getattr(state, field) for state in states])
+            for name, field in fields.items()
+        },
     }
 
 

@@ -228,6 +228,16 @@ def test_verify_couples_as_the_scene_says(
     assert proofs[0] == proofs[1]
 
 
+def test_verify_blames_the_scene_for_its_influence(command: Any, tmp_path: Path) -> None:
+    more = '[solver]\ninfluence = "lattice"'
+    (tmp_path / "a.toml").write_text(scene_text(SUMMITS, more=more))
+    (tmp_path / "summits.csv").write_text("x,y\n0,0\n0.0025,0\n0.1,0.3\n0.2,0.7\n")
+    (tmp_path / "loads.csv").write_text("load\n1e-9\n0\n0\n0\n")
+    outcome = command("verify", "a.toml", "loads.csv")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.startswith("convexrough: error: a.toml: influence: found lattice")
+
+
 @pytest.mark.parametrize("within", ["", "within = 0.0102"])
 def test_the_approach_under_a_load_is_bounded_once(
     command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, within: str
@@ -395,6 +405,28 @@ def test_bad_scenes(command: Any, tmp_path: Path, scene: str, expected: str) -> 
     for line in outcome.err.splitlines():
         assert line.startswith("convexrough: error: a.toml: ")
     assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name != "a.toml"]
+
+
+KEYS = ["radius", "contact_modulus", "spacing", "tip_radius", "within", "height_std"]
+KEYS += ["tip_radius_cv", "coefficient"]
+
+
+@pytest.mark.parametrize("value", ["1e-60", "1e60"])
+@pytest.mark.parametrize("key", [*KEYS, "normal"])
+@pytest.mark.parametrize("normal", ["approach = 5e-5", "load = 3.6e-7"])
+def test_extreme_sizes(command: Any, tmp_path: Path, normal: str, key: str, value: str) -> None:
+    """An answer, or a message that says what is wrong."""
+    rough = HEXAGONAL + "height_std = 1e-6\ntip_radius_cv = 0.1\nseed = 1\n"
+    rough += "within = 0.0102\n" if key == "within" else ""
+    text = scene_text(rough, normal, SHEAR)
+    name = normal.split()[0] if key == "normal" else key
+    text, found = re.subn(rf"^{name} = .*$", f"{name} = {value}", text, flags=re.M)
+    assert found == 1
+    (tmp_path / "a.toml").write_text(text)
+    outcome = command("run", "a.toml", "--json", "--no-figures")
+    assert outcome.status in (0, 2, 3)
+    assert (outcome.out == "") == (outcome.status == 2)
+    assert outcome.status == 0 or outcome.err.startswith("convexrough: ")
 
 
 @pytest.mark.parametrize(

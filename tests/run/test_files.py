@@ -103,7 +103,7 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
         ("spacing = nan", "spacing: found nan, expected a positive number"),
         ("spacing = true", "spacing: found true, expected a positive number"),
         ('spacing = "1"', "spacing: found '1', expected a positive number"),
-        ("spacing = 1e-50", "spacing: found 1e-50, expected a size from 1e-40 to 1e+40"),
+        ("spacing = 1e-61", "spacing: found 1e-61, expected a size from 1e-60 to 1e+60"),
         ("spacing = 1\nspaceing = 1", 'spaceing: unknown key, did you mean "spacing"?'),
         ("spacing = 1\nzzz = 1", "zzz: unknown key, valid: pattern, spacing, tip_radius"),
         ("spacing = 1\ntip_radius = inf", "tip_radius: found inf, expected a positive number"),
