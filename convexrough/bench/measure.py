@@ -89,6 +89,11 @@ class Row:
     def seconds(self) -> float:
         return self.assembling + self.solving
 
+    @property
+    def known(self) -> bool:
+        """An answer, and its error."""
+        return self.outcome == "answered" and bool(np.isfinite(self.error))
+
 
 @dataclass
 class Tally:
@@ -138,14 +143,14 @@ def measure(scene: Scene, attempt: Attempt, reference: Reference | None, *, pati
     blank = Row(attempt.solver, attempt.setting, attempt.default, "answered")
     try:
         return _measure(scene, attempt, reference, patience, blank)
-    except InputError as error:
-        return replace(blank, outcome="refused", message=_reason(error, attempt))
-    except SolverError as error:
-        return replace(blank, outcome="failed", message=_reason(error, attempt))
+    except (InputError, SolverError) as error:
+        reason = str(error).removeprefix(f"{attempt.settings.name}: ")
+        return replace(blank, outcome=outcome_of(error), message=reason)
 
 
-def _reason(error: Exception, attempt: Attempt) -> str:
-    return str(error).removeprefix(f"{attempt.settings.name}: ")
+def outcome_of(error: InputError | SolverError) -> Outcome:
+    """What it is called that there is no answer."""
+    return "refused" if isinstance(error, InputError) else "failed"
 
 
 def _measure(
@@ -218,10 +223,8 @@ def measure_cost(family: str, scene: Scene, *, patience: float) -> CostRow:
     """Time and memory of `press`; then its parts, and products counted."""
     try:
         return _measure_cost(family, scene, patience)
-    except InputError as error:
-        return CostRow(family, len(scene), "refused", str(error))
-    except SolverError as error:
-        return CostRow(family, len(scene), "failed", str(error))
+    except (InputError, SolverError) as error:
+        return CostRow(family, len(scene), outcome_of(error), str(error))
 
 
 def _measure_cost(family: str, scene: Scene, patience: float) -> CostRow:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from convexrough.bench.machine import busy
 from convexrough.bench.measure import CostRow, Row
@@ -26,14 +27,8 @@ SHEAR_HEADING = ["what", "asperities", "touching", "states", "seconds", "s per s
 def describe(bench: Bench) -> list[str]:
     """Aligned lines for people."""
     lines = [f"{name:<16}{text}" for name, text in _machine_lines(bench)]
-    for panel in bench.panels:
-        lines += ["", _title(panel), *aligned(_work_table(panel), left=2)]
-        lines += _messages(panel.rows)
-    lines += ["", "cost of a press", *aligned(_cost_table(bench.cost), left=1)]
-    lines += _messages(bench.cost)
-    if bench.shear:
-        lines += ["", "cost of shear", *aligned(_shear_table(bench.shear), left=1)]
-        lines += _messages(bench.shear)
+    for title, table, left, messages in (*_panels(bench), *_costs(bench)):
+        lines += ["", title, *aligned(table, left=left), *messages]
     return [*lines, "", *verdicts(bench)]
 
 
@@ -47,16 +42,30 @@ def page_block(bench: Bench, figures: str) -> list[str]:
     lines += [f"![Time of a press against the number of asperities]({figures}/cost.png)", ""]
     lines += ["### The machine", ""]
     lines += markdown([["", ""], *([name, text] for name, text in _machine_lines(bench))], left=2)
-    lines += ["", "### Cost of a press", ""]
-    lines += markdown(_cost_table(bench.cost), left=1)
-    lines += _messages(bench.cost)
-    if bench.shear:
-        lines += ["", "### Cost of shear", "", *markdown(_shear_table(bench.shear), left=1)]
-        lines += _messages(bench.shear)
-    for panel in bench.panels:
-        lines += ["", f"### {_title(panel)}", "", *markdown(_work_table(panel), left=2)]
-        lines += _messages(panel.rows)
+    for title, table, left, messages in (*_costs(bench), *_panels(bench)):
+        heading = f"### {title[0].upper()}{title[1:]}"
+        lines += ["", heading, "", *markdown(table, left=left), *messages]
     return lines
+
+
+class Section(NamedTuple):
+    """A table with what is above and below it; so many of its columns are aligned to the left."""
+
+    title: str
+    table: list[list[str]]
+    left: int
+    messages: list[str]
+
+
+def _panels(bench: Bench) -> Iterator[Section]:
+    for panel in bench.panels:
+        yield Section(_title(panel), _work_table(panel), 2, _messages(panel.rows))
+
+
+def _costs(bench: Bench) -> Iterator[Section]:
+    yield Section("cost of a press", _cost_table(bench.cost), 1, _messages(bench.cost))
+    if bench.shear:
+        yield Section("cost of shear", _shear_table(bench.shear), 1, _messages(bench.shear))
 
 
 def renewed_page(page: Path, bench: Bench, figures: str) -> str:

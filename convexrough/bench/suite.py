@@ -20,6 +20,7 @@ from convexrough.bench.measure import (
     Row,
     measure,
     measure_cost,
+    outcome_of,
     timed,
 )
 from convexrough.bench.plan import Plan, attempts
@@ -100,10 +101,14 @@ class Bench:
     shear: tuple[ShearRow, ...]
     seconds: float
 
-    def exponent(self, family: Family) -> float:
-        """Of the time of a press against the number of asperities, of `FITTED_FROM` and more."""
+    def fitted(self, family: Family) -> list[CostRow]:
+        """The presses of `FITTED_FROM` asperities and more."""
         rows = [row for row in self.cost if row.family == family and row.outcome == "answered"]
-        rows = [row for row in rows if row.asperities >= FITTED_FROM]
+        return [row for row in rows if row.asperities >= FITTED_FROM]
+
+    def exponent(self, family: Family) -> float:
+        """Of the time of these presses against the number of asperities."""
+        rows = self.fitted(family)
         return exponent([row.asperities for row in rows], [row.seconds for row in rows])
 
 
@@ -241,10 +246,8 @@ def _shear_row(
     memory = MemoryRise()
     try:
         _, seconds = timed(lambda: _sheared(contact, states))
-    except InputError as error:
-        return replace(blank, outcome="refused", message=str(error))
-    except SolverError as error:
-        return replace(blank, outcome="failed", message=str(error))
+    except (InputError, SolverError) as error:
+        return replace(blank, outcome=outcome_of(error), message=str(error))
     return replace(blank, seconds=seconds, memory=memory.risen())
 
 

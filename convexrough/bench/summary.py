@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from convexrough.bench.frontier import NOISE
-from convexrough.bench.measure import CostRow, Row
+from convexrough.bench.measure import Row
 from convexrough.bench.scenes import APPROACH, WORDS, Family
 from convexrough.bench.suite import FITTED_FROM, Bench, Panel
 from convexrough.run.summary import Summary
@@ -67,7 +67,7 @@ def verdicts(bench: Bench) -> list[str]:
     lines.insert(0, f"The default solver is on the work-precision frontier in {where} scenes.")
     for family in _families(bench):
         if math.isfinite(b := bench.exponent(family)):
-            sizes = [row.asperities for row in bench.cost if _fitted(row, family)]
+            sizes = [row.asperities for row in bench.fitted(family)]
             lines.append(
                 f"The time of a press grows as n^{b:.2f} from {min(sizes):,} to {max(sizes):,} "
                 f"asperities ({family})."
@@ -132,7 +132,3 @@ def _last_word(setting: str) -> str:
 def _families(bench: Bench) -> list[Family]:
     present = {row.family for row in bench.cost}
     return [family for family in WORDS if family in present]
-
-
-def _fitted(row: CostRow, family: Family) -> bool:
-    return row.family == family and row.outcome == "answered" and row.asperities >= FITTED_FROM

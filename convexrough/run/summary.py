@@ -72,14 +72,13 @@ def summarise(found: Findings) -> Summary:
 
 def certificate_summary(certificate: Certificate, loads: Array) -> Summary:
     """The summary of judged loads, (n,) [force], in the scene's units."""
-    return _headed(_judged(certificate, loads))
+    return _headed(normal=_judged(certificate, loads))
 
 
 def comparison_summary(comparison: Comparison) -> Summary:
     """The summary of a comparison, in the scene's units."""
     rows = [_entry_summary(entry) for entry in comparison.entries]
-    found = {"compare": rows, "contradictions": list(comparison.contradictions)}
-    return {"schema": 1, "version": __version__} | found
+    return _headed(compare=rows, contradictions=list(comparison.contradictions))
 
 
 def proved(summary: Summary) -> bool:
@@ -104,11 +103,11 @@ def _contact_summary(contact: Contact) -> Summary:
         "model_error": contact.model_error,
         "crowding": contact.crowding,
     }
-    return _headed(normal)
+    return _headed(normal=normal)
 
 
-def _headed(normal: Summary) -> Summary:
-    return {"schema": 1, "version": __version__, "normal": normal}
+def _headed(**contents: Any) -> Summary:
+    return {"schema": 1, "version": __version__} | contents
 
 
 def _judged(certificate: Certificate, loads: Array) -> Summary:
