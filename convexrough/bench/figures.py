@@ -101,12 +101,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
         x, y = np.append(x, 10.0), np.append(y, y[-1])
         axes.step(x, y, "-", where="post", color=FAINT, lw=2.5, zorder=0, label="frontier")
     if len({row.solver for row in panel.rows if row.known}) == 1:
-        place: dict[str, Any] = {
-            "transform": axes.transAxes,
-            "ha": "right",
-            "va": "top",
-            "color": "0.4",
-        }
+        place: dict[str, Any] = dict(transform=axes.transAxes, ha="right", va="top", color="0.4")
         axes.text(0.96, 0.95, "others: too slow,\ntoo large, or refused", fontsize=TICK, **place)
     axes.set_title(f"{panel.asperities:,} ({panel.family})", fontsize=TICK, loc="left")
     axes.set_xlim(1e-17, 1.0)

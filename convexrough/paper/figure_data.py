@@ -21,22 +21,20 @@ Columns = dict[str, NDArray[Any]]
 
 def figure_data(contact: cr.Contact) -> dict[str, Columns]:
     """The numbers behind the paper's Figs. 3 to 9, name -> columns; forces as fractions of f P."""
-    limit = 0.5 * contact.load
-    named = lettered(contact)
-    smooth = cr.smooth(contact.scene, load=contact.load)
+    return _at_half(contact) | _loading(contact)
+
+
+def _at_half(contact: cr.Contact) -> dict[str, Columns]:
+    """Figs. 3 to 6: the pressure, and the state at half of gross sliding."""
+    limit, smooth = 0.5 * contact.load, cr.smooth(contact.scene, load=contact.load)
     half = cr.shear(contact, force=0.5 * limit)
     x = np.linspace(-1.3, 1.3, 2001) * smooth.contact_radius
     line = np.column_stack((x, np.zeros_like(x)))
     close = np.linspace(0.0, 1.2, 241) * contact.contact_radii[0]
     radial = np.column_stack((close, np.zeros_like(close)))
-    path = cr.history(contact, forces=FRACTIONS * limit)
-    loop = cr.cycle(contact, maximum=0.5 * limit).loop(200)
-    branch = smooth.branch(loop.forces[: len(loop.forces) // 2 + 1], 0.5 * limit)
-    smooth_loop: Array = np.concatenate((branch, -branch[1:]))
-    cycles = cr.cycles(contact, AMPLITUDES * limit)
     x_i, y_i = contact.scene.asperities.positions.T
     letters = np.full(len(x_i), "", dtype="<U1")
-    for name, ring in named.items():
+    for name, ring in lettered(contact).items():
         letters[ring] = name
     return {
         "fig3_pressure": {
@@ -70,6 +68,19 @@ def figure_data(contact: cr.Contact) -> dict[str, Columns]:
             "traction": fields.traction(half, line),
             "smooth_traction": smooth.traction(np.abs(x), half.force),
         },
+    }
+
+
+def _loading(contact: cr.Contact) -> dict[str, Columns]:
+    """Figs. 7 to 9: first loading, the loop at half of gross sliding, and energies."""
+    limit, named = 0.5 * contact.load, lettered(contact)
+    smooth = cr.smooth(contact.scene, load=contact.load)
+    path = cr.history(contact, forces=FRACTIONS * limit)
+    loop = cr.cycle(contact, maximum=0.5 * limit).loop(200)
+    branch = smooth.branch(loop.forces[: len(loop.forces) // 2 + 1], 0.5 * limit)
+    smooth_loop: Array = np.concatenate((branch, -branch[1:]))
+    cycles = cr.cycles(contact, AMPLITUDES * limit)
+    return {
         "fig7_asperities": {
             "fraction": FRACTIONS,
             "displacement": path.displacements,

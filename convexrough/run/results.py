@@ -105,17 +105,14 @@ def write_figures(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
 def _draw(found: Findings, units: UnitNames) -> dict[str, Figure]:
     from convexrough import plots  # matplotlib: only when it draws
 
-    length, force = units
-    figures = plots.press_figures(found.contact, length_unit=length, force_unit=force)
+    names: dict[str, Any] = dict(length_unit=units.length, force_unit=units.force)
+    figures = plots.press_figures(found.contact, **names)
     if found.shear:
-        states = [row.state for row in found.shear]
-        figures |= plots.shear_figures(states, length_unit=length, force_unit=force)
+        figures |= plots.shear_figures([row.state for row in found.shear], **names)
     if found.cycles:
-        cycles = [row.cycle for row in found.cycles]
-        figures |= plots.cycle_figures(cycles, length_unit=length, force_unit=force)
+        figures |= plots.cycle_figures([row.cycle for row in found.cycles], **names)
     if found.history is not None:
-        history = found.history.history
-        figures |= plots.history_figures(history, length_unit=length, force_unit=force)
+        figures |= plots.history_figures(found.history.history, **names)
     return figures
 
 
