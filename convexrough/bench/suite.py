@@ -153,13 +153,7 @@ def _load_code(say: Announce) -> None:
             press(small, approach=APPROACH, solver=solver)
 
 
-def _panel(
-    plan: Plan,
-    family: Family,
-    size: int,
-    spent: Spent,
-    say: Announce,
-) -> Panel:
+def _panel(plan: Plan, family: Family, size: int, spent: Spent, say: Announce) -> Panel:
     """Every attempt at one scene; `spent` knows what the smaller ones took, and is added to."""
     each = scene(family, REFINEMENTS[size])
     n = len(each)

@@ -86,11 +86,7 @@ def paper_figures(
 
 
 def _rings_figure(
-    state: ShearState,
-    named: dict[str, Indices],
-    onsets: Array,
-    scale: Scale,
-    friction: ShearScale,
+    state: ShearState, named: dict[str, Indices], onsets: Array, scale: Scale, friction: ShearScale
 ) -> Figure:
     contact = state.contact
     figure = Figure(figsize=(DOUBLE, 3.4), layout="constrained")
