@@ -1,4 +1,4 @@
-"""What a prescribed total load implies before the problem is solved: shifts, and the approach."""
+"""What a total load implies before the problem is solved: shifts, the approach, the reach."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def all_that_could_touch(
     farthest: Callable[[float], float],
     load: float,
 ) -> tuple[Scene, float]:
-    """The scene as far as any asperity could touch under a load, and its `highest_approach`.
+    """The scene as far as any asperity could touch under a load, and a bound on the approach there.
 
     scene_within : the scene as far as a distance from the axis [length]; further out it only has
         more asperities
