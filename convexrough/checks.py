@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,26 +14,25 @@ from convexrough.errors import InputError
 #: Sizes of numbers, in a scene's own units, whose products and powers float64 can hold.
 SMALLEST, LARGEST = 1e-60, 1e60
 
+#: What is expected of other numbers.
+SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
+
 
 def finite(what: str, value: float) -> float:
-    number = _number(what, value, "a finite number")
-    if not math.isfinite(number):
-        raise InputError(what, found=number, expected="a finite number")
-    return _of_size(what, number)
+    return _checked(what, value, "a finite number", lambda number: True)
 
 
 def positive(what: str, value: float) -> float:
-    number = _number(what, value, "a positive number")
-    if not (math.isfinite(number) and number > 0):
-        raise InputError(what, found=number, expected="a positive number")
-    return _of_size(what, number)
+    return _checked(what, value, "a positive number", lambda number: number > 0)
 
 
 def non_negative(what: str, value: float) -> float:
-    number = _number(what, value, "a number that is not negative")
-    if not (math.isfinite(number) and number >= 0):
-        raise InputError(what, found=number, expected="a number that is not negative")
-    return _of_size(what, number)
+    return _checked(what, value, "a number that is not negative", lambda number: number >= 0)
+
+
+def is_sized(number: float) -> bool:
+    """0, or of a size whose products and powers float64 can hold."""
+    return number == 0 or SMALLEST <= abs(number) <= LARGEST
 
 
 def between(what: str, value: float, low: float, high: float) -> float:
@@ -138,10 +137,12 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     return f"valid: {', '.join(names.values())}"
 
 
-def _of_size(what: str, number: float) -> float:
-    if number != 0 and not SMALLEST <= abs(number) <= LARGEST:
-        expected = f"0 or a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
+def _checked(what: str, value: float, expected: str, holds: Callable[[float], bool]) -> float:
+    number = _number(what, value, expected)
+    if not (math.isfinite(number) and holds(number)):
         raise InputError(what, found=number, expected=expected)
+    if not is_sized(number):
+        raise InputError(what, found=number, expected=SIZED)
     return number
 
 

@@ -1,4 +1,7 @@
-"""The command line. Nothing is computed here; every command imports what it needs when it runs."""
+"""The command line: what each command reads, calls, writes and says, and its exit status.
+
+What is slow to import is imported by the command that needs it, when it runs.
+"""
 
 from __future__ import annotations
 
@@ -14,60 +17,10 @@ from convexrough.errors import ConvexroughError, FileError, InputError, SolverEr
 from convexrough.version import __version__
 
 if TYPE_CHECKING:
-    from convexrough.run.report import Summary
     from convexrough.run.scene_file import UnitNames
-    from convexrough.run.stages import Outcome
+    from convexrough.run.summary import Summary
 
 DONE, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
-
-NEW_SCENE = """\
-# A rough sphere pressed on a half-space. Any consistent units; convexrough run THIS-FILE
-
-[sphere]
-radius = 1.0
-
-[material]
-contact_modulus = 1.0        # E* = E / (2 (1 - nu^2)); or youngs_modulus = ... (one of the two)
-poisson_ratio = 0.3
-
-[asperities]
-pattern = "hexagonal"        # "hexagonal", "square", or "file"
-spacing = 0.0025
-tip_radius = 0.02            # a number; or a list as long as the asperities
-# within = 0.0102            # keep asperities this near to the axis; default: all that could touch
-# height_std = 1e-6          # random heights (normal distribution) ...
-# tip_radius_cv = 0.1        # ... and tip radii (lognormal, this coefficient of variation)
-# seed = 7                   # required when either is given
-geometry = "summit"          # or "closest": touch where the undeformed surfaces are closest
-
-# Asperities from a file instead, with columns x, y and optionally height, tip_radius:
-# pattern = "file"
-# path = "summits.csv"       # relative to this file
-
-[normal]
-approach = 5e-5              # or load = ... (one of the two)
-
-# [units]                    # names for printed results and figures; nothing is converted
-# length = "m"
-# force = "N"
-
-[friction]                   # the three tables below need it; leave out what you do not want
-coefficient = 0.5
-
-[shear]                      # monotonic shear
-fractions = [0.1, 0.37, 0.5]             # of f P
-
-[cycle]                      # steady cycles
-maximum = [0.1, 0.37, 0.5]               # of f P
-# minimum = [0.0, 0.1, 0.2]              # default: the negative of maximum
-
-[history]                    # any sequence of shear forces, from 0
-fractions = [0.6, -0.2, 0.3, -0.6, 0.6]  # of f P
-
-# [solver]
-# name = "newton"            # or "conic", "conic_cvxpy", "bristles"
-# influence = "lattice"      # or "dense", "scattered"; default: the cheapest that is exact
-"""
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 _PATH = click.Path(path_type=Path)
@@ -103,33 +56,26 @@ def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: b
 
     Results go to the folder SCENE-results unless --out names another.
     """
-    from convexrough.contact import press
-    from convexrough.run.results import claim_folder
+    from convexrough.contact import solve
+    from convexrough.run.results import claim_folder, write_results
     from convexrough.run.scene_file import read_scene
     from convexrough.run.stages import compute
+    from convexrough.run.summary import summarise
 
     file = read_scene(scene)
     folder = out or Path(f"{scene.stem}-results")
     claim_folder(folder, force=force)
     pressing = f"pressing {len(file.scene):,} asperities"
     with _blamed_on(scene), _progress(pressing) as show:
-        contact = press(
-            file.scene,
-            approach=file.approach,
-            load=file.load,
-            solver=file.solver,
-            influence=file.influence,
-            announce=lambda news: show(f"{pressing}: {news}"),
+        contact = solve(
+            file.problem(), file.solver, announce=lambda news: show(f"{pressing}: {news}")
         )
     with _blamed_on(scene), _progress("shearing") as show:
-        outcome = compute(
-            contact,
-            shear_at=file.shear,
-            cycle_between=file.cycle,
-            history_of=file.history,
-            announce=lambda news: show(f"shearing: {news}"),
-        )
-    return _finish(folder, outcome, file.units, not no_figures, as_json)
+        found = compute(contact, file, announce=lambda news: show(f"shearing: {news}"))
+    summary = summarise(found)
+    with _progress("writing results"):
+        files = write_results(folder, found, summary, figures=not no_figures, units=file.units)
+    return _say(summary, as_json, _written(folder, files), file.units)
 
 
 @program.command()
@@ -141,15 +87,18 @@ def verify(scene: Path, loads: Path, as_json: bool) -> int:
 
     LOADS is a CSV file with a column load, and x and y unless in the scene's order.
     """
-    from convexrough.normal.certificate import certify
-    from convexrough.run.report import certificate_summary
+    from convexrough.normal.certificate import judge
     from convexrough.run.scene_file import read_scene
+    from convexrough.run.summary import certificate_summary
     from convexrough.run.tables import read_loads
 
     file = read_scene(scene)
     values = read_loads(loads, file.scene)
-    with _blamed_on(loads), _progress(f"judging the loads of {len(values)} asperities"):
-        certificate = certify(file.scene, values, approach=file.approach, load=file.load)
+    with _progress(f"judging the loads of {len(values)} asperities"):
+        with _blamed_on(scene):
+            problem = file.problem()
+        with _blamed_on(loads):
+            certificate = judge(problem, values)
     summary = certificate_summary(certificate, values)
     return _say(summary, as_json, units=file.units)
 
@@ -166,13 +115,9 @@ def compare(scene: Path, as_json: bool) -> int:
     other: that would be a mistake in the mathematics.
     """
     from convexrough.compare import compare as compare_solvers
-    from convexrough.run.report import (
-        comparison_summary,
-        comparison_warnings,
-        describe_comparison,
-        to_json,
-    )
+    from convexrough.run.report import comparison_warnings, describe_comparison
     from convexrough.run.scene_file import read_scene
+    from convexrough.run.summary import comparison_summary, to_json
 
     file = read_scene(scene)
     with _blamed_on(scene), _progress(f"pressing on {len(file.scene)} asperities") as show:
@@ -202,9 +147,12 @@ def compare(scene: Path, as_json: bool) -> int:
 @click.argument("scene", type=_PATH)
 def new(scene: Path) -> int:
     """Write a commented scene to start from."""
+    from importlib.resources import files
+
+    template = files("convexrough.run").joinpath("new_scene.toml").read_text(encoding="utf-8")
     try:
         with scene.open("x", encoding="utf-8") as file:
-            file.write(NEW_SCENE)
+            file.write(template)
     except OSError as error:
         raise FileError(f"{scene}: cannot be written: {error.strerror or error}") from error
     click.echo(f"written  {scene}")
@@ -216,20 +164,22 @@ def new(scene: Path) -> int:
 def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int:
     """Reproduce the source paper's example (Dini and Hills 2009)."""
     from convexrough.paper import example
-    from convexrough.run import report, results
+    from convexrough.paper.figure_data import figure_data
+    from convexrough.run import results
+    from convexrough.run.summary import summarise
 
     folder = out or Path("paper-results")
     results.claim_folder(folder, force=force)
     with _progress("reproducing the paper"):
-        outcome = example.outcome()
-        comparison = example.compare(outcome)
-        summary = report.summarise(outcome) | {"paper": comparison}
-        files = results.write_tables(folder, example.figure_data(outcome.contact))
+        found = example.findings()
+        comparison = example.compare(found)
+        summary = summarise(found) | {"paper": comparison}
+        files = results.write_tables(folder, figure_data(found.contact))
         if not no_figures:
             from convexrough.paper.figures import paper_figures
 
-            files += results.write_figures(folder, paper_figures(outcome.contact))
-        files += results.write_results(folder, outcome, summary, figures=False)
+            files += results.write_figures(folder, paper_figures(found.contact))
+        files += results.write_results(folder, found, summary, figures=False)
     lines = ["", *example.table(comparison), *_written(folder, files)]
     return _say(summary, as_json, lines)
 
@@ -246,19 +196,23 @@ def bench(
     Results go to the folder bench-results unless --out names another. With --page, the tables also
     go between the markers of that page, and the figures into the folder figures beside it.
     """
-    from convexrough import bench as benching
-    from convexrough.run.report import to_json
+    from convexrough.bench import suite
+    from convexrough.bench.files import write_bench
+    from convexrough.bench.page import describe, split_page
+    from convexrough.bench.plan import full_plan, quick_plan
+    from convexrough.bench.summary import summarise
     from convexrough.run.results import claim_folder
+    from convexrough.run.summary import to_json
 
     if page is not None:
-        benching.split_page(page)  # a page without markers is refused before anything is computed
+        split_page(page)  # a page without markers is refused before anything is computed
     folder = out or Path("bench-results")
     claim_folder(folder, force=force)
-    plan = benching.quick_plan() if quick else benching.full_plan()
+    plan = quick_plan() if quick else full_plan()
     with _progress("measuring") as show:
-        found = benching.run(plan, announce=show)
-        files = benching.write_bench(folder, found, figures=not no_figures, page=page)
-    lines = [to_json(benching.summarise(found))] if as_json else benching.describe(found)
+        found = suite.run(plan, announce=show)
+        files = write_bench(folder, found, figures=not no_figures, page=page)
+    lines = [to_json(summarise(found))] if as_json else describe(found)
     click.echo("\n".join(lines if as_json else [*lines, *_written(folder, files)]))
     return DONE
 
@@ -278,17 +232,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
 
 
-def _finish(folder: Path, outcome: Outcome, units: UnitNames, figures: bool, as_json: bool) -> int:
-    """Write and say the results of a run."""
-    from convexrough.run.report import summarise
-    from convexrough.run.results import write_results
-
-    summary = summarise(outcome)
-    with _progress("writing results"):
-        files = write_results(folder, outcome, summary, figures=figures, units=units)
-    return _say(summary, as_json, _written(folder, files), units)
-
-
 def _written(folder: Path, files: Sequence[Path]) -> list[str]:
     return ["", f"written to {folder}: {', '.join(path.name for path in files)}"]
 
@@ -297,7 +240,8 @@ def _say(
     summary: Summary, as_json: bool, lines: Sequence[str] = (), units: UnitNames | None = None
 ) -> int:
     """Print the summary, then `lines`, and return the exit status that it deserves."""
-    from convexrough.run.report import describe, proved, to_json, warnings
+    from convexrough.run.report import describe, warnings
+    from convexrough.run.summary import proved, to_json
 
     if as_json:
         click.echo(to_json(summary))

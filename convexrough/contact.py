@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +34,7 @@ class Contact(Keeper):
         over the loaded asperities
     crowding      : largest (a_i + a_j) / r_ij; above 1 contact discs overlap and the model fails
     influence     : how the candidates were coupled: "dense", "lattice" or "scattered"
+    seconds       : [s] that `press` took, or `solve`
     """
 
     scene: Scene
@@ -83,8 +84,21 @@ def press(
     answer without a certificate is returned: look at `contact.certificate.scope`.
     """
     began = time.perf_counter()
-    solver = Newton() if solver is None else solver
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
+    contact = solve(problem, solver, start, announce)
+    return replace(contact, seconds=time.perf_counter() - began)
+
+
+def solve(
+    problem: NormalProblem,
+    solver: Solver | None = None,
+    start: ArrayLike | None = None,
+    announce: Announce | None = None,
+) -> Contact:
+    """`press` for a problem already assembled; its arguments are as there."""
+    began = time.perf_counter()
+    solver = Newton() if solver is None else solver
+    scene = problem.scene
     force, length = problem.units.force, problem.units.length
     first = None
     if start is not None:

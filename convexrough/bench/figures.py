@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from convexrough.bench.measure import CostRow, Row
+from convexrough.bench.measure import Row
 from convexrough.bench.suite import Bench, Panel
 from convexrough.bench.summary import condensed
 from convexrough.plots.style import DOUBLE, FAINT, LABEL, ROUGH, SINGLE, TICK, UNSURE, label
@@ -88,7 +88,7 @@ def work_figure(panels: Sequence[Panel]) -> Figure:
 def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.set(xscale="log", yscale="log")
     for name, look in LOOKS.items():
-        points = [row for row in condensed(panel.rows) if row.solver == name and _shown(row)]
+        points = [row for row in condensed(panel.rows) if row.solver == name and row.known]
         points.sort(key=lambda row: row.error)
         if points:
             style: dict[str, Any] = {"ms": 4.5, "mew": 0.9, "lw": 0.8, "ls": "none"} | look
@@ -100,13 +100,8 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
         # Up from the most accurate point, down to the left of the fastest.
         x, y = np.append(x, 10.0), np.append(y, y[-1])
         axes.step(x, y, "-", where="post", color=FAINT, lw=2.5, zorder=0, label="frontier")
-    if len({row.solver for row in panel.rows if _shown(row)}) == 1:
-        place: dict[str, Any] = {
-            "transform": axes.transAxes,
-            "ha": "right",
-            "va": "top",
-            "color": "0.4",
-        }
+    if len({row.solver for row in panel.rows if row.known}) == 1:
+        place: dict[str, Any] = dict(transform=axes.transAxes, ha="right", va="top", color="0.4")
         axes.text(0.96, 0.95, "others: too slow,\ntoo large, or refused", fontsize=TICK, **place)
     axes.set_title(f"{panel.asperities:,} ({panel.family})", fontsize=TICK, loc="left")
     axes.set_xlim(1e-17, 1.0)
@@ -125,10 +120,6 @@ def _coordinates(rows: Sequence[Row]) -> tuple[Any, Any]:
     return error, np.array([row.seconds for row in rows])
 
 
-def _shown(row: Row) -> bool:
-    return row.outcome == "answered" and bool(np.isfinite(row.error))
-
-
 def cost_figure(bench: Bench) -> Figure:
     """Log-log, with the fitted exponent, and slope 1 to compare."""
     figure = Figure(figsize=(SINGLE, 2.9), layout="constrained")
@@ -139,7 +130,7 @@ def cost_figure(bench: Bench) -> Figure:
         rows = [row for row in answered if row.family == family]
         if not rows:
             continue
-        x, y = np.array([row.asperities for row in rows]), _press_times(rows)
+        x, y = np.array([(row.asperities, row.seconds) for row in rows]).T
         name = family
         if np.isfinite(b := bench.exponent(family)):  # type: ignore[arg-type]
             name = f"{family}: $n^{{{b:.2f}}}$"
@@ -166,7 +157,3 @@ def cost_figure(bench: Bench) -> Figure:
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_minor_formatter(NullFormatter())
     return figure
-
-
-def _press_times(rows: Sequence[CostRow]) -> Any:
-    return np.array([row.seconds for row in rows])

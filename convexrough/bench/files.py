@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from convexrough.bench.page import renewed_page
 from convexrough.bench.suite import Bench
-from convexrough.bench.summary import renewed_page, summarise, tables
+from convexrough.bench.summary import summarise, tables
 from convexrough.errors import FileError
-from convexrough.run.report import to_json
 from convexrough.run.results import beside, write_figures, write_tables
+from convexrough.run.summary import to_json
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

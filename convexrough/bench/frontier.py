@@ -18,7 +18,7 @@ def mark_frontier(rows: Sequence[Row]) -> tuple[Row, ...]:
 
     Points that are no answer, or without a known error, are never on it.
     """
-    points = [row for row in rows if _known(row)]
+    points = [row for row in rows if row.known]
 
     def dominated(row: Row) -> bool:
         return any(
@@ -28,7 +28,7 @@ def mark_frontier(rows: Sequence[Row]) -> tuple[Row, ...]:
             for other in points
         )
 
-    return tuple(replace(row, frontier=_known(row) and not dominated(row)) for row in rows)
+    return tuple(replace(row, frontier=row.known and not dominated(row)) for row in rows)
 
 
 def better_than_default(rows: Sequence[Row]) -> tuple[Row, ...]:
@@ -36,7 +36,7 @@ def better_than_default(rows: Sequence[Row]) -> tuple[Row, ...]:
 
     Where the default has no answer: every point.
     """
-    points = [row for row in rows if _known(row)]
+    points = [row for row in rows if row.known]
     default = next((row for row in points if row.default), None)
     if default is None:
         return tuple(points)
@@ -50,7 +50,3 @@ def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
         return np.nan
     slope, _ = np.polyfit(np.log(sizes), np.log(costs), 1)
     return float(slope)
-
-
-def _known(row: Row) -> bool:
-    return row.outcome == "answered" and bool(np.isfinite(row.error))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.bench.reference import Reference
 from convexrough.bench.scenes import APPROACH
 from convexrough.contact import press
@@ -90,6 +89,11 @@ class Row:
     def seconds(self) -> float:
         return self.assembling + self.solving
 
+    @property
+    def known(self) -> bool:
+        """An answer, and its error."""
+        return self.outcome == "answered" and bool(np.isfinite(self.error))
+
 
 @dataclass
 class Tally:
@@ -99,28 +103,36 @@ class Tally:
     single: int = 0
 
 
-def counted(influence: Influence, tally: Tally) -> Influence:
-    """The same operator, of the same class, which counts its applications."""
-    base: Any = type(influence)
+class Counted:
+    """An influence that counts its applications; everything else is the influence's own."""
 
-    def apply(self: Any, loads: Array) -> Array:
+    def __init__(self, influence: Influence, tally: Tally) -> None:
+        self._influence, self._tally = influence, tally
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._influence, name)
+
+    @property  # type: ignore[misc]
+    def __class__(self) -> Any:  # some ask by class whether it is a matrix
+        return type(self._influence)
+
+    def __len__(self) -> int:
+        return len(self._influence)
+
+    def apply(self, loads: Array) -> Array:
         if loads.dtype == np.float32:
-            tally.single += 1
+            self._tally.single += 1
         else:
-            tally.double += 1
-        product: Array = base.apply(self, loads)
-        return product
+            self._tally.double += 1
+        return self._influence.apply(loads)
 
-    def among(self: Any, which: Any) -> Influence:
-        plain = copy.copy(self)
-        object.__setattr__(plain, "__class__", base)  # a part is made by the class of the whole
-        return counted(plain.among(which), tally)
+    def among(self, which: Indices) -> Influence:
+        return counted(self._influence.among(which), self._tally)
 
-    twin: Any = copy.copy(influence)
-    kind = type(base.__name__, (base,), {"apply": apply, "among": among})
-    object.__setattr__(twin, "__class__", kind)  # frozen dataclasses
-    result: Influence = twin
-    return result
+
+def counted(influence: Influence, tally: Tally) -> Influence:
+    """The same operator, which counts its applications."""
+    return cast("Influence", Counted(influence, tally))
 
 
 def measure(scene: Scene, attempt: Attempt, reference: Reference | None, *, patience: float) -> Row:
@@ -131,14 +143,14 @@ def measure(scene: Scene, attempt: Attempt, reference: Reference | None, *, pati
     blank = Row(attempt.solver, attempt.setting, attempt.default, "answered")
     try:
         return _measure(scene, attempt, reference, patience, blank)
-    except InputError as error:
-        return replace(blank, outcome="refused", message=_reason(error, attempt))
-    except SolverError as error:
-        return replace(blank, outcome="failed", message=_reason(error, attempt))
+    except (InputError, SolverError) as error:
+        reason = str(error).removeprefix(f"{attempt.settings.name}: ")
+        return replace(blank, outcome=outcome_of(error), message=reason)
 
 
-def _reason(error: Exception, attempt: Attempt) -> str:
-    return str(error).removeprefix(f"{attempt.settings.name}: ")
+def outcome_of(error: InputError | SolverError) -> Outcome:
+    """What it is called that there is no answer."""
+    return "refused" if isinstance(error, InputError) else "failed"
 
 
 def _measure(
@@ -146,9 +158,6 @@ def _measure(
 ) -> Row:
     tally, memory = Tally(), MemoryRise()
     problem = NormalProblem.assemble(scene, approach=APPROACH, influence=attempt.influence)
-    if attempt.influence not in (None, (used := problem.influence.name)):
-        message = f"no {attempt.influence} coupling in this version; it would take the {used} one"
-        return replace(blank, outcome="left out", message=message)
     solution = attempt.settings.solve(replace(problem, influence=counted(problem.influence, tally)))
     certificate = judge(problem, problem.to_scene(solution.loads * problem.units.force))
     risen = memory.risen()
@@ -214,10 +223,8 @@ def measure_cost(family: str, scene: Scene, *, patience: float) -> CostRow:
     """Time and memory of `press`; then its parts, and products counted."""
     try:
         return _measure_cost(family, scene, patience)
-    except InputError as error:
-        return CostRow(family, len(scene), "refused", str(error))
-    except SolverError as error:
-        return CostRow(family, len(scene), "failed", str(error))
+    except (InputError, SolverError) as error:
+        return CostRow(family, len(scene), outcome_of(error), str(error))
 
 
 def _measure_cost(family: str, scene: Scene, patience: float) -> CostRow:

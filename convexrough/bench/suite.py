@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from convexrough import checks
 from convexrough.bench.frontier import better_than_default, exponent, mark_frontier
 from convexrough.bench.machine import describe_machine
 from convexrough.bench.measure import (
@@ -19,6 +20,7 @@ from convexrough.bench.measure import (
     Row,
     measure,
     measure_cost,
+    outcome_of,
     timed,
 )
 from convexrough.bench.plan import Plan, attempts
@@ -28,6 +30,7 @@ from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
 from convexrough.memory import MemoryRise
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import Announce
 from convexrough.scene.scene import Scene
 from convexrough.shearing.cycle import cycles
 from convexrough.shearing.state import shear
@@ -40,8 +43,6 @@ FITTED_FROM = 10_000
 ROUNDS = 4
 
 PARTS = ("assembling", "solving", "certifying")
-
-Announce = Callable[[str], object]
 
 #: What a solver, set so, took last: the number of asperities, and seconds.
 Spent = dict[tuple[str, str], tuple[int, float]]
@@ -100,36 +101,38 @@ class Bench:
     shear: tuple[ShearRow, ...]
     seconds: float
 
-    def exponent(self, family: Family) -> float:
-        """Of the time of a press against the number of asperities, of `FITTED_FROM` and more."""
+    def fitted(self, family: Family) -> list[CostRow]:
+        """The presses of `FITTED_FROM` asperities and more."""
         rows = [row for row in self.cost if row.family == family and row.outcome == "answered"]
-        rows = [row for row in rows if row.asperities >= FITTED_FROM]
+        return [row for row in rows if row.asperities >= FITTED_FROM]
+
+    def exponent(self, family: Family) -> float:
+        """Of the time of these presses against the number of asperities."""
+        rows = self.fitted(family)
         return exponent([row.asperities for row in rows], [row.seconds for row in rows])
 
 
-def run(plan: Plan, announce: Announce = lambda line: None) -> Bench:
-    """Measure all of it. `announce` is told what is going on."""
+def run(plan: Plan, announce: Announce | None = None) -> Bench:
+    """Measure all of it.
+
+    announce : told in a line what is going on
+    """
     began = time.perf_counter()
     machine = describe_machine()
-    meshes = _has_meshes()
-    _load_code(announce)
+    say = announce or (lambda line: None)
+    _load_code(say)
     panels: list[Panel] = []
     spent: Spent = {}
     for family, size in plan.work:
-        panels.append(_panel(plan, family, size, spent, announce))
+        panels.append(_panel(plan, family, size, spent, say))
     cost = []
     for family, size in plan.cost:
-        announce(f"cost: {family}, about {size:,}")
-        each = scene(family, REFINEMENTS[size])
-        if family == "scattered" and not meshes:
-            message = "no coupling for so many scattered points in this version"
-            cost.append(CostRow(family, len(each), "left out", message))
-        else:
-            cost.append(measure_cost(family, each, patience=plan.patience))
+        say(f"cost: {family}, about {size:,}")
+        cost.append(measure_cost(family, scene(family, REFINEMENTS[size]), patience=plan.patience))
     sheared: list[ShearRow] = []
     for what, sizes in (("state", plan.shear), ("loss curve", plan.cycles)):
         for family, size in sizes:
-            announce(f"shear, {what}: {family}, about {size:,}")
+            say(f"shear, {what}: {family}, about {size:,}")
             sheared.append(_shear_row(plan, what, family, size, sheared))
     return Bench(
         machine=machine,
@@ -141,35 +144,21 @@ def run(plan: Plan, announce: Announce = lambda line: None) -> Bench:
     )
 
 
-def _has_meshes() -> bool:
-    """Whether this version can couple scattered points by other means than a matrix."""
-    problem = NormalProblem.assemble(
-        scene("scattered", 3.4), approach=APPROACH, influence="scattered"
-    )
-    return problem.influence.name == "scattered"
-
-
-def _load_code(announce: Announce) -> None:
+def _load_code(say: Announce) -> None:
     """Have every solver import what it needs, so that times are those of solving."""
-    announce("loading the solvers")
+    say("loading the solvers")
     small = scene("lattice", 1.0)
     for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):
         with suppress(InputError, SolverError):  # it will come again, and be told
             press(small, approach=APPROACH, solver=solver)
 
 
-def _panel(
-    plan: Plan,
-    family: Family,
-    size: int,
-    spent: Spent,
-    announce: Announce,
-) -> Panel:
+def _panel(plan: Plan, family: Family, size: int, spent: Spent, say: Announce) -> Panel:
     """Every attempt at one scene; `spent` knows what the smaller ones took, and is added to."""
     each = scene(family, REFINEMENTS[size])
     n = len(each)
     title = f"{family}, {n:,} asperities"
-    announce(f"{title}: reference")
+    say(f"{title}: reference")
     reference, without = _reference(each)
     used = NormalProblem.assemble(each, approach=APPROACH).influence.name
     tried: list[Attempt] = []
@@ -177,7 +166,7 @@ def _panel(
     for attempt in attempts(plan):
         if attempt.influence == used:
             continue  # the default takes it anyway
-        announce(f"{title}: {attempt.solver}, {attempt.setting}")
+        say(f"{title}: {attempt.solver}, {attempt.setting}")
         expected = _expected(attempt, n, spent)
         if expected > plan.longest:
             message = f"more than {plan.longest:g} s expected (in brackets: about how many)"
@@ -187,7 +176,7 @@ def _panel(
             row = measure(each, attempt, reference, patience=plan.patience)
         tried.append(attempt)
         rows.append(row)
-    announce(f"{title}: the closest again")
+    say(f"{title}: the closest again")
     rows = _timed_in_turns(each, tried, rows, plan.patience)
     answered = [row for row in rows if row.outcome == "answered"]
     spent |= {(row.solver, row.setting): (n, row.seconds) for row in answered}
@@ -251,16 +240,13 @@ def _shear_row(
     memory = MemoryRise()
     try:
         _, seconds = timed(lambda: _sheared(contact, states))
-    except InputError as error:
-        return replace(blank, outcome="refused", message=str(error))
-    except SolverError as error:
-        return replace(blank, outcome="failed", message=str(error))
+    except (InputError, SolverError) as error:
+        return replace(blank, outcome=outcome_of(error), message=str(error))
     return replace(blank, seconds=seconds, memory=memory.risen())
 
 
 def _sheared(contact: Contact, states: int) -> object:
-    assert contact.scene.friction is not None  # every scene here has it
-    most = contact.scene.friction * contact.load
+    most = checks.friction(contact.scene.friction) * contact.load
     if states == 1:
         return shear(contact, force=0.5 * most)
     return cycles(contact, most * np.arange(1, states + 1) / (states + 1))

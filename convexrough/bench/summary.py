@@ -1,32 +1,18 @@
-"""What was measured: for programs, for people, and for a page of the documentation."""
+"""What was measured, for programs, and what follows from it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 from convexrough.bench.frontier import NOISE
-from convexrough.bench.machine import busy
-from convexrough.bench.measure import CostRow, Row
+from convexrough.bench.measure import Row
 from convexrough.bench.scenes import APPROACH, WORDS, Family
-from convexrough.bench.suite import FITTED_FROM, Bench, Panel, ShearRow
-from convexrough.errors import FileError
-from convexrough.run.report import Summary
+from convexrough.bench.suite import FITTED_FROM, Bench, Panel
+from convexrough.run.summary import Summary
 from convexrough.version import __version__
-
-BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
-
-#: A table: a heading, and rows of as many cells.
-Table = list[list[str]]
-
-WORK_HEADING = ["solver", "setting", "error", "seconds", "assembling", "certifying", "A P"]
-WORK_HEADING += ["single", "iterations", "MB", ""]
-COST_HEADING = ["scene", "asperities", "touching", "seconds", "assembling", "solving"]
-COST_HEADING += ["certifying", "A P", "single", "MB", "B each", "proved error"]
-SHEAR_HEADING = ["what", "asperities", "touching", "states", "seconds", "s per state", "MB"]
 
 
 def summarise(bench: Bench) -> Summary:
@@ -47,6 +33,56 @@ def summarise(bench: Bench) -> Summary:
         ],
         "shear": [asdict(row) for row in bench.shear],
     }
+
+
+def tables(bench: Bench) -> dict[str, dict[str, list[Any]]]:
+    """The rows as columns, by the stem of the file each belongs in."""
+    work = [
+        {"family": panel.family, "asperities": panel.asperities} | asdict(row)
+        for panel in bench.panels
+        for row in panel.rows
+    ]
+    found = {"work-precision": work}
+    found["cost"] = [asdict(row) for row in bench.cost]
+    found["shear"] = [asdict(row) for row in bench.shear]
+    return {
+        name: {key: [row[key] for row in rows] for key in rows[0]}
+        for name, rows in found.items()
+        if rows
+    }
+
+
+def verdicts(bench: Bench) -> list[str]:
+    """Whether the default solver is on the frontier, and how its time grows."""
+    lines = []
+    judged = [panel for panel in bench.panels if panel.reference is not None]
+    beaten = [panel for panel in judged if not _on_frontier(panel)]
+    for panel in beaten:
+        names = "; ".join(f"{row.solver}, {row.setting}" for row in panel.offenders)
+        lines.append(
+            f"NOT on the frontier with {panel.asperities:,} asperities ({panel.family}): "
+            f"{names or 'the default solver has no answer'}"
+        )
+    where = f"{len(judged) - len(beaten)} of {len(judged)}"
+    lines.insert(0, f"The default solver is on the work-precision frontier in {where} scenes.")
+    for family in _families(bench):
+        if math.isfinite(b := bench.exponent(family)):
+            sizes = [row.asperities for row in bench.fitted(family)]
+            lines.append(
+                f"The time of a press grows as n^{b:.2f} from {min(sizes):,} to {max(sizes):,} "
+                f"asperities ({family})."
+            )
+    return lines
+
+
+def condensed(rows: Sequence[Row]) -> list[Row]:
+    """Settings of one solver that make no difference in one row, with the least of their times."""
+    found: dict[tuple[object, ...], list[Row]] = {}
+    for row in rows:
+        same = row.error if math.isfinite(row.error) else row.outcome
+        answer = (row.solver, same, row.iterations, row.products, row.single)
+        found.setdefault(answer, []).append(row)
+    return [_one(alike) for alike in found.values()]
 
 
 def _panel_summary(panel: Panel) -> Summary:
@@ -74,168 +110,6 @@ def _on_frontier(panel: Panel) -> bool | None:
     return panel.default is not None and not panel.offenders
 
 
-def tables(bench: Bench) -> dict[str, dict[str, list[Any]]]:
-    """The rows as columns, by the stem of the file each belongs in."""
-    work = [
-        {"family": panel.family, "asperities": panel.asperities} | asdict(row)
-        for panel in bench.panels
-        for row in panel.rows
-    ]
-    found = {"work-precision": work}
-    found["cost"] = [asdict(row) for row in bench.cost]
-    found["shear"] = [asdict(row) for row in bench.shear]
-    return {
-        name: {key: [row[key] for row in rows] for key in rows[0]}
-        for name, rows in found.items()
-        if rows
-    }
-
-
-def describe(bench: Bench) -> list[str]:
-    """Aligned lines for people."""
-    lines = [f"{name:<16}{text}" for name, text in _machine_lines(bench)]
-    for panel in bench.panels:
-        lines += ["", _title(panel), *aligned(_work_table(panel), left=2)]
-        lines += _messages(panel.rows)
-    lines += ["", "cost of a press", *aligned(_cost_table(bench.cost), left=1)]
-    lines += _messages(bench.cost)
-    if bench.shear:
-        lines += ["", "cost of shear", *aligned(_shear_table(bench.shear), left=1)]
-        lines += _messages(bench.shear)
-    return [*lines, "", *verdicts(bench)]
-
-
-def verdicts(bench: Bench) -> list[str]:
-    """Whether the default solver is on the frontier, and how its time grows."""
-    lines = []
-    judged = [panel for panel in bench.panels if panel.reference is not None]
-    beaten = [panel for panel in judged if not _on_frontier(panel)]
-    for panel in beaten:
-        names = "; ".join(f"{row.solver}, {row.setting}" for row in panel.offenders)
-        lines.append(
-            f"NOT on the frontier with {panel.asperities:,} asperities ({panel.family}): "
-            f"{names or 'the default solver has no answer'}"
-        )
-    where = f"{len(judged) - len(beaten)} of {len(judged)}"
-    lines.insert(0, f"The default solver is on the work-precision frontier in {where} scenes.")
-    for family in _families(bench):
-        if math.isfinite(b := bench.exponent(family)):
-            sizes = [row.asperities for row in bench.cost if _fitted(row, family)]
-            lines.append(
-                f"The time of a press grows as n^{b:.2f} from {min(sizes):,} to {max(sizes):,} "
-                f"asperities ({family})."
-            )
-    return lines
-
-
-def page_block(bench: Bench, figures: str) -> list[str]:
-    """Lines of Markdown; `figures` is where the figures are, from the page."""
-    lines = [*(f"- {line}" for line in verdicts(bench)), ""]
-    lines += [
-        f"![Time against error, every solver, at each size]({figures}/work-precision.png)",
-        "",
-    ]
-    lines += [f"![Time of a press against the number of asperities]({figures}/cost.png)", ""]
-    lines += ["### The machine", ""]
-    lines += markdown([["", ""], *([name, text] for name, text in _machine_lines(bench))], left=2)
-    lines += ["", "### Cost of a press", ""]
-    lines += markdown(_cost_table(bench.cost), left=1)
-    lines += _messages(bench.cost)
-    if bench.shear:
-        lines += ["", "### Cost of shear", "", *markdown(_shear_table(bench.shear), left=1)]
-        lines += _messages(bench.shear)
-    for panel in bench.panels:
-        lines += ["", f"### {_title(panel)}", "", *markdown(_work_table(panel), left=2)]
-        lines += _messages(panel.rows)
-    return lines
-
-
-def renewed_page(page: Path, bench: Bench, figures: str) -> str:
-    """The text of a page with the block between the markers written anew; the rest as it was.
-
-    Raises FileError where the page has no such block.
-    """
-    before, after = split_page(page)
-    return "\n".join([before + BEGIN, "", *page_block(bench, figures), "", END + after])
-
-
-def split_page(page: Path) -> tuple[str, str]:
-    """What is before and after the block of a page; FileError where there is not one block."""
-    try:
-        text = page.read_text(encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{page}: cannot be read: {error.strerror or error}") from error
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end or BEGIN in after or END in after or END in before:
-        raise FileError(f"{page}: expected one line {BEGIN} and below it one line {END}")
-    return before, after
-
-
-def aligned(table: Table, *, left: int) -> list[str]:
-    """Lines of a table, the first `left` columns aligned to the left."""
-    return ["  ".join(row).rstrip() for row in _padded(table, left)]
-
-
-def markdown(table: Table, *, left: int) -> list[str]:
-    """The same as a table in Markdown."""
-    rows = _padded(table, left)
-    rule = ["-" * max(3, len(cell)) for cell in rows[0]]
-    rule = [each if column < left else f"{each[:-1]}:" for column, each in enumerate(rule)]
-    return [f"| {' | '.join(row)} |" for row in [rows[0], rule, *rows[1:]]]
-
-
-def _padded(table: Table, left: int) -> Table:
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return [
-        [
-            f"{cell:{'<' if column < left else '>'}{width}}"
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        for row in table
-    ]
-
-
-def _title(panel: Panel) -> str:
-    title = f"{panel.asperities:,} asperities, {panel.family}"
-    if (reference := panel.reference) is None:
-        return f"{title}; {panel.without}"
-    return (
-        f"{title}; {reference.touching:,} touch; reference good to {reference.correction:.0e} "
-        f"({reference.how}, residual {reference.residual:.0e})"
-    )
-
-
-def _work_table(panel: Panel) -> Table:
-    table = [WORK_HEADING]
-    for row in condensed(panel.rows):
-        guess = f"({row.expected:.0e})" if math.isfinite(row.expected) else "-"
-        cells = [row.outcome, guess, *["-"] * 6, ""]
-        if row.outcome == "answered":
-            cells = [f"{row.error:.1e}" if math.isfinite(row.error) else "unknown"]
-            cells += [_seconds(row.seconds), _seconds(row.assembling), _seconds(row.certifying)]
-            cells += [
-                str(row.products),
-                str(row.single),
-                str(row.iterations),
-                _megabytes(row.memory),
-            ]
-            cells.append("frontier" if row.frontier else "")
-        solver = f"{row.solver} (default)" if row.default else row.solver
-        table.append([solver, row.setting, *cells])
-    return table
-
-
-def condensed(rows: Sequence[Row]) -> list[Row]:
-    """Settings of one solver that make no difference in one row, with the least of their times."""
-    found: dict[tuple[object, ...], list[Row]] = {}
-    for row in rows:
-        same = row.error if math.isfinite(row.error) else row.outcome
-        answer = (row.solver, same, row.iterations, row.products, row.single)
-        found.setdefault(answer, []).append(row)
-    return [_one(alike) for alike in found.values()]
-
-
 def _one(rows: Sequence[Row]) -> Row:
     """Rows with one answer as one row."""
     best = min(rows, key=lambda row: (not row.seconds >= 0.0, row.seconds, row.expected))
@@ -255,82 +129,6 @@ def _last_word(setting: str) -> str:
     return setting.rpartition(" ")[2]
 
 
-def _cost_table(rows: Sequence[CostRow]) -> Table:
-    table = [COST_HEADING]
-    for row in rows:
-        cells = [f"{row.asperities:,}", row.outcome, *["-"] * 9]
-        if row.outcome == "answered":
-            each = "-" if row.memory is None else f"{row.memory / row.asperities:,.0f}"
-            proved = f"{row.load_error:.1e}" if row.certified else f"not proved ({row.scope})"
-            cells = [f"{row.asperities:,}", f"{row.touching:,}", _seconds(row.seconds)]
-            cells += [_seconds(row.assembling), _seconds(row.solving), _seconds(row.certifying)]
-            cells += [str(row.products), str(row.single), _megabytes(row.memory), each, proved]
-        table.append([row.family, *cells])
-    return table
-
-
-def _shear_table(rows: Sequence[ShearRow]) -> Table:
-    table = [SHEAR_HEADING]
-    for row in rows:
-        cells = [f"{row.asperities:,}", f"{row.touching:,}", str(row.states)]
-        if row.outcome == "answered":
-            cells += [_seconds(row.seconds), _seconds(row.seconds / row.states)]
-            cells.append(_megabytes(row.memory))
-        else:
-            cells += [row.outcome, "-", "-"]
-        table.append([row.what, *cells])
-    return table
-
-
-def _messages(rows: Sequence[Row] | Sequence[CostRow] | Sequence[ShearRow]) -> list[str]:
-    """Why some did not answer, below their table."""
-    found: dict[str, list[str]] = {}
-    for row in rows:
-        if row.outcome != "answered":
-            name = row.solver if isinstance(row, Row) else f"{row.asperities:,} asperities"
-            named = found.setdefault(f"{row.outcome}: {row.message}", [])
-            named += [name] if name not in named else []
-    lines = [f"- {'; '.join(names)} {why}" for why, names in found.items()]
-    return ["", *lines] if lines else []
-
-
-def _machine_lines(bench: Bench) -> list[tuple[str, str]]:
-    machine = bench.machine
-    versions = ", ".join(f"{name} {number}" for name, number in machine["versions"].items())
-    limits = machine["linear_algebra_threads"]
-    threads = limits if isinstance(limits, str) else _listed(limits)
-    load = machine["load_average"]
-    shared = "; other work was running, so times are high" if busy(machine) else ""
-    return [
-        ("processor", f"{machine['processor']}, {machine['cores']} cores, {machine['system']}"),
-        ("memory", f"{machine['memory'] / 2**30:.0f} GiB"),
-        ("threads", f"linear algebra ({machine['linear_algebra']}): {threads}"),
-        ("", f"transforms: {machine['transform_threads']}"),
-        ("versions", f"convexrough {__version__}, Python {machine['python']}, {versions}"),
-        ("date", f"{machine['date']}, {'quick' if bench.quick else 'full'} run of "
-                 f"{bench.seconds / 60:.1f} min"),
-        ("load average", "unknown" if load is None else f"{load:.2f} at the start{shared}"),
-    ]  # fmt: skip
-
-
-def _listed(limits: Mapping[str, str]) -> str:
-    return ", ".join(f"{name}={value}" for name, value in limits.items())
-
-
 def _families(bench: Bench) -> list[Family]:
     present = {row.family for row in bench.cost}
     return [family for family in WORDS if family in present]
-
-
-def _fitted(row: CostRow, family: Family) -> bool:
-    return row.family == family and row.outcome == "answered" and row.asperities >= FITTED_FROM
-
-
-def _seconds(value: float) -> str:
-    if value < 1e-3:
-        return f"{1e6 * value:.0f}e-6"
-    return f"{value:.2g}" if value < 100 else f"{value:.0f}"
-
-
-def _megabytes(memory: int | None) -> str:
-    return "-" if memory is None else f"{memory / 1e6:.1f}"

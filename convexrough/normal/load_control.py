@@ -1,6 +1,8 @@
-"""What a prescribed total load implies before the problem is solved: shifts, and the approach."""
+"""What a total load implies before the problem is solved: shifts, the approach, the reach."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -10,6 +12,10 @@ from convexrough.influence import Kind, couple
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
+
+#: A scene reaches so many times the smooth contact radius at least, and to find out how far it has
+#: to reach, the approach is bounded on one so many times wider.
+LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 
 def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Array:
@@ -72,12 +78,9 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
     `approach_bound` with the loads that Hertz's smooth sphere suggests.
     """
-    modulus, radius = scene.material.contact_modulus, scene.sphere_radius
+    modulus = scene.material.contact_modulus
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-    a = float(hertz.contact_radius(load, modulus, radius))
-    sunk = hertz.surface_displacement(scene.asperities.distances, a, radius)
-    indentation = scene.offsets - sunk
-    weights = hertz.load(shifted_to_load(indentation, coefficients, load), coefficients)
+    weights = smooth_loads(scene, load)
     touching = np.flatnonzero(weights)
     sources = couple(scene, touching, 1.0 / (np.pi * modulus), influence)
     displacement = np.empty(len(scene))
@@ -94,3 +97,42 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     if not np.isfinite(bound):
         raise InputError("load", found=load, expected="a load this scene's units can hold")
     return bound
+
+
+def smooth_loads(scene: Scene, load: float) -> Array:
+    """(n,) [force] of this total, on asperities that ride on the surface under a smooth sphere."""
+    modulus, radius = scene.material.contact_modulus, scene.sphere_radius
+    coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
+    a = float(hertz.contact_radius(load, modulus, radius))
+    sunk = hertz.surface_displacement(scene.asperities.distances, a, radius)
+    indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
+    return np.asarray(hertz.load(indentation, coefficients))
+
+
+def all_that_could_touch(
+    scene_within: Callable[[float], Scene],
+    farthest: Callable[[float], float],
+    load: float,
+) -> tuple[Scene, float]:
+    """The scene as far as any asperity could touch under a load, and a bound on the approach there.
+
+    scene_within : the scene as far as a distance from the axis [length]; further out it only has
+        more asperities
+    farthest     : how far from the axis any could touch at an approach [length]
+
+    The bound of a wide scene also holds for the same scene cut back, as long as no trial load is
+    cut off: its height is at least the displacement at every asperity, so at those that are left.
+    """
+    axis = scene_within(0.0)
+    modulus, radius = axis.material.contact_modulus, axis.sphere_radius
+    within = LEAST_REACH * float(hertz.contact_radius(load, modulus, radius))
+    while True:
+        reached = WIDER * within
+        grown = scene_within(reached)
+        if smooth_loads(grown, load)[grown.asperities.distances > within].any():
+            reached, grown = within, scene_within(within)
+        bound = highest_approach(grown, load)
+        needed = farthest(bound)
+        if needed <= reached:
+            return scene_within(max(within, needed)), bound
+        within = needed

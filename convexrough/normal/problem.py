@@ -72,10 +72,13 @@ class NormalProblem:
         approach: float | None = None,
         load: float | None = None,
         influence: Kind | None = None,
+        highest: float | None = None,
     ) -> NormalProblem:
         """Screen, scale and couple. `approach` [length] or `load` [force], exactly one.
 
         influence : how to couple; None for the cheapest exact way
+        highest   : [length] an upper bound on the approach under this load, where one is known;
+            else `highest_approach` finds one
         """
         checks.exactly_one("approach", approach, "load", load)
         errors = scene.offset_errors
@@ -86,7 +89,7 @@ class NormalProblem:
         else:
             assert load is not None  # exactly_one
             load = checks.positive("load", load)
-            ceiling = highest_approach(scene, load, influence)
+            ceiling = highest_approach(scene, load, influence) if highest is None else highest
 
         # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
         prescribed = ceiling + scene.offsets + errors + 6 * ROUNDOFF * abs(ceiling)

@@ -12,16 +12,7 @@ from matplotlib.patches import Rectangle
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.plots.cycle import ring_colour
-from convexrough.plots.style import (
-    DASHED,
-    DOUBLE,
-    ROUGH,
-    SMOOTH,
-    TICK,
-    UNSURE,
-    ShearScale,
-    label,
-)
+from convexrough.plots.style import DASHED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE, ShearScale, label
 from convexrough.shearing.cycle import cycles
 from convexrough.shearing.history import history
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from convexrough import checks, fields
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.paper.curves import forces_figure, loss_figure
+from convexrough.paper.example import lettered
 from convexrough.plots.cycle import MOST_ASPERITIES, loops_figure
 from convexrough.plots.press import pressure_figure
 from convexrough.plots.shear import SLIDING, STICK, draw_state, legend_handles
@@ -37,10 +37,9 @@ from convexrough.plots.style import (
     map_edge,
     no_contact_figure,
     quantity,
-    rings,
-    spread,
     towards_rim,
 )
+from convexrough.scene.rings import evenly_chosen
 from convexrough.shearing.cycle import cycle
 from convexrough.shearing.state import ShearState, onset_of_sliding, shear
 
@@ -72,12 +71,13 @@ def paper_figures(
     onsets = onset_of_sliding(contact) / friction.force
     named = lettered(contact)
     steady = cycle(contact, maximum=SHARE * friction.force)
-    some = spread(list(named), MOST_ASPERITIES)
+    some = evenly_chosen(list(named), MOST_ASPERITIES)
     firsts = [int(named[name][0]) for name in some]
+    centre = firsts[0]
     return {
         "fig3_pressure": pressure_figure(contact, scale),
         "fig4_rings": _rings_figure(state, named, onsets, scale, friction),
-        "fig5_traction": _traction_figure(state, scale, friction),
+        "fig5_traction": _traction_figure(state, centre, scale, friction),
         "fig6_section": _section_figure(state, scale, friction),
         "fig7_asperities": forces_figure(contact, named, onsets, friction),
         "fig8_loops": loops_figure([steady], firsts, some, "ring", friction),
@@ -85,20 +85,8 @@ def paper_figures(
     }
 
 
-def lettered(contact: Contact) -> dict[str, Indices]:
-    """The touching asperities by ring, from the axis outwards; the last ring is A."""
-    groups = rings(contact)
-    several = -(-len(groups) // 26)
-    names = [letter * (turn + 1) for turn in range(several) for letter in ascii_uppercase]
-    return dict(zip(reversed(names[: len(groups)]), groups, strict=True))
-
-
 def _rings_figure(
-    state: ShearState,
-    named: dict[str, Indices],
-    onsets: Array,
-    scale: Scale,
-    friction: ShearScale,
+    state: ShearState, named: dict[str, Indices], onsets: Array, scale: Scale, friction: ShearScale
 ) -> Figure:
     contact = state.contact
     figure = Figure(figsize=(DOUBLE, 3.4), layout="constrained")
@@ -148,7 +136,7 @@ def _slides(state: ShearState, ring: Indices) -> bool:
     return bool((state.status[ring] == "sliding").any())
 
 
-def _traction_figure(state: ShearState, scale: Scale, friction: ShearScale) -> Figure:
+def _traction_figure(state: ShearState, centre: int, scale: Scale, friction: ShearScale) -> Figure:
     contact = state.contact
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
@@ -163,7 +151,6 @@ def _traction_figure(state: ShearState, scale: Scale, friction: ShearScale) -> F
     bar.ax.tick_params(labelsize=TICK)
     bar.ax.set_title("$q\\,/\\,(fp_0)$", fontsize=TICK)
 
-    centre = int(rings(contact)[0][0])
     a, c = contact.contact_radii[centre], state.stick_radii[centre]
     middle = contact.scene.contact_points[centre]
     x = np.unique(np.concatenate((a * towards_rim(), c * towards_rim())))

@@ -1,4 +1,4 @@
-"""Figures of every stage, fit to print. Nothing is computed here that another room computes.
+"""Figures of every stage, fit to print.
 
 Each function returns figures by the stem of the file each belongs in; units are only said, never
 converted. No global state of matplotlib is touched: save a figure, or show it in a notebook. Discs
@@ -10,9 +10,4 @@ from convexrough.plots.history import history_figures
 from convexrough.plots.press import press_figures
 from convexrough.plots.shear import shear_figures
 
-__all__ = [
-    "cycle_figures",
-    "history_figures",
-    "press_figures",
-    "shear_figures",
-]
+__all__ = ["cycle_figures", "history_figures", "press_figures", "shear_figures"]

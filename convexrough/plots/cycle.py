@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from convexrough.arrays import Array
-from convexrough.contact import Contact
 from convexrough.plots.style import (
     DASHED,
     DOUBLE,
@@ -23,10 +22,9 @@ from convexrough.plots.style import (
     ShearScale,
     label,
     no_contact_figure,
-    rings,
     round_ticks,
-    spread,
 )
+from convexrough.scene.rings import evenly_chosen, one_of_each_ring
 from convexrough.shearing.cycle import Cycle, Loop
 from convexrough.shearing.history import history
 from convexrough.sphere import mindlin
@@ -64,10 +62,11 @@ def cycle_figures(
         return figures
     scale = ShearScale.of(contact, length_unit, force_unit)
     by_range = sorted(cycles, key=lambda each: each.maximum - each.minimum)
-    chosen = one_of_each_ring(contact) if asperities is None else list(asperities)
-    distances = np.hypot(*contact.scene.contact_points.T) / scale.sphere.contact_radius
-    names = [f"{distance:.2f}" for distance in distances[chosen]]
-    shown = spread(by_range, MOST_LOOPS)
+    distances = np.hypot(*contact.scene.contact_points.T)
+    every = one_of_each_ring(distances, contact.loads, MOST_ASPERITIES)
+    chosen = every if asperities is None else list(asperities)
+    names = [f"{r:.2f}" for r in distances[chosen] / scale.sphere.contact_radius]
+    shown = evenly_chosen(by_range, MOST_LOOPS)
     figures = {"hysteresis": loops_figure(shown, chosen, names, "$r\\,/\\,a_H$", scale)}
     if several:
         figures["loss"] = _loss_figure(by_range, scale)
@@ -163,11 +162,6 @@ def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:
     there = start + 2.0 * sphere.displacement((forces[: turn + 1] - maximum) / 2.0)
     back = there[-1] + 2.0 * sphere.displacement((forces[turn + 1 :] - minimum) / 2.0)
     return np.append(there, back)
-
-
-def one_of_each_ring(contact: Contact) -> list[int]:
-    """An asperity at each distance from the axis, at most 6 of them."""
-    return [int(ring[0]) for ring in spread(rings(contact), MOST_ASPERITIES)]
 
 
 def _draw_asperity_loops(

@@ -15,14 +15,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from convexrough.arrays import Array
-from convexrough.plots.style import (
-    DOUBLE,
-    SMOOTH,
-    TICK,
-    ShearScale,
-    label,
-    no_contact_figure,
-)
+from convexrough.plots.style import DOUBLE, SMOOTH, TICK, ShearScale, label, no_contact_figure
 from convexrough.shearing.history import History, history
 
 MOST_POINTS, MOST_NUMBERS, MOST_DOTS = 2000, 12, 60

@@ -33,8 +33,8 @@ from convexrough.plots.style import (
     no_contact_figure,
     quantity,
     round_ticks,
-    spread,
 )
+from convexrough.scene.rings import evenly_chosen
 from convexrough.shearing.state import ShearState
 
 #: The more slip, the darker, also in grey.
@@ -47,7 +47,7 @@ MOST_PANELS = 12
 def shear_figures(
     states: Sequence[ShearState], *, length_unit: str = "", force_unit: str = ""
 ) -> dict[str, Figure]:
-    """The map of each friction state of one contact, at most 12 of them, evenly spread.
+    """The map of each friction state of one contact, at most 12 of them, evenly chosen.
 
     "stick_slip" : contact discs with their stick discs inside, sliding asperities, open ones; and
         the smooth sphere's contact and stick discs under the same forces
@@ -60,7 +60,7 @@ def shear_figures(
     contact = states[0].contact
     scale = Scale.of(contact, length_unit, force_unit)
     friction = ShearScale.of(contact, length_unit, force_unit)
-    shown = spread(states, MOST_PANELS)
+    shown = evenly_chosen(states, MOST_PANELS)
     columns = len(shown) if len(shown) <= 4 else 3 if len(shown) in (5, 6, 9) else 4
     rows = -(-len(shown) // columns)
     width = SINGLE if columns == 1 else DOUBLE

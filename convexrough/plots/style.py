@@ -6,9 +6,8 @@ the same load. Shear forces are in f P, displacements in X0 and energies in W0 (
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.sphere import hertz
 from convexrough.sphere.smooth import SmoothSphere, smooth
@@ -32,8 +31,6 @@ DASHED = (0, (4, 2.5))
 #: From these numbers of touching asperities on, the discs are pixels inside a vector file, and
 #: too small to be drawn.
 DENSE, CROWDED = 200, 3000
-
-Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -104,21 +101,6 @@ class ShearScale:
         both = self.force_unit and self.length_unit
         unit = f"{self.force_unit} {self.length_unit}" if both else ""
         return f"$W\\,/\\,W_0$  ($W_0$ = {quantity(self.energy, unit)})"
-
-
-def rings(contact: Contact) -> list[Indices]:
-    """The touching asperities, in groups at the same distance from the axis; outwards."""
-    distances = np.hypot(*contact.scene.contact_points.T)
-    order = np.flatnonzero(contact.loads)
-    order = order[np.argsort(distances[order], kind="stable")]
-    ends = np.flatnonzero(np.diff(distances[order]) > 1e-6 * distances.max()) + 1
-    return np.split(order, ends)
-
-
-def spread(items: Sequence[Item], most: int) -> list[Item]:
-    """All the items, or of more than `most` so many evenly spread: the first and last are kept."""
-    places = np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int)
-    return [items[i] for i in places]
 
 
 def map_edge(contact: Contact, scale: Scale) -> float:

@@ -1,24 +1,15 @@
-"""What a run says: a summary for programs, aligned lines for people."""
+"""What a run says, for people: aligned lines, and warnings. All of it is read off a summary."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from convexrough.arrays import Array
-from convexrough.compare import Comparison, Entry
-from convexrough.contact import Contact
-from convexrough.normal.certificate import Certificate
-from convexrough.run.stages import Outcome
-from convexrough.version import __version__
+from convexrough.run.columns import aligned
+from convexrough.run.summary import NORMAL, Summary
 
-Summary = dict[str, Any]
-
-_WORDS = ("contact", "open", "undecided")
 _SCOPES = {
     "global": "global: the scene has no other solution",
     "local": "local: no other solution with contacts of such sizes",
@@ -31,148 +22,6 @@ _INFLUENCES = {
 }
 
 
-def summarise(outcome: Outcome) -> Summary:
-    """The summary of a run, in the scene's units; the shear stages only where they were asked for.
-
-    Forces named as in a scene file are fractions of f P, as there.
-    """
-    summary = _contact_summary(outcome.contact)
-    if outcome.shear:
-        summary["shear"] = [
-            {
-                "fraction": fraction,
-                "force": state.force,
-                "displacement": state.displacement,
-                "displacement_error": state.certificate.displacement_error,
-                "sliding": int(np.sum(state.status == "sliding")),
-                "partial_slip": int(np.sum(state.status == "partial")),
-                "undecided": int(np.sum(state.status == "undecided")),
-                "scope": state.certificate.scope,
-            }
-            for fraction, state in outcome.shear
-        ]
-    if outcome.cycles:
-        summary["cycle"] = [
-            {
-                "maximum": maximum,
-                "minimum": minimum,
-                "energy": cycle.energy,
-                "energy_normalised": cycle.energy_normalised,
-                "smooth_normalised": cycle.smooth_normalised,
-                "balance_defect": cycle.balance_defect,
-                "sliding": int(np.sum(cycle.status == "sliding")),
-                "partial_slip": int(np.sum(cycle.status == "partial")),
-                "undecided": int(np.sum(cycle.status == "undecided")),
-            }
-            for maximum, minimum, cycle in outcome.cycles
-        ]
-    if outcome.history is not None:
-        fractions, history = outcome.history
-        summary["history"] = {
-            "fraction": list(fractions),
-            "displacement": history.displacements.tolist(),
-            "energy": history.energy.tolist(),
-        }
-    return summary
-
-
-def _contact_summary(contact: Contact) -> Summary:
-    normal = _judged(contact.certificate, contact.loads) | {
-        "candidates": contact.candidates,
-        "influence": contact.influence,
-        "solver": contact.solver,
-        "iterations": contact.iterations,
-        "seconds": contact.seconds,
-        "model_error": contact.model_error,
-        "crowding": contact.crowding,
-    }
-    return _headed(normal)
-
-
-def certificate_summary(certificate: Certificate, loads: Array) -> Summary:
-    """The summary of judged loads, (n,) [force], in the scene's units."""
-    return _headed(_judged(certificate, loads))
-
-
-def comparison_summary(comparison: Comparison) -> Summary:
-    """The summary of a comparison, in the scene's units."""
-    rows = [_entry_summary(entry) for entry in comparison.entries]
-    found = {"compare": rows, "contradictions": list(comparison.contradictions)}
-    return {"schema": 1, "version": __version__} | found
-
-
-def _entry_summary(entry: Entry) -> Summary:
-    row: Summary = {
-        "solver": entry.solver,
-        "outcome": entry.outcome,
-        "message": entry.message,
-        "disagreement": entry.disagreement,
-        "different_words": entry.different_words,
-        "memory": entry.memory,
-    }
-    if (contact := entry.contact) is not None:
-        proof, words = contact.certificate, contact.status
-        row |= {
-            **{word: int(np.sum(words == word)) for word in _WORDS},
-            "approach": contact.approach,
-            "load": contact.load,
-            "largest_load": float(contact.loads.max()),
-            "scope": proof.scope,
-            "load_error": proof.load_error,
-            "duality_gap": proof.duality_gap,
-            "iterations": contact.iterations,
-            "seconds": contact.seconds,
-        }
-    return row
-
-
-def describe_comparison(
-    summary: Summary, *, length_unit: str = "", force_unit: str = ""
-) -> list[str]:
-    """Aligned lines for people, of the summary of a comparison."""
-    work = f"{force_unit} {length_unit}".strip()
-    heading = ["solver", "disagreement", "load error", "duality gap", "certificate", "words"]
-    heading += ["iterations", "seconds", "MB"]
-    rows = []
-    for row in summary["compare"]:
-        if row["outcome"] == "answered":
-            largest, memory = row["largest_load"], row["memory"]
-            cells = [_two(row["disagreement"]), _relative_bound(row["load_error"], largest)]
-            cells += [_two(row["duality_gap"]), row["scope"], _wording(row)]
-            cells += [str(row["iterations"]), _two(row["seconds"])]
-            cells.append("-" if memory is None else f"{memory / 1e6:.1f}")
-        else:
-            cells = [row["outcome"], *["-"] * (len(heading) - 2)]
-        rows.append([row["solver"], *cells])
-    first = summary["compare"][0]
-    lines = []
-    if first["outcome"] == "answered":
-        words = ", ".join(f"{first[word]} {word}" for word in _WORDS if first[word])
-        lines.append(f"asperities         {words}")
-    lines += [
-        f"disagreement       with {first['solver']}, over the largest load, as is the load error",
-        f"duality gap        {f'in {work}, ' if work else ''}from the loads alone",
-        "MB                 by which the memory of the process rose while the solver worked",
-        "",
-        *_columns([heading, *rows], left=1),
-    ]
-    for row in summary["compare"]:
-        lines += ["", row["message"]] if row["message"] else []
-    return lines
-
-
-def _wording(row: Summary) -> str:
-    """How the words compare with those of the reference, and whether any is missing."""
-    different, undecided = row["different_words"], row["undecided"]
-    said = {None: "-", 0: "same"}.get(different, f"{different} differ")
-    return f"{said}, {undecided} undecided" if undecided else said
-
-
-def to_json(summary: Summary) -> str:
-    """Valid JSON: infinities, and what is no number, are null."""
-    return json.dumps(_finite(summary), indent=2, allow_nan=False)
-
-
 def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -> list[str]:
     """Aligned lines for people, of either summary."""
     normal = summary["normal"]
@@ -182,7 +31,7 @@ def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
     relative = _ratio(proof["load_error"], normal["largest_load"])
     lines = [
         ("asperities", f"{normal['asperities']}{able}"),
-        *((f"  {word}", f"{normal[word]:>{width}}") for word in _WORDS),
+        *((f"  {word}", f"{normal[word]:>{width}}") for word in NORMAL),
         ("approach", _quantity(f"{normal['approach']:.10g}", length_unit)),
         ("load", _quantity(f"{normal['load']:.10g}", force_unit)),
         ("certificate", _SCOPES[proof["scope"]]),
@@ -210,19 +59,19 @@ def _describe_shear(summary: Summary, length_unit: str, force_unit: str) -> list
         keys = ["fraction", "force", "displacement", "sliding", "partial_slip", "undecided"]
         lines += ["", _titled("shear", f"force {force_unit}", f"displacement {length_unit}")]
         heading = ["Q/(fP)", "force", "displacement", "slide", "partial", "undecided"]
-        lines += _aligned(heading, [[row[key] for key in keys] for row in rows])
+        lines += _numbers(heading, [[row[key] for key in keys] for row in rows])
     if rows := summary.get("cycle"):
         keys = ["maximum", "minimum", "energy", "energy_normalised", "smooth_normalised"]
         keys += ["balance_defect", "sliding"]
         lines += ["", _titled("steady cycles", f"energy {work}")]
         heading = ["max/(fP)", "min/(fP)", "energy", "W/W0", "smooth", "defect", "slide"]
-        lines += _aligned(heading, [[row[key] for key in keys] for row in rows])
+        lines += _numbers(heading, [[row[key] for key in keys] for row in rows])
     if past := summary.get("history"):
         steps = list(zip(past["fraction"], past["displacement"], past["energy"], strict=True))
         lines += ["", _titled("history", f"displacement {length_unit}", f"energy {work}")]
         if len(steps) > 20:
             lines.append(f"(the last 20 of {len(steps)} steps; all are in history.csv)")
-        lines += _aligned(["Q/(fP)", "displacement", "energy"], steps[-20:])
+        lines += _numbers(["Q/(fP)", "displacement", "energy"], steps[-20:])
     return lines
 
 
@@ -232,21 +81,51 @@ def _titled(name: str, *quantities: str) -> str:
     return f"{name}  ({', '.join(named)})" if named else name
 
 
-def _aligned(heading: Sequence[str], rows: Sequence[Sequence[float]]) -> list[str]:
+def _numbers(heading: Sequence[str], rows: Sequence[Sequence[float]]) -> list[str]:
     cells = [[f"{x:d}" if isinstance(x, int) else f"{x:.7g}" for x in row] for row in rows]
-    return _columns([heading, *cells])
+    return aligned([heading, *cells])
 
 
-def _columns(rows: Sequence[Sequence[str]], *, left: int = 0) -> list[str]:
-    """Lines of a table, the first `left` columns aligned to the left."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            f"{cell:{'<' if column < left else '>'}{width}}"
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in rows
+def describe_comparison(
+    summary: Summary, *, length_unit: str = "", force_unit: str = ""
+) -> list[str]:
+    """Aligned lines for people, of the summary of a comparison."""
+    work = f"{force_unit} {length_unit}".strip()
+    heading = ["solver", "disagreement", "load error", "duality gap", "certificate", "words"]
+    heading += ["iterations", "seconds", "MB"]
+    rows = []
+    for row in summary["compare"]:
+        if row["outcome"] == "answered":
+            largest, memory = row["largest_load"], row["memory"]
+            cells = [_two(row["disagreement"]), _relative_bound(row["load_error"], largest)]
+            cells += [_two(row["duality_gap"]), row["scope"], _wording(row)]
+            cells += [str(row["iterations"]), _two(row["seconds"])]
+            cells.append("-" if memory is None else f"{memory / 1e6:.1f}")
+        else:
+            cells = [row["outcome"], *["-"] * (len(heading) - 2)]
+        rows.append([row["solver"], *cells])
+    first = summary["compare"][0]
+    lines = []
+    if first["outcome"] == "answered":
+        words = ", ".join(f"{first[word]} {word}" for word in NORMAL if first[word])
+        lines.append(f"asperities         {words}")
+    lines += [
+        f"disagreement       with {first['solver']}, over the largest load, as is the load error",
+        f"duality gap        {f'in {work}, ' if work else ''}from the loads alone",
+        "MB                 by which the memory of the process rose while the solver worked",
+        "",
+        *aligned([heading, *rows], left=1),
     ]
+    for row in summary["compare"]:
+        lines += ["", row["message"]] if row["message"] else []
+    return lines
+
+
+def _wording(row: Summary) -> str:
+    """How the words compare with those of the reference, and whether any is missing."""
+    different, undecided = row["different_words"], row["undecided"]
+    said = {None: "-", 0: "same"}.get(different, f"{different} differ")
+    return f"{said}, {undecided} undecided" if undecided else said
 
 
 def warnings(summary: Summary) -> list[str]:
@@ -276,45 +155,6 @@ def comparison_warnings(summary: Summary) -> list[str]:
     if not any(row["scope"] != "none" and not row["undecided"] for row in answered):
         found.append("not certified: no answer has a proved word for every asperity")
     return found
-
-
-def proved(summary: Summary) -> bool:
-    """Every asperity has a proved word, in every stage."""
-    stages = [summary["normal"], *summary.get("shear", ()), *summary.get("cycle", ())]
-    scope = summary["normal"]["certificate"]["scope"]
-    return scope != "none" and not any(stage["undecided"] for stage in stages)
-
-
-def _headed(normal: Summary) -> Summary:
-    return {"schema": 1, "version": __version__, "normal": normal}
-
-
-def _judged(certificate: Certificate, loads: Array) -> Summary:
-    return {
-        "asperities": len(loads),
-        **{word: int(np.sum(certificate.status == word)) for word in _WORDS},
-        "approach": certificate.approach,
-        "approach_error": certificate.approach_error,
-        "load": float(loads.sum()),
-        "largest_load": float(loads.max()),
-        "certificate": {
-            "scope": certificate.scope,
-            "convexity_number": certificate.convexity_number,
-            "load_error": certificate.load_error,
-            "gap_error": certificate.gap_error,
-            "duality_gap": certificate.duality_gap,
-        },
-    }
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_finite(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def _quantity(number: str, unit: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,18 +15,20 @@ from numpy.typing import NDArray
 
 from convexrough.contact import Contact
 from convexrough.errors import FileError
-from convexrough.run.report import Summary, to_json
 from convexrough.run.scene_file import UnitNames
-from convexrough.run.stages import Outcome, representatives
+from convexrough.run.stages import Cycled, Findings, Sheared
+from convexrough.run.summary import SHEAR, Summary, counts, to_json
 from convexrough.run.tables import ASPERITY_COLUMNS
-from convexrough.shearing.cycle import Cycle
-from convexrough.shearing.state import ShearState
+from convexrough.scene.rings import one_of_each_ring
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Tables with more rows are written as .npz.
 MOST_CSV_ROWS = 100_000
+
+#: Asperities whose loops are written, at most.
+MOST_LOOPS = 12
 
 
 def claim_folder(folder: Path, *, force: bool) -> None:
@@ -49,7 +51,7 @@ def claim_folder(folder: Path, *, force: bool) -> None:
 
 def write_results(
     folder: Path,
-    outcome: Outcome,
+    found: Findings,
     summary: Summary,
     *,
     figures: bool,
@@ -59,23 +61,23 @@ def write_results(
 
     Returns the paths. Raises FileError; files already written stay.
     """
-    written = [_write_columns(folder / "asperities.csv", _asperity_columns(outcome.contact))]
-    if outcome.shear:
-        written.append(_write_columns(folder / "shear.csv", _shear_columns(outcome.shear)))
-    if outcome.cycles:
-        written.append(_write_columns(folder / "cycle.csv", _cycle_columns(outcome.cycles)))
-        written.append(_write_columns(folder / "loop.csv", _loop_columns(outcome)))
-    if outcome.history is not None:
-        fractions, past = outcome.history
+    written = [_write_columns(folder / "asperities.csv", _asperity_columns(found.contact))]
+    if found.shear:
+        written.append(_write_columns(folder / "shear.csv", _shear_columns(found.shear)))
+    if found.cycles:
+        written.append(_write_columns(folder / "cycle.csv", _cycle_columns(found.cycles)))
+        written.append(_write_columns(folder / "loop.csv", _loop_columns(found)))
+    if found.history is not None:
+        past = found.history.history
         columns = {
-            "fraction": np.array(fractions),
+            "fraction": np.array(found.history.fractions),
             "force": past.applied,
             "displacement": past.displacements,
             "energy": past.energy,
         }
         written.append(_write_columns(folder / "history.csv", columns))
     if figures:
-        written += write_figures(folder, _draw(outcome, units or UnitNames()))
+        written += write_figures(folder, _draw(found, units or UnitNames()))
     # Last, so that a summary says that the rest is there.
     path = folder / "summary.json"
     with beside(path) as temporary:
@@ -100,20 +102,17 @@ def write_figures(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
     return written
 
 
-def _draw(outcome: Outcome, units: UnitNames) -> dict[str, Figure]:
+def _draw(found: Findings, units: UnitNames) -> dict[str, Figure]:
     from convexrough import plots  # matplotlib: only when it draws
 
-    length, force = units
-    figures = plots.press_figures(outcome.contact, length_unit=length, force_unit=force)
-    if outcome.shear:
-        states = [state for _, state in outcome.shear]
-        figures |= plots.shear_figures(states, length_unit=length, force_unit=force)
-    if outcome.cycles:
-        cycles = [cycle for *_, cycle in outcome.cycles]
-        figures |= plots.cycle_figures(cycles, length_unit=length, force_unit=force)
-    if outcome.history is not None:
-        history = outcome.history[1]
-        figures |= plots.history_figures(history, length_unit=length, force_unit=force)
+    names: dict[str, Any] = dict(length_unit=units.length, force_unit=units.force)
+    figures = plots.press_figures(found.contact, **names)
+    if found.shear:
+        figures |= plots.shear_figures([row.state for row in found.shear], **names)
+    if found.cycles:
+        figures |= plots.cycle_figures([row.cycle for row in found.cycles], **names)
+    if found.history is not None:
+        figures |= plots.history_figures(found.history.history, **names)
     return figures
 
 
@@ -147,45 +146,52 @@ def _asperity_columns(contact: Contact) -> dict[str, NDArray[Any]]:
     return dict(zip(ASPERITY_COLUMNS, values, strict=True))
 
 
-def _shear_columns(states: Sequence[tuple[float, ShearState]]) -> dict[str, NDArray[Any]]:
+def _shear_columns(rows: tuple[Sheared, ...]) -> dict[str, NDArray[Any]]:
     """One row for each fraction and asperity."""
-    count = len(states[0][1].forces)
-    x, y = states[0][1].contact.scene.asperities.positions.T
-    arrays: dict[str, list[NDArray[Any]]] = {
-        "force": [state.forces for _, state in states],
-        "stick_radius": [state.stick_radii for _, state in states],
-        "slip": [state.slips for _, state in states],
-        "displacement": [state.displacements for _, state in states],
-        "status": [state.status for _, state in states],
+    states = [row.state for row in rows]
+    count = len(states[0].forces)
+    x, y = states[0].contact.scene.asperities.positions.T
+    fields = {
+        "force": "forces",
+        "stick_radius": "stick_radii",
+        "slip": "slips",
+        "displacement": "displacements",
+        "status": "status",
     }
     return {
-        "fraction": np.repeat([fraction for fraction, _ in states], count),
-        "x": np.tile(x, len(states)),
-        "y": np.tile(y, len(states)),
-        **{name: np.concatenate(parts) for name, parts in arrays.items()},
+        "fraction": np.repeat([row.fraction for row in rows], count),
+        "x": np.tile(x, len(rows)),
+        "y": np.tile(y, len(rows)),
+        **{
+            name: np.concatenate([getattr(state, field) for state in states])
+            for name, field in fields.items()
+        },
     }
 
 
-def _cycle_columns(rows: Sequence[tuple[float, float, Cycle]]) -> dict[str, NDArray[Any]]:
+def _cycle_columns(rows: tuple[Cycled, ...]) -> dict[str, NDArray[Any]]:
     """One row per cycle; energies are those of both bodies, per steady cycle."""
+    cycles = [row.cycle for row in rows]
     names = ("energy", "energy_normalised", "smooth_normalised", "balance_defect")
     return {
-        "maximum": np.array([maximum for maximum, _, _ in rows]),
-        "minimum": np.array([minimum for _, minimum, _ in rows]),
-        **{name: np.array([getattr(cycle, name) for *_, cycle in rows]) for name in names},
-        "partial_slip_energy": np.array([c.partial_slip_energies.sum() for *_, c in rows]),
-        "sliding_energy": np.array([c.sliding_energies.sum() for *_, c in rows]),
-        "sliding": np.array([int((c.status == "sliding").sum()) for *_, c in rows]),
+        "maximum": np.array([row.maximum for row in rows]),
+        "minimum": np.array([row.minimum for row in rows]),
+        **{name: np.array([getattr(cycle, name) for cycle in cycles]) for name in names},
+        "partial_slip_energy": np.array([each.partial_slip_energies.sum() for each in cycles]),
+        "sliding_energy": np.array([each.sliding_energies.sum() for each in cycles]),
+        "sliding": np.array([counts(each.status, SHEAR)["sliding"] for each in cycles]),
     }
 
 
-def _loop_columns(outcome: Outcome) -> dict[str, NDArray[Any]]:
+def _loop_columns(found: Findings) -> dict[str, NDArray[Any]]:
     """Force-displacement points of each cycle: macroscopic ("total"), and of some asperities."""
-    chosen = representatives(outcome.contact)
+    contact = found.contact
+    distances = contact.scene.asperities.distances
+    chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)
     parts: dict[str, list[NDArray[Any]]] = {
         name: [] for name in ("maximum", "minimum", "curve", "force", "displacement")
     }
-    for maximum, minimum, cycle in outcome.cycles:
+    for maximum, minimum, cycle in found.cycles:
         loop = cycle.loop(200)
         curves = [("total", loop.forces, loop.displacements)]
         curves += [

@@ -12,19 +12,18 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 from convexrough.errors import FileError, InputError, SceneFileError
 from convexrough.influence import Kind
-from convexrough.normal.load_control import highest_approach
+from convexrough.normal.load_control import all_that_could_touch
+from convexrough.normal.problem import NormalProblem
+from convexrough.run.stages import Stages
 from convexrough.run.tables import read_summits, read_text
 from convexrough.scene.asperities import Asperities, largest_tip_radius
 from convexrough.scene.material import Material
 from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver
-from convexrough.sphere import hertz
 
 if TYPE_CHECKING:
     from convexrough.run.schema import Document, Lattice
-
-Fractions = tuple[float, ...]
 
 
 class UnitNames(NamedTuple):
@@ -34,14 +33,13 @@ class UnitNames(NamedTuple):
     force: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class SceneFile:
-    """What a scene file says. Tables that it leaves out are None.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SceneFile(Stages):
+    """What a scene file says: the shear stages, and the contact they start from.
 
     approach [length] or load [force] : what is prescribed; the other is None
-    shear   : shear forces, as fractions of f P
-    cycle   : maxima and minima of steady cycles, as fractions of f P
-    history : shear forces one after the other, as fractions of f P
+    highest_approach : [length] upper bound on the approach under the load, where the scene was
+        made to reach as far as that; else None
     influence : how to couple the asperities; None for the cheapest exact way
     """
 
@@ -49,12 +47,20 @@ class SceneFile:
     scene: Scene
     approach: float | None
     load: float | None
-    shear: Fractions | None
-    cycle: tuple[Fractions, Fractions] | None
-    history: Fractions | None
+    highest_approach: float | None
     solver: Solver
     influence: Kind | None
     units: UnitNames
+
+    def problem(self) -> NormalProblem:
+        """The normal contact problem of the file, assembled."""
+        return NormalProblem.assemble(
+            self.scene,
+            approach=self.approach,
+            load=self.load,
+            influence=self.influence,
+            highest=self.highest_approach,
+        )
 
 
 def read_scene(path: str | os.PathLike[str]) -> SceneFile:
@@ -70,11 +76,13 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
     if tables is None:
         raise SceneFileError(str(path), mistakes)
     shear, cycle, history, units = tables.shear, tables.cycle, tables.history, tables.units
+    scene, highest = _scene(path, tables)
     return SceneFile(
         path=path,
-        scene=_scene(path, tables),
+        scene=scene,
         approach=tables.normal.approach,
         load=tables.normal.load,
+        highest_approach=highest,
         shear=tuple(shear.fractions) if shear else None,
         cycle=(tuple(cycle.maximum), tuple(cycle.lowest)) if cycle else None,
         history=tuple(history.fractions) if history else None,
@@ -94,7 +102,8 @@ def _parse(path: Path) -> dict[str, object]:
     return contents
 
 
-def _scene(path: Path, tables: Document) -> Scene:
+def _scene(path: Path, tables: Document) -> tuple[Scene, float | None]:
+    """And what `SceneFile.highest_approach` says."""
     material = tables.material
     ratio = material.poisson_ratio
     with _blamed_on(path, "material"):
@@ -117,13 +126,13 @@ def _scene(path: Path, tables: Document) -> Scene:
     with _blamed_on(path, "asperities"):
         if layout.pattern == "file":
             summits = read_summits(path.parent / layout.path, tip_radius=layout.tip_radius)
-            return press_on(summits)
-        return _lattice(layout, tables, stuff, press_on)
+            return press_on(summits), None
+        return _lattice(layout, tables, press_on)
 
 
 def _lattice(
-    layout: Lattice, tables: Document, material: Material, press_on: Callable[[Asperities], Scene]
-) -> Scene:
+    layout: Lattice, tables: Document, press_on: Callable[[Asperities], Scene]
+) -> tuple[Scene, float | None]:
     """The scene as far as `within`, or else as far as any asperity could touch."""
     pattern = Asperities.hexagonal if layout.pattern == "hexagonal" else Asperities.square
 
@@ -148,20 +157,11 @@ def _lattice(
         )
 
     if layout.within is not None:
-        return scene(layout.within)
+        return scene(layout.within), None
     if (approach := tables.normal.approach) is not None:
-        return scene(farthest(approach))
-    load = tables.normal.load
-    assert load is not None  # exactly one of the two
-    # Grow until the approach that this scene can need at most lets nothing outside it touch.
-    radius = tables.sphere.radius
-    within = 1.5 * float(hertz.contact_radius(load, material.contact_modulus, radius))
-    while True:
-        grown = scene(within)
-        needed = farthest(highest_approach(grown, load))
-        if needed <= within:
-            return grown
-        within = needed
+        return scene(farthest(approach)), None
+    assert tables.normal.load is not None  # exactly one of the two
+    return all_that_could_touch(scene, farthest, tables.normal.load)
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from convexrough import solvers
-from convexrough.checks import nearest
+from convexrough.checks import SIZED, is_sized, nearest
 from convexrough.influence import KINDS
 
 #: What `[solver] name` may say.
@@ -32,9 +32,6 @@ SOLVERS: dict[str, Callable[[], solvers.Solver]] = {
     "conic_cvxpy": solvers.ConicCVXPY,
     "bristles": solvers.BristleQP,
 }
-
-#: In sensible units every number is well inside; the cube of one outside may overflow.
-LARGEST = 1e40
 
 
 def _expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
@@ -52,15 +49,11 @@ def _expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) ->
     return WrapValidator(check)
 
 
-def _is_sized(value: float) -> bool:
-    return value == 0 or 1 / LARGEST <= abs(value) <= LARGEST
-
-
-_SIZED = _expected(f"a size from {1 / LARGEST:g} to {LARGEST:g}; choose other units", _is_sized)
+_SIZED = _expected(SIZED, is_sized)
 
 Finite = Annotated[float, _expected("a finite number"), _SIZED]
 Positive = Annotated[float, _expected("a positive number", lambda value: value > 0), _SIZED]
-Spread = Annotated[
+NonNegative = Annotated[
     float, _expected("a number that is not negative", lambda value: value >= 0), _SIZED
 ]
 Ratio = Annotated[float, _expected("a number from 0 to 0.5", lambda value: 0 <= value <= 0.5)]
@@ -122,9 +115,9 @@ class Lattice(Table):
     pattern: Pattern
     spacing: Positive
     tip_radius: TipRadius
-    within: Spread | None = None
-    height_std: Spread = 0.0
-    tip_radius_cv: Spread = 0.0
+    within: NonNegative | None = None
+    height_std: NonNegative = 0.0
+    tip_radius_cv: NonNegative = 0.0
     seed: Seed | None = None
     geometry: Geometry = "summit"
 

@@ -1,75 +1,88 @@
-"""The shear stages a scene file asks for, on a pressed contact. Forces are fractions of f P."""
+"""The shear stages asked for, on a pressed contact. Forces are fractions of f P."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.progress import Announce
 from convexrough.shearing.cycle import Cycle, cycles
 from convexrough.shearing.history import History, history
 from convexrough.shearing.state import ShearState, shear
 
+Fractions = tuple[float, ...]
 
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """A contact and what was computed from it; stages that were not asked for are empty.
 
-    shear   : (fraction, state) of each shear force
-    cycles  : (maximum, minimum, cycle) of each steady cycle, as fractions
-    history : (fractions, history), or None
+@dataclass(frozen=True)
+class Stages:
+    """What is asked for, None where it is not.
+
+    shear   : shear forces, as fractions of f P
+    cycle   : maxima and minima of steady cycles, as fractions of f P
+    history : shear forces one after the other, as fractions of f P
     """
 
+    shear: Fractions | None = None
+    cycle: tuple[Fractions, Fractions] | None = None
+    history: Fractions | None = None
+
+
+class Sheared(NamedTuple):
+    """The state under one shear force."""
+
+    fraction: float
+    state: ShearState
+
+
+class Cycled(NamedTuple):
+    """The steady cycle between two shear forces."""
+
+    maximum: float
+    minimum: float
+    cycle: Cycle
+
+
+class Followed(NamedTuple):
+    """The history of a sequence of shear forces."""
+
+    fractions: Fractions
+    history: History
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """A contact and what was computed of it; empty or None where nothing was asked for."""
+
     contact: Contact
-    shear: Sequence[tuple[float, ShearState]] = ()
-    cycles: Sequence[tuple[float, float, Cycle]] = ()
-    history: tuple[Sequence[float], History] | None = None
+    shear: tuple[Sheared, ...] = ()
+    cycles: tuple[Cycled, ...] = ()
+    history: Followed | None = None
 
 
-def compute(
-    contact: Contact,
-    *,
-    shear_at: Sequence[float] | None,
-    cycle_between: tuple[Sequence[float], Sequence[float]] | None,
-    history_of: Sequence[float] | None,
-    announce: Announce | None = None,
-) -> Outcome:
-    """The stages asked for; None for those that are not.
+def compute(contact: Contact, stages: Stages, announce: Announce | None = None) -> Findings:
+    """All stages asked for.
 
     announce : told in a line how far long work has come
     """
-    if shear_at is None and cycle_between is None and history_of is None:
-        return Outcome(contact)
+    if stages.shear is None and stages.cycle is None and stages.history is None:
+        return Findings(contact)
     limit = checks.friction(contact.scene.friction) * contact.load
-    maxima, minima = cycle_between or ((), ())
+    maxima, minima = stages.cycle or ((), ())
     steady = cycles(contact, limit * np.array(maxima), limit * np.array(minima), announce=announce)
-    past = None
-    if history_of is not None:
-        past = (
-            history_of,
-            history(contact, forces=limit * np.array(history_of), announce=announce),
-        )
-    return Outcome(
+    followed = None
+    if stages.history is not None:
+        past = history(contact, forces=limit * np.array(stages.history), announce=announce)
+        followed = Followed(stages.history, past)
+    return Findings(
         contact,
-        shear=[
-            (part, shear(contact, force=part * limit, announce=announce)) for part in shear_at or ()
-        ],
-        cycles=list(zip(maxima, minima, steady, strict=True)),
-        history=past,
+        shear=tuple(
+            Sheared(part, shear(contact, force=part * limit, announce=announce))
+            for part in stages.shear or ()
+        ),
+        cycles=tuple(map(Cycled, maxima, minima, steady)),
+        history=followed,
     )
-
-
-def representatives(contact: Contact, most: int = 12) -> Indices:
-    """Loaded asperities, one from each distance from the axis, evenly chosen if there are many."""
-    touching = np.flatnonzero(contact.loads)
-    distances: Array = contact.scene.asperities.distances[touching]
-    spacing = 1e-9 * float(distances.max(initial=0.0)) or 1.0
-    _, first = np.unique(np.round(distances / spacing), return_index=True)
-    if len(first) > most:
-        first = first[np.linspace(0, len(first) - 1, most).astype(int)]
-    return touching[first]

@@ -15,8 +15,7 @@ from flint import arb, ctx
 from matplotlib.text import Text
 
 import convexrough as cr
-from convexrough import bench as benching
-from convexrough.bench import measure, reference, summary
+from convexrough.bench import measure, page, reference, suite, summary
 from convexrough.bench.figures import bench_figures
 from convexrough.bench.frontier import better_than_default, exponent, mark_frontier
 from convexrough.bench.measure import Attempt, CostRow, Row, Tally, counted
@@ -44,7 +43,7 @@ extended = pytest.mark.skipif(not LONG, reason="no extended precision on this pl
 
 @cache
 def tiny() -> Bench:
-    return benching.run(TINY)
+    return suite.run(TINY)
 
 
 # The reference.
@@ -258,7 +257,7 @@ def test_settings_that_make_no_difference_are_one_line() -> None:
 def command(command: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The command line, which finds a run that was made before."""
     made = tiny()
-    monkeypatch.setattr(benching, "run", lambda plan, announce: made)
+    monkeypatch.setattr(suite, "run", lambda plan, announce: made)
     return command
 
 
@@ -310,16 +309,16 @@ def test_json(command: Any, tmp_path: Path) -> None:
     assert {each["what"] for each in summary["shear"]} == {"state", "loss curve"}
 
 
-PAGE = f"# Title\n\nBefore.\n\n{summary.BEGIN}\nold\n{summary.END}\n\nAfter.\n"
+PAGE = f"# Title\n\nBefore.\n\n{page.BEGIN}\nold\n{page.END}\n\nAfter.\n"
 
 
 def test_a_page_is_renewed_between_its_markers(command: Any, tmp_path: Path) -> None:
-    page = tmp_path / "docs" / "page.md"
-    page.parent.mkdir()
-    page.write_text(PAGE)
+    path = tmp_path / "docs" / "page.md"
+    path.parent.mkdir()
+    path.write_text(PAGE)
     assert command("bench", "--quick", "--page", "docs/page.md", "--no-figures").status == 0
-    text = page.read_text()
-    before, after = benching.split_page(page)
+    text = path.read_text()
+    before, after = page.split_page(path)
     assert (before, after) == ("# Title\n\nBefore.\n\n", "\n\nAfter.\n")
     assert "old" not in text
     assert "| newton (default) " in text
@@ -327,12 +326,12 @@ def test_a_page_is_renewed_between_its_markers(command: Any, tmp_path: Path) -> 
         assert f"(figures/{name}.png)" in text
         assert (tmp_path / "docs" / "figures" / f"{name}.png").exists()
     assert command("bench", "--quick", "--page", "docs/page.md", "--force").status == 0
-    assert page.read_text() == text
+    assert path.read_text() == text
 
 
 @pytest.mark.parametrize(
     "text",
-    ["nothing", PAGE.replace(summary.END, ""), PAGE.replace(summary.BEGIN, ""), PAGE + PAGE],
+    ["nothing", PAGE.replace(page.END, ""), PAGE.replace(page.BEGIN, ""), PAGE + PAGE],
     ids=["no block", "no end", "no beginning", "two blocks"],
 )
 def test_a_page_without_one_block_is_refused_first(command: Any, tmp_path: Path, text: str) -> None:
@@ -346,10 +345,10 @@ def test_a_page_without_one_block_is_refused_first(command: Any, tmp_path: Path,
 
 
 def test_the_page_of_the_documentation() -> None:
-    page = ROOT / "docs" / "performance.md"
-    before, _ = benching.split_page(page)
+    path = ROOT / "docs" / "performance.md"
+    before, _ = page.split_page(path)
     assert "convexrough bench --page docs/performance.md" in before
-    block = page.read_text("utf-8").split(summary.BEGIN)[1].split(summary.END)[0]
+    block = path.read_text("utf-8").split(page.BEGIN)[1].split(page.END)[0]
     assert "| newton (default) " in block
     tables = [line for line in block.splitlines() if line.startswith("|")]
     assert all(line.endswith("|") for line in tables)
@@ -387,6 +386,6 @@ def test_progress_is_told() -> None:
     short = [Attempt("newton", "", Newton()), Attempt("bristles", "", BristleQP(4))]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("convexrough.bench.suite.attempts", lambda plan: short)
-        found = benching.run(plan, told.append)
+        found = suite.run(plan, told.append)
     assert "lattice, 61 asperities: newton, " in told
     assert [each.solver for each in found.panels[0].rows] == ["newton", "bristles"]

@@ -1,6 +1,7 @@
 """The command line as its users meet it: output, files, exit status."""
 
 import csv
+import importlib
 import json
 import os
 import re
@@ -16,7 +17,6 @@ import pytest
 from scene_files import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
-from convexrough import cli
 from convexrough.run.scene_file import read_scene
 
 
@@ -59,7 +59,8 @@ def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
 
 
 def test_what_new_comments_out_is_valid_too(command: Any, tmp_path: Path) -> None:
-    text = cli.NEW_SCENE
+    command("new", "new.toml")
+    text = (tmp_path / "new.toml").read_text()
     tables = text[text.index("# [units]") :]
     active = "\n".join(line.removeprefix("# ") for line in tables.splitlines())
     rough = re.sub(r"^# (height_std|tip_radius_cv|seed|within)", r"\1", text, flags=re.M)
@@ -147,7 +148,7 @@ def test_the_folder_is_refused_before_computing(
     def never(*_: Any, **__: Any) -> None:
         raise AssertionError("computed")
 
-    monkeypatch.setattr("convexrough.contact.press", never)
+    monkeypatch.setattr("convexrough.contact.solve", never)
     outcome = command("run", "a.toml", "--out", "file")
     assert outcome.status == 2
     assert outcome.err == "convexrough: error: file: cannot hold results: File exists\n"
@@ -197,6 +198,57 @@ def test_verify_rounded_and_shuffled_loads(command: Any, tmp_path: Path, digits:
     assert normal["open"] <= 24
     assert outcome.status == (0 if normal["undecided"] == 0 else 3)
     assert ("warning" in outcome.err) == (outcome.status == 3)
+
+
+def recorded(monkeypatch: pytest.MonkeyPatch, place: str, name: str) -> list[Any]:
+    """What a function of the package is called with from now on."""
+    calls: list[Any] = []
+    work = getattr(importlib.import_module(place), name)
+
+    def noted(*arguments: Any, **options: Any) -> Any:
+        calls.append((arguments, options))
+        return work(*arguments, **options)
+
+    monkeypatch.setattr(f"{place}.{name}", noted)
+    return calls
+
+
+@pytest.mark.parametrize("influence", ["dense", "lattice", "scattered"])
+def test_verify_couples_as_the_scene_says(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, influence: str
+) -> None:
+    """And so judges the loads of a run as the run did."""
+    text = scene_text(more=f'[solver]\ninfluence = "{influence}"')
+    (tmp_path / "a.toml").write_text(text)
+    ran = command("run", "a.toml", "--json", "--no-figures")
+    kinds = recorded(monkeypatch, "convexrough.normal.problem", "couple")
+    verified = command("verify", "a.toml", "a-results/asperities.csv", "--json")
+    assert [arguments[3] for arguments, _ in kinds] == [influence]
+    proofs = [json.loads(each.out)["normal"]["certificate"] for each in (ran, verified)]
+    assert proofs[0] == proofs[1]
+
+
+def test_verify_blames_the_scene_for_its_influence(command: Any, tmp_path: Path) -> None:
+    more = '[solver]\ninfluence = "lattice"'
+    (tmp_path / "a.toml").write_text(scene_text(SUMMITS, more=more))
+    (tmp_path / "summits.csv").write_text("x,y\n0,0\n0.0025,0\n0.1,0.3\n0.2,0.7\n")
+    (tmp_path / "loads.csv").write_text("load\n1e-9\n0\n0\n0\n")
+    outcome = command("verify", "a.toml", "loads.csv")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.startswith("convexrough: error: a.toml: influence: found lattice")
+
+
+@pytest.mark.parametrize("within", ["", "within = 0.0102"])
+def test_the_approach_under_a_load_is_bounded_once(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, within: str
+) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + within, "load = 3.6e-7"))
+    loads = recorded(monkeypatch, "convexrough.normal.load_control", "highest_approach")
+    more = recorded(monkeypatch, "convexrough.normal.problem", "highest_approach")
+    assert command("run", "a.toml", "--no-figures").status == 0
+    assert len(loads + more) == 1
+    assert command("verify", "a.toml", "a-results/asperities.csv").status == 0
+    assert len(loads + more) == 2
 
 
 def test_verify_finds_loads_in_the_wrong_rows(command: Any, tmp_path: Path) -> None:
@@ -355,6 +407,28 @@ def test_bad_scenes(command: Any, tmp_path: Path, scene: str, expected: str) -> 
     assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name != "a.toml"]
 
 
+KEYS = ["radius", "contact_modulus", "spacing", "tip_radius", "within", "height_std"]
+KEYS += ["tip_radius_cv", "coefficient"]
+
+
+@pytest.mark.parametrize("value", ["1e-60", "1e60"])
+@pytest.mark.parametrize("key", [*KEYS, "normal"])
+@pytest.mark.parametrize("normal", ["approach = 5e-5", "load = 3.6e-7"])
+def test_extreme_sizes(command: Any, tmp_path: Path, normal: str, key: str, value: str) -> None:
+    """An answer, or a message that says what is wrong."""
+    rough = HEXAGONAL + "height_std = 1e-6\ntip_radius_cv = 0.1\nseed = 1\n"
+    rough += "within = 0.0102\n" if key == "within" else ""
+    text = scene_text(rough, normal, SHEAR)
+    name = normal.split()[0] if key == "normal" else key
+    text, found = re.subn(rf"^{name} = .*$", f"{name} = {value}", text, flags=re.M)
+    assert found == 1
+    (tmp_path / "a.toml").write_text(text)
+    outcome = command("run", "a.toml", "--json", "--no-figures")
+    assert outcome.status in (0, 2, 3)
+    assert (outcome.out == "") == (outcome.status == 2)
+    assert outcome.status == 0 or outcome.err.startswith("convexrough: ")
+
+
 @pytest.mark.parametrize(
     ("summits", "expected"),
     [
@@ -478,7 +552,7 @@ def test_an_interrupt(tmp_path: Path) -> None:
     interrupt = "lambda *a, **k: os.kill(os.getpid(), signal.SIGINT)"
     # A job in the background inherits a signal that is ignored; this one must not.
     before = "import os, signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    before += f"import convexrough.contact as c; c.press = {interrupt}\n"
+    before += f"import convexrough.contact as c; c.solve = {interrupt}\n"
     ran = shell("run", "a.toml", cwd=tmp_path, before=before)
     assert ran.returncode == 128 + signal.SIGINT
     assert "Traceback" not in ran.stderr

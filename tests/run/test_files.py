@@ -10,10 +10,10 @@ from scene_files import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
 from convexrough.run import results
-from convexrough.run.report import Summary, summarise, to_json
 from convexrough.run.results import beside, claim_folder, write_results
 from convexrough.run.scene_file import UnitNames, read_scene
-from convexrough.run.stages import Outcome
+from convexrough.run.stages import Findings
+from convexrough.run.summary import Summary, summarise, to_json
 from convexrough.run.tables import ASPERITY_COLUMNS, read_loads, read_summits, read_table
 
 
@@ -103,7 +103,7 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
         ("spacing = nan", "spacing: found nan, expected a positive number"),
         ("spacing = true", "spacing: found true, expected a positive number"),
         ('spacing = "1"', "spacing: found '1', expected a positive number"),
-        ("spacing = 1e-50", "spacing: found 1e-50, expected a size from 1e-40 to 1e+40"),
+        ("spacing = 1e-61", "spacing: found 1e-61, expected a size from 1e-60 to 1e+60"),
         ("spacing = 1\nspaceing = 1", 'spaceing: unknown key, did you mean "spacing"?'),
         ("spacing = 1\nzzz = 1", "zzz: unknown key, valid: pattern, spacing, tip_radius"),
         ("spacing = 1\ntip_radius = inf", "tip_radius: found inf, expected a positive number"),
@@ -394,9 +394,9 @@ def test_wrong_loads(tmp_path: Path, content: str, expected: str) -> None:
 
 
 def written(folder: Path, contact: cr.Contact, *, figures: bool = False) -> list[str]:
-    outcome = Outcome(contact)
+    found = Findings(contact)
     paths = write_results(
-        folder, outcome, summarise(outcome), figures=figures, units=UnitNames("m", "N")
+        folder, found, summarise(found), figures=figures, units=UnitNames("m", "N")
     )
     assert all(path.stat().st_size > 0 for path in paths)
     assert {path.name for path in paths} == {path.name for path in folder.iterdir()}

@@ -16,7 +16,7 @@ from scenes import MATERIAL, PAPER_APPROACH, paper
 
 import convexrough as cr
 from convexrough.influence.lattice import LatticeInfluence
-from convexrough.run.stages import compute
+from convexrough.run.stages import Stages, compute
 from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.judgement import judge_in_turn, judge_states
 from convexrough.shearing.many_states import by_matrices, solve_together
@@ -191,13 +191,8 @@ def test_one_state_takes_few_products(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_stage_tells_how_far_it_is() -> None:
     contact = refined("lattice")
     lines: list[str] = []
-    compute(
-        contact,
-        shear_at=[0.5],
-        cycle_between=([0.2, 0.4, 1.0], [-0.2, -0.4, -1.0]),
-        history_of=[0.3, -0.3],
-        announce=lines.append,
-    )
+    stages = Stages((0.5,), ((0.2, 0.4, 1.0), (-0.2, -0.4, -1.0)), (0.3, -0.3))
+    compute(contact, stages, lines.append)
     pattern = r"state (\d+) of (\d+): residual \de[-+]\d\d of the displacement, [\d,]+ sliding"
     told = [found.groups() for line in lines if (found := re.fullmatch(pattern, line))]
     assert told[:2] == [("1", "3"), ("2", "3")]

@@ -1,0 +1,112 @@
+"""How far a scene has to reach under a load: as growing it step by step finds, in fewer bounds."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import convexrough as cr
+from convexrough.normal import load_control
+from convexrough.normal.load_control import all_that_could_touch, highest_approach
+from convexrough.scene.asperities import largest_tip_radius
+from convexrough.scene.patterns import CUT_DEVIATIONS
+from convexrough.scene.scene import reach
+from convexrough.sphere import hertz
+
+Maker = tuple[Callable[[float], cr.Scene], Callable[[float], float]]
+
+PATTERNS = [cr.Asperities.hexagonal, cr.Asperities.square]
+ROUGHNESS: dict[str, dict[str, Any]] = {
+    "even": dict(),
+    "heights": dict(height_std=1e-6, seed=3),
+    "heights and radii": dict(height_std=1e-6, tip_radius_cv=0.1, seed=7),
+    "very rough": dict(height_std=2e-5, tip_radius_cv=0.5, seed=5),
+}
+#: On one asperity, on a few, on some hundred and on a thousand.
+LOADS = [1e-12, 1e-9, 2e-8, 2e-7, 3.6e-7, 2e-6, 1e-5]
+
+
+def maker(pattern: Any, geometry: Any, k: float = 1.0, **rough: Any) -> Maker:
+    """The paper's sphere on a lattice k times finer, and how far out one could touch."""
+    tip_radius = 0.02 / k
+
+    def scene_within(within: float) -> cr.Scene:
+        asperities = pattern(spacing=0.0025 / k, tip_radius=tip_radius, within=within, **rough)
+        return cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry=geometry)
+
+    def farthest(approach: float) -> float:
+        return reach(
+            approach,
+            sphere_radius=1.0,
+            tip_radius=largest_tip_radius(tip_radius, rough.get("tip_radius_cv", 0.0)),
+            height=CUT_DEVIATIONS * rough.get("height_std", 0.0),
+            geometry=geometry,
+        )
+
+    return scene_within, farthest
+
+
+def grown_step_by_step(make: Maker, load: float) -> cr.Scene:
+    """From 1.5 contact radii of the smooth sphere, until nothing outside could touch."""
+    scene_within, farthest = make
+    within = 1.5 * float(hertz.contact_radius(load, 1.0, 1.0))
+    while True:
+        scene = scene_within(within)
+        needed = farthest(highest_approach(scene, load))
+        if needed <= within:
+            return scene
+        within = needed
+
+
+def assert_same(found: cr.Scene, expected: cr.Scene) -> None:
+    for name in ("positions", "heights", "tip_radii"):
+        one, other = (getattr(scene.asperities, name) for scene in (found, expected))
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("load", LOADS)
+@pytest.mark.parametrize("rough", ROUGHNESS)
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+@pytest.mark.parametrize("pattern", PATTERNS, ids=["hexagonal", "square"])
+def test_as_far_as_growing_step_by_step(
+    pattern: Any, geometry: Any, rough: str, load: float
+) -> None:
+    make = maker(pattern, geometry, **ROUGHNESS[rough])
+    scene, bound = all_that_could_touch(*make, load)
+    assert_same(scene, grown_step_by_step(make, load))
+    # The bound is that of the scene itself, but for rounding.
+    assert bound == pytest.approx(highest_approach(scene, load), rel=1e-11)
+
+
+@pytest.mark.parametrize("k", [3.0, 6.0])
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+def test_fine_lattices_as_growing_step_by_step(geometry: Any, k: float) -> None:
+    """Nearly a smooth sphere: no further than the first guess."""
+    make = maker(cr.Asperities.hexagonal, geometry, k)
+    scene, _ = all_that_could_touch(*make, 2e-7)
+    assert_same(scene, grown_step_by_step(make, 2e-7))
+
+
+@pytest.mark.parametrize("rough", ROUGHNESS)
+@pytest.mark.parametrize("load", [1e-9, 2e-7])
+def test_the_bound_is_above_the_approach(rough: str, load: float) -> None:
+    scene, bound = all_that_could_touch(
+        *maker(cr.Asperities.hexagonal, "summit", **ROUGHNESS[rough]), load
+    )
+    contact = cr.press(scene, load=load)
+    assert contact.certificate.approach <= bound * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("load", [2e-7, 3.6e-7, 2e-6, 1e-5])
+@pytest.mark.parametrize("rough", ["even", "heights"])
+def test_one_bound_is_enough(monkeypatch: pytest.MonkeyPatch, rough: str, load: float) -> None:
+    loads = []
+
+    def counted(scene: cr.Scene, load: float) -> float:
+        loads.append(load)
+        return highest_approach(scene, load)
+
+    monkeypatch.setattr(load_control, "highest_approach", counted)
+    all_that_could_touch(*maker(cr.Asperities.hexagonal, "summit", **ROUGHNESS[rough]), load)
+    assert loads == [load]
