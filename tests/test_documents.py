@@ -34,3 +34,22 @@ def test_the_readme_shows_what_the_package_computes(capsys: pytest.CaptureFixtur
     assert printed[1].startswith("global")
     assert printed[2].startswith("True")
     assert printed[3].startswith("6 ")
+
+
+def test_every_section_that_the_code_cites_is_there() -> None:
+    """Formulas cite `docs/theory/page.md, "Section"`; a renamed section is found here."""
+    cited = set()
+    for path in (ROOT / "convexrough").rglob("*.py"):
+        text = re.sub(r"\s+(#:? )?", " ", path.read_text("utf-8"))
+        cited |= set(re.findall(r'(docs/theory/[\w-]+\.md),? "([^"]+)"', text))
+    assert len(cited) > 15
+    for page, section in cited:
+        text = (ROOT / page).read_text("utf-8").replace("$", "")
+        assert re.search(rf"^(#+ |.*\*\*){re.escape(section)}", text, re.M), (page, section)
+
+
+def test_every_test_that_the_guarantees_name_is_there() -> None:
+    named = set(re.findall(r"`(test_\w+)`", (ROOT / "docs/guarantees.md").read_text("utf-8")))
+    tests = "\n".join(path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    assert len(named) > 40
+    assert named <= set(re.findall(r"^def (test_\w+)", tests, re.M))
