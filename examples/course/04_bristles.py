@@ -125,6 +125,8 @@ left.legend(fontsize=8, loc="lower center")
 right.loglog(counts, errors, "ko", label="error of the load")
 right.loglog(counts, errors[0] * (counts[0] / counts) ** 2.0, "k-", lw=0.8, label="second order")
 right.set(xlabel="number of bristles", ylabel="relative error [1]")
+right.set_xticks(counts, labels=counts, minor=False)
+right.minorticks_off()
 right.legend(fontsize=8)
 
 # %%
