@@ -1,14 +1,11 @@
 """The site: `python -m sphinx -W docs DIR`. Pages are Markdown; the course is run as it is built.
 
-Opened pages ask the network for nothing. Formulas are turned into MathML here, by KaTeX, which
-needs node; where that is missing their TeX is shown instead.
+Opened pages ask the network for nothing: formulas are MathML in the page (formulas.py).
 """
 
 import re
-import shutil
 import sys
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -22,7 +19,7 @@ author = "the authors of convexrough"
 copyright = author
 release = version = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_gallery.gen_gallery"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_gallery.gen_gallery", "formulas"]
 exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = "convexrough"
@@ -34,16 +31,6 @@ html_copy_source = False
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 myst_dmath_double_inline = True
-
-# Formulas
-
-if shutil.which("node"):
-    extensions.append("sphinxcontrib.katex")
-    katex_prerender = True
-    katex_options = 'output: "mathml", throwOnError: true, strict: "error"'
-    katex_css_path = "katex-math.css"  # the extension's own; the default is on a server
-else:
-    print("node is not installed: formulas are shown as TeX", file=sys.stderr)
 
 # Reference
 
@@ -79,25 +66,6 @@ def to_the_course(app: Sphinx, page: str, source: list[str]) -> None:
     )
 
 
-def show_tex(app: Sphinx) -> None:
-    """Without node: formulas as they are written."""
-
-    def inline(translator: Any, node: Any) -> None:
-        translator.body.append(f"<code>{translator.encode(node.astext())}</code>")
-        raise SkipNode
-
-    def block(translator: Any, node: Any) -> None:
-        translator.body.append(f"<pre>{translator.encode(node.astext())}</pre>")
-        raise SkipNode
-
-    from docutils.nodes import SkipNode
-
-    app.add_html_math_renderer("source", (inline, None), (block, None))
-
-
 def setup(app: Sphinx) -> None:
     app.connect("autodoc-process-docstring", literal_docstring)
     app.connect("source-read", to_the_course)
-    if "sphinxcontrib.katex" not in extensions:
-        show_tex(app)
-        app.config.html_math_renderer = "source"  # type: ignore[attr-defined]
