@@ -7,7 +7,7 @@ radii a_i, with loads P_i = 4 E* a_i^3 / (3 R_i), 1 / R_i = 1 / R + 1 / rho_i an
 
 The file states a scene, radii near its solution, a box of radii, why the energy is convex on that
 box, and what it claims. Its numbers are float64 in hexadecimal: exact rationals. Numbers computed
-here are rational, too, or enclosed between rationals. docs/theory/proof-file.md derives (1) to (8).
+here are rational, too, or enclosed between rationals. docs/theory/proof-file.md derives (1) - (10).
 
 Exit status: 0 all that is claimed is proved; 1 refused, with the reason; 2 unreadable.
 """
@@ -50,27 +50,30 @@ class Unreadable(Exception):
 # Numbers ------------------------------------------------------------------------------------------
 
 
-def rounded(x: Fraction | int, to: Callable[[Fraction], int]) -> Fraction:
-    """To BITS significant bits, down or up."""
-    scale = Fraction(2) ** (BITS - x.numerator.bit_length() + x.denominator.bit_length())
-    return to(x * scale) / scale
+def rounded(x: Fraction | int, up: bool) -> Fraction:
+    """To BITS significant bits."""
+    n, d = x.as_integer_ratio()
+    shift = BITS - n.bit_length() + d.bit_length()
+    n, d = n << max(shift, 0), d << max(-shift, 0)
+    whole = -(-n // d) if up else n // d
+    return Fraction(whole << max(-shift, 0), 1 << max(shift, 0))
 
 
-def root(x: Fraction, to: Callable[[Fraction], int]) -> Fraction:
-    """The square root to about BITS bits, down or up."""
+def root(x: Fraction, up: bool) -> Fraction:
+    """The square root to about BITS bits."""
     if x <= 0:
         return Fraction(0)
-    shift = BITS + (x.denominator.bit_length() - x.numerator.bit_length()) // 2
-    further = 1 if to is math.ceil else 0
-    return (math.isqrt(to(x * Fraction(4) ** shift)) + further) / Fraction(2) ** shift
+    scale = Fraction(2) ** (BITS + (x.denominator.bit_length() - x.numerator.bit_length()) // 2)
+    square = x * scale * scale
+    return (math.isqrt(math.ceil(square)) + 1 if up else math.isqrt(math.floor(square))) / scale
 
 
 class Interval:
     """Holds a real number between two rationals."""
 
     def __init__(self, low: Fraction | int, high: Fraction | int | None = None) -> None:
-        self.low = rounded(low, math.floor)
-        self.high = rounded(low if high is None else high, math.ceil)
+        self.low = rounded(low, up=False)
+        self.high = rounded(low if high is None else high, up=True)
 
     def __add__(self, other: Interval | Fraction | int) -> Interval:
         other = interval(other)
@@ -95,7 +98,7 @@ class Interval:
 
     def root(self) -> Interval:
         """Of a number that is not negative."""
-        return Interval(root(self.low, math.floor), root(self.high, math.ceil))
+        return Interval(root(self.low, up=False), root(self.high, up=True))
 
     def wider(self, by: Fraction) -> Interval:
         return Interval(self.low - by, self.high + by)
@@ -488,11 +491,12 @@ def sentence(document: Any) -> str:
     """What the claims say."""
     claims, ((control, value),) = document["claims"], document["prescribed"].items()
     bounds = [numbers(pair, 2) for pair in claims["loads"]]
-    width = max(high - low for low, high in bounds) / (max(high for _, high in bounds) or 1)
+    largest = max(high for _, high in bounds) or Fraction(1)
+    known = float(min(max(high - low for low, high in bounds) / largest, Fraction(1)))
     alone = "the only one" if claims["scope"] == "global" else "the only one inside its box"
     lines = [
         f"proved: under the {control} {float.fromhex(value)!r} there is a solution, {alone}",
-        f"{counted(claims, 'contact', 'open')}, loads known to {float(min(width, 1)):.0e} of the largest",
+        f"{counted(claims, 'contact', 'open')}, loads known to {known:.0e} of the largest",
     ]
     for entry, claim in zip(document["sheared"], claims["shear"], strict=True):
         low, high = (float.fromhex(end) for end in claim["energy"])

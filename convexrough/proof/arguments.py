@@ -18,11 +18,9 @@ from scipy.spatial.distance import cdist
 from convexrough.arrays import Array
 from convexrough.scene.scene import Scene
 
-#: Boxes end this far, relatively, beyond what a solution can reach, so that none is on a face.
-BEYOND = 1e-6
-
-#: The least radius of a box, in parts of the largest: room for the bounds of a grazing asperity.
-LEAST = 1e-2
+#: How far, relatively, boxes end beyond what a solution can reach, and their least radius in parts
+#: of the largest: room for the bounds. First for radii to all digits, then for rough ones.
+ROOM = ((1e-6, 1e-2), (5e-2, 3e-1))
 
 #: Relative room for rounding in what is computed here.
 ROUNDING = 1e-9
@@ -97,18 +95,24 @@ class Trial:
 
     def arguments(self) -> Iterator[Argument]:
         """The most general first; those that fail already in floating point are left out."""
+        for beyond, least in ROOM:
+            box = self._box(beyond, least)
+            able = box > 0
+            room = np.where(able, self.apart[able].min(axis=0, initial=4 * box.max()) / 2, 0.0)
+            yield from _by_shells(box, room)
+            yield from self._by_cholesky(box)
+            yield from self._local(box, room)
+            yield from self._local(box, self._fitted(room))
+
+    def _box(self, beyond: float, least: float) -> Array:
+        """(n,) [length] radii that hold every solution; 0 where none can touch."""
         R, offsets = self.scene.relative_radii, self.scene.offsets
         deepest = self.ceiling + offsets
         size = np.abs(offsets) + abs(self.ceiling)
-        box = np.sqrt(R * np.maximum(deepest, 0.0)) * (1 + BEYOND)
-        box = np.maximum(box, LEAST * max(box.max(), self.radii.max()))
+        box: Array = np.sqrt(R * np.maximum(deepest, 0.0)) * (1 + beyond)
+        box = np.maximum(box, least * max(box.max(), self.radii.max()))
         box[(deepest < -ROUNDING * size) & (self.radii == 0)] = 0.0
-        able = box > 0
-        room = np.where(able, self.apart[able].min(axis=0, initial=4 * box.max()) / 2, 0.0)
-        yield from _by_shells(box, room)
-        yield from self._by_cholesky(box)
-        yield from self._local(box, room)
-        yield from self._local(box, self._fitted(room))
+        return box
 
     def _by_cholesky(self, box: Array) -> Iterator[Argument]:
         able = np.flatnonzero(box)
