@@ -54,7 +54,7 @@ def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:
     assert "many.toml: asperities of a scene to prove" in refused.err
     assert not (tmp_path / "many-results").exists()
 
-    crowded = HEXAGONAL.replace("0.02\n", "0.5\nwithin = 0.0051")
+    crowded = HEXAGONAL.replace("0.02\n", "50.0\nwithin = 0.0102")
     (tmp_path / "crowded.toml").write_text(scene_text(crowded))
     ran = command("run", "crowded.toml", "--proof", "--no-figures")
     assert ran.status == 3
