@@ -313,22 +313,22 @@ def prove_state(
     everyone = range(len(a))
     if min(a) < 0 or any(a[i] > b[i] for i in everyone):
         raise Refused("a contact radius is negative, or outside the box")
-    loads = [Interval(4 * a[i] ** 3 / (3 * R[i])) for i in everyone]
-    local = [Interval(a[i] ** 2 / R[i]) for i in everyone]
-    pushed, spread = push(scene, box, loads, tell)
+    exact = [4 * a[i] ** 3 / (3 * R[i]) for i in everyone]
+    pushed, spread = push(scene, box, exact, tell)
+    loads, local = [Interval(p) for p in exact], [Interval(a[i] ** 2 / R[i]) for i in everyone]
     if load is not None:  # (4) scaled to the total
         share = load / sum(loads, Interval(0))
         scaling = Interval(1).wider((share - 1).size())
         loads, local, pushed = ([x * scaling for x in xs] for xs in (loads, local, pushed))
 
-    # (5) How far the solution is away in energy, hence in each load (6): so it is inside the box.
+    # (5) How far away the solution is in energy, so in each load (6): it is inside the box.
     trial = [d[i] + approach - pushed[i] for i in everyone]
     gaps = [local[i] - trial[i] for i in everyone]
     off = [gaps[i].size() if a[i] > 0 else max(-gaps[i].low, Fraction(0)) for i in everyone]
     squares = sum((Interval(off[i]) * off[i] * (2 * b[i]) for i in box.able), Interval(0))
     distance = squares.root() / (1 - box.theta)
-    by = [(distance * interval(2 * radius).root()).high for radius in b]
-    if any(loads[i].high + by[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
+    doubt = [(distance * interval(2 * radius).root()).high for radius in b]
+    if any(loads[i].high + doubt[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
         raise Refused("the solution may be outside the box")
 
     # (7) How deep each asperity is pressed: by the approach, less what the others push.
@@ -336,9 +336,9 @@ def prove_state(
     shift = Fraction(0)
     if load is not None:
         known = [
-            (local[i] * by[i] / loads[i] + gaps[i].size() + moved[i]).high
+            (local[i] * doubt[i] / loads[i] + gaps[i].size() + moved[i]).high
             for i in box.able
-            if by[i] < loads[i].low
+            if doubt[i] < loads[i].low
         ]
         if not known:
             raise Refused("no asperity is sure enough to touch to tell the approach")
@@ -348,11 +348,11 @@ def prove_state(
 
 
 def push(
-    scene: Scene, box: Box, loads: list[Interval], tell: Tell
+    scene: Scene, box: Box, loads: list[Fraction], tell: Tell
 ) -> tuple[list[Interval], list[Interval]]:
     """(A P)_i and a bound on sum_j A_ij^2 2 b_j, from sums of integers (1)."""
-    force = max(load.high for load in loads) / 2**GRID or Fraction(1)
-    parts = [math.floor(loads[j].low / force) for j in box.able]
+    force = max(loads) / 2**GRID or Fraction(1)
+    parts = [math.floor(loads[j] / force) for j in box.able]
     weights = [math.ceil(2 * box.radii[j] * scene.grid) for j in box.able]
     pushed, spread = [], []
     for _, apart in distances(scene, box.able, tell):

@@ -9,6 +9,7 @@ import sys
 from copy import deepcopy
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -117,6 +118,107 @@ def test_a_hash_that_was_kept_is_refused(document: Any) -> None:
     document["scene"]["heights"][0] = (1e-30).hex()
     with pytest.raises(Refused, match="sha256"):
         checker.check(document, lambda line: None)
+
+
+def proof_of(scene: cr.Scene, approach: float, **more: Any) -> Any:
+    return json.loads(json.dumps(cr.press(scene, approach=approach).proof(**more).document))
+
+
+def scaled(values: list[str], factor: float) -> list[str]:
+    return [(factor * float.fromhex(text)).hex() for text in values]
+
+
+def refused(document: Any, reason: str, **changes: Any) -> None:
+    """That the checker refuses a proof, changed at the keys named a__b__c, for this reason."""
+    document = deepcopy(document)
+    for keys, value in changes.items():
+        *path, last = (int(key) if key.isdigit() else key for key in keys.split("__"))
+        place = document
+        for key in path:
+            place = place[key]
+        place[last] = value
+    with pytest.raises(Refused, match=reason):
+        checker.check(document, lambda line: None)
+
+
+def test_boxes_and_shells_that_prove_nothing_are_refused(document: Any) -> None:
+    argument, radii = document["argument"], document["pressed"]["radii"]
+    refused(document, "may be outside the box", argument__box__0=radii[0])
+    refused(document, "outside the box", argument__box__0=(0.0).hex())
+    refused(document, "too small for its box", argument__shells=scaled(argument["shells"], 0.9))
+    refused(document, "overlaps another", argument__shells=scaled(argument["shells"], 1.001))
+    refused(document, "convexity number", argument__convexity_number=(1.0).hex())
+    wide = {"argument__box": scaled(argument["box"], 4.0), "argument__shells": None}
+    refused(document, "breaks down", **wide, argument__convexity_number=(0.999).hex())
+    refused(document, "not the one prescribed", pressed__approach=(5.0001e-5).hex())
+
+
+def test_who_could_touch_may_not_be_left_out() -> None:
+    scene, approach = scenes.scattered(1, 6, 0.7, 0.3)
+    document = proof_of(scene, approach)
+    assert document["claims"]["status"][5] == "open"
+    refused(document, "left out", argument__box__5=(0.0).hex())
+
+
+def test_a_local_proof_is_not_a_global_one() -> None:
+    document = proof_of(*scenes.scattered(9, 6, 2.2, 0.1))
+    refused(document, "claimed 'global', proved 'local'", claims__scope="global")
+
+
+def test_each_end_of_each_bound_counts(document: Any) -> None:
+    claims = document["claims"]
+    for key in ("load", "loads__7", "gaps__60"):
+        name, *place = key.split("__")
+        low, high = (
+            float.fromhex(x) for x in (claims[name][int(place[0])] if place else claims[name])
+        )
+        inside = 0.3 * (high - low)
+        for bounds in ((low + inside, high), (low, high - inside), (high, low)):
+            ends = [bound.hex() for bound in bounds]
+            refused(document, "not proved to be within", **{f"claims__{key}": ends})
+
+
+def test_numbers_are_written_one_way_and_nothing_is_left_unread(document: Any) -> None:
+    for text in (
+        "0x1p+1",
+        "0x1.8p-1",
+        " 0x1.0000000000000p+0",
+        "1.0",
+        "nan",
+        "inf",
+        "0x1p99999",
+        None,
+    ):
+        changed = deepcopy(document)
+        changed["pressed"]["radii"][0] = text
+        with pytest.raises(checker.Unreadable, match="not a finite float64"):
+            checker.check(changed, lambda line: None)
+    for where in (document, document["claims"], document["argument"], document["pressed"]):
+        changed = deepcopy(where) | {"note": "believe me"}
+        with pytest.raises(checker.Unreadable, match="expected a table"):
+            checker.table(changed, *where)
+
+
+def test_an_asperity_that_is_dragged_along_is_refused() -> None:
+    """One between six blunt ones loses load as the total rises, so regains some in shear.
+
+    There Ciavarella and Jaeger's difference is no friction state.
+    """
+    six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
+    points = 0.0025 * np.array([[0, 0], *six])
+    ring = cr.Asperities(points, [0.02, *[0.1] * 6], [-1e-5, *[0.0] * 6])
+    contact = cr.press(cr.Scene(1.0, ring, scenes.MATERIAL, friction=0.5), approach=7.6e-5)
+    assert contact.proof().document["claims"]["scope"] == "global"
+    left = cr.press(contact.scene, load=0.99 * contact.load)
+    assert left.loads[0] > contact.loads[0]
+    travel = 0.5 * 1.7 / 1.4
+    state = SimpleNamespace(
+        force=0.01 * 0.5 * contact.load,
+        displacement=travel * (contact.approach - left.approach),
+        stick_radii=left.contact_radii,
+    )
+    with pytest.raises(cr.ProofError, match="dragged along"):
+        contact.proof(sheared=[state])
 
 
 def exact(x: Fraction) -> arb:
