@@ -2,7 +2,7 @@
 
 from convexrough import solvers
 from convexrough.contact import Contact, press
-from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
+from convexrough.errors import ConvexroughError, FileError, InputError, ProofError, SolverError
 from convexrough.normal.certificate import Certificate, certify
 from convexrough.run.scene_file import SceneFile, read_scene
 from convexrough.scene.asperities import Asperities
@@ -32,6 +32,7 @@ __all__ = [
     "InputError",
     "Loop",
     "Material",
+    "ProofError",
     "Scene",
     "SceneFile",
     "ShearCertificate",

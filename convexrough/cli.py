@@ -8,15 +8,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
+from convexrough.errors import ConvexroughError, FileError, InputError, ProofError, SolverError
 from convexrough.version import __version__
 
 if TYPE_CHECKING:
+    from convexrough.proof import Proof
     from convexrough.run.scene_file import UnitNames
     from convexrough.run.summary import Summary
 
@@ -24,6 +26,7 @@ DONE, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 _PATH = click.Path(path_type=Path)
+_proof = click.option("--proof", is_flag=True, help="Write proof.json, for anybody to check.")
 _json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object, no text.")
 
 
@@ -50,8 +53,11 @@ def program() -> None:
 
 @program.command()
 @click.argument("scene", type=_PATH)
+@_proof
 @_output
-def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int:
+def run(
+    scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: bool, proof: bool
+) -> int:
     """Press and shear the scene of a TOML file; write tables, certificate and figures.
 
     Results go to the folder SCENE-results unless --out names another.
@@ -63,6 +69,11 @@ def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: b
     from convexrough.run.summary import summarise
 
     file = read_scene(scene)
+    if proof:
+        from convexrough.proof import refuse_many
+
+        with _blamed_on(scene):
+            refuse_many(file.scene)
     folder = out or Path(f"{scene.stem}-results")
     claim_folder(folder, force=force)
     pressing = f"pressing {len(file.scene):,} asperities"
@@ -75,14 +86,21 @@ def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: b
     summary = summarise(found)
     with _progress("writing results"):
         files = write_results(folder, found, summary, figures=not no_figures, units=file.units)
-    return _say(summary, as_json, _written(folder, files), file.units)
+    status = _say(summary, as_json, _written(folder, files), file.units)
+    if not proof:
+        return status
+    from convexrough.run.proving import prove_findings
+
+    work = partial(prove_findings, found)
+    return _prove(folder / "proof.json", lambda show: work(announce=show), as_json) or status
 
 
 @program.command()
 @click.argument("scene", type=_PATH)
 @click.argument("loads", type=_PATH)
+@_proof
 @_json
-def verify(scene: Path, loads: Path, as_json: bool) -> int:
+def verify(scene: Path, loads: Path, as_json: bool, proof: bool) -> int:
     """Certify loads that came from anywhere.
 
     LOADS is a CSV file with a column load, and x and y unless in the scene's order.
@@ -92,6 +110,9 @@ def verify(scene: Path, loads: Path, as_json: bool) -> int:
     from convexrough.run.summary import certificate_summary
     from convexrough.run.tables import read_loads
 
+    proof_path = Path("proof.json")
+    if proof and proof_path.exists():
+        raise FileError(f"{proof_path}: is there already; nothing is overwritten")
     file = read_scene(scene)
     values = read_loads(loads, file.scene)
     with _progress(f"judging the loads of {len(values)} asperities"):
@@ -100,7 +121,28 @@ def verify(scene: Path, loads: Path, as_json: bool) -> int:
         with _blamed_on(loads):
             certificate = judge(problem, values)
     summary = certificate_summary(certificate, values)
-    return _say(summary, as_json, units=file.units)
+    status = _say(summary, as_json, units=file.units)
+    if not proof:
+        return status
+    from convexrough.proof import prove
+
+    control: Any = {"approach": file.approach, "load": file.load}
+    work = partial(prove, file.scene, values, **control)
+    with _blamed_on(scene):
+        return _prove(proof_path, lambda show: work(announce=show), as_json) or status
+
+
+@program.command()
+@click.argument("proof", type=_PATH)
+def check(proof: Path) -> int:
+    """Check a proof in exact arithmetic, believing nothing in the file.
+
+    Exit status: 0 all that it claims is proved; 1 refused, with the reason; 2 unreadable. The
+    checker is one file that needs Python only: python checker.py PROOF does the same.
+    """
+    from convexrough import checker
+
+    return checker.main([str(proof)])
 
 
 @program.command()
@@ -230,6 +272,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for line in str(error).splitlines():
             _say_aside("error", line)
         return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
+
+
+def _prove(path: Path, work: Callable[[Callable[[str], object]], Proof], as_json: bool) -> int:
+    """Write a proof; NOT_CERTIFIED where there is none."""
+    try:
+        with _progress("proving") as show:
+            proof = work(lambda news: show(f"proving: {news}"))
+    except ProofError as error:
+        _say_aside("warning", str(error))
+        return NOT_CERTIFIED
+    proof.save(path)
+    click.echo(f"{proof.proved}\nwritten  {path}", err=as_json)
+    return DONE
 
 
 def _written(folder: Path, files: Sequence[Path]) -> list[str]:

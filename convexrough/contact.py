@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +22,9 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton, Solution, Solver
 from convexrough.sphere import hertz
 
+if TYPE_CHECKING:
+    from convexrough.proof import Proof, Sheared
+
 
 @dataclass(frozen=True, eq=False)
 class Contact(Keeper):
@@ -28,6 +33,7 @@ class Contact(Keeper):
     loads         : [force]
     contact_radii : [length]
     approach      : D0 [length];  load : total [force]
+    prescribed_load : [force] None where the approach was prescribed
     certificate   : what is proved of the loads, whatever the solver said
     model_error   : largest relative error of the indentations from treating each asperity's
         pressure as a point force, to leading order: max sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i
@@ -50,6 +56,7 @@ class Contact(Keeper):
     solver: str
     iterations: int
     seconds: float
+    prescribed_load: float | None = None
 
     @property
     def gaps(self) -> Array:
@@ -60,6 +67,27 @@ class Contact(Keeper):
     def status(self) -> NDArray[np.str_]:
         """(n,) "contact", "open" or "undecided"; each of the first two is proved."""
         return self.certificate.status
+
+    def proof(self, *, sheared: Sequence[Sheared] = (), announce: Announce | None = None) -> Proof:
+        """A proof that `convexrough check` and anybody's checker can judge: `.save(path)` it.
+
+        sheared : friction states of this contact to prove, too, with the loss of their cycles
+        announce : told in a line how far long work has come
+
+        Raises InputError for scenes too large for exact arithmetic, ProofError where nothing is
+        proved.
+        """
+        from convexrough.proof import prove  # it reads and writes: only when asked
+
+        by_load = self.prescribed_load is not None
+        return prove(
+            self.scene,
+            self.loads,
+            approach=None if by_load else self.approach,
+            load=self.prescribed_load,
+            sheared=sheared,
+            announce=announce,
+        )
 
 
 def press(
@@ -128,6 +156,7 @@ def solve(
         solver=solver.name,
         iterations=solution.iterations,
         seconds=time.perf_counter() - began,
+        prescribed_load=None if problem.load is None else problem.load * force,
     )
 
 

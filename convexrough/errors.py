@@ -70,3 +70,7 @@ class SolverError(ConvexroughError):
         self.what, self.solver, self.advice, self.iterate = what, solver, advice, iterate
         place = f"{solver}: " if solver else ""
         super().__init__(place + what + (f"; {advice}" if advice else ""))
+
+
+class ProofError(ConvexroughError):
+    """Nothing could be proved; the message says why."""
