@@ -4,32 +4,27 @@ Loads from anywhere make three claims: these asperities touch (load > floor), th
 these are the loads. `certify` judges how near the loads are to the solution and what that proves of
 the solution; here the claimed set itself is held against the proved words. Where the loads are too
 far off for every word to follow from them alone, Newton's method goes on from them to a solution
-nearby, and what is proved of that one names the asperities that are wrong.
+nearby, and what is proved of that one names the asperities that are wrong. `shearing.verdict` does
+the same for shear forces.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.contact import Contact, press
+from convexrough.contact import Contact, solve
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.coupling import Kind
-from convexrough.normal.certificate import Certificate, certify
+from convexrough.normal.certificate import Certificate, judge
+from convexrough.normal.claims import beyond, standing_out, total_agrees
+from convexrough.normal.problem import NormalProblem
 from convexrough.scene.scene import Scene
-
-#: How far the sum of the loads may be off a prescribed total, relatively, unless `within` says so.
-TOTAL_WITHIN = 1e-6
-
-#: A suspect is off by at least this part of what the worst one is off by.
-SUSPICIOUS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +101,12 @@ class Verdict:
     @property
     def loads_hold(self) -> bool:
         """Every load is proved near enough."""
-        return self.certificate.holds if self.within is None else self.load_error <= self.within
+        return self.certificate.holds if self.within is None else not len(self.loads_off)
+
+    @cached_property
+    def loads_off(self) -> Indices:
+        """(m,) not proved to be `within`, furthest first; none where that is None."""
+        return beyond(self.load_errors, self.within, float(self.loads.max()))
 
     @property
     def total_given(self) -> float:
@@ -118,8 +118,7 @@ class Verdict:
         """The loads add up to a prescribed total, within `within` of it or else 1e-6."""
         if self.total_prescribed is None:
             return True
-        missing = abs(self.total_given - self.total_prescribed)
-        return missing <= (self.within or TOTAL_WITHIN) * self.total_prescribed
+        return total_agrees(self.total_given, self.total_prescribed, self.within)
 
     @cached_property
     def suspects(self) -> Indices:
@@ -132,14 +131,12 @@ class Verdict:
         wrong = np.concatenate((self.wrongly_open, self.wrongly_loaded))
         if self.solution is None or (self.loads_hold and not len(wrong)):
             return frozen(wrong[np.argsort(-self.load_errors[wrong], kind="stable")])
-        true, bounds = self.solution.loads, self.solution.certificate.load_errors
         scales = [1.0]
         if (total := self.total_given) > 0:
             scales.append(self.solution.load / total)
+        true = self.solution.loads
         apart = min((np.abs(scale * self.loads - true) for scale in scales), key=np.sum)
-        least = np.maximum(np.where(np.isfinite(bounds), bounds, 0.0), SUSPICIOUS * apart.max())
-        order = np.argsort(-apart, kind="stable")
-        return frozen(order[(apart > least)[order]])
+        return standing_out(apart, self.solution.certificate.load_errors)
 
 
 def verify(
@@ -163,19 +160,34 @@ def verify(
 
     Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.
     """
+    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
+    return verify_on(problem, loads, within=within, floor=floor)
+
+
+def verify_on(
+    problem: NormalProblem,
+    loads: ArrayLike,
+    *,
+    within: float | None = None,
+    floor: float = 0.0,
+) -> Verdict:
+    """`verify` for a problem already assembled; its arguments are as there."""
     floor = checks.non_negative("floor", floor)
     within = None if within is None else checks.positive("within", within)
-    given = checks.array("loads", loads, length=len(scene))
+    given = checks.array("loads", loads, length=len(problem.scene))
     if (given < -floor).any():
         first = int(np.argmax(given < -floor))
         expected = "a load that is not negative; a floor lets noise up to its size count as 0"
         raise InputError(f"loads[{first}]", found=given[first], expected=expected)
-    prescribed: Any = {"approach": approach, "load": load, "influence": influence}
     claimed = np.where(given > floor, given, 0.0)
-    certificate = certify(scene, claimed, **prescribed)
-    verdict = Verdict(scene, given, floor, within, load, certificate)
+    total = None if problem.load is None else problem.load * problem.units.force
+    certificate = judge(problem, claimed)
+    verdict = Verdict(problem.scene, given, floor, within, total, certificate)
     if verdict.holds:
         return verdict
-    with suppress(SolverError):  # without a solution nearby only the loads' own certificate speaks
-        return replace(verdict, solution=press(scene, start=claimed, **prescribed))
-    return verdict
+    for start in (claimed, None):  # from loads that are far off, it may not arrive
+        try:
+            return replace(verdict, solution=solve(problem, start=start))
+        except SolverError:
+            continue
+    return verdict  # of which only the loads' own certificate speaks

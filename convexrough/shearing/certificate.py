@@ -118,13 +118,16 @@ def _judged(problem: TangentialProblem, given: Array, totals: Array) -> Bounds:
     def least(errors: Array, apart: Array) -> Array:
         return np.asarray((errors + apart * (1 + SAFETY)).min(axis=0, keepdims=True))
 
+    def either(proved: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        return np.asarray(proved.any(axis=0, keepdims=True))
+
     return Bounds(
-        proved=bounds.proved.any(axis=0, keepdims=True),
+        proved=either(bounds.proved),
         increments=least(bounds.increments, apart),
         slips=least(bounds.slips, np.abs(states.slips - states.slips[0])),
         rises=least(bounds.rises, np.abs(states.rises - states.rises[0])),
-        sliding=bounds.sliding.any(axis=0, keepdims=True),
-        partial=bounds.partial.any(axis=0, keepdims=True),
+        sliding=either(bounds.sliding),
+        partial=either(bounds.partial),
     )
 
 
