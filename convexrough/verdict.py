@@ -22,13 +22,13 @@ from convexrough.contact import Contact, solve
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.coupling import Kind
 from convexrough.normal.certificate import Certificate, judge
-from convexrough.normal.claims import beyond, standing_out, total_agrees
+from convexrough.normal.claims import Claim
 from convexrough.normal.problem import NormalProblem
 from convexrough.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class Verdict(Claim):
     """What is proved of a claim. Indices and arrays are those of the scene's asperities.
 
     loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"
@@ -49,10 +49,9 @@ class Verdict:
     solution: Contact | None = None
 
     @property
-    def holds(self) -> bool:
-        """The claimed set is proved right, every load is within, and the total agrees."""
-        wrong = len(self.wrongly_open) + len(self.wrongly_loaded) + len(self.undecided)
-        return not wrong and self.loads_hold and self.total_holds
+    def values(self) -> Array:
+        """(n,) [force] the loads."""
+        return self.loads
 
     @cached_property
     def claimed(self) -> NDArray[np.bool_]:
@@ -77,66 +76,32 @@ class Verdict:
         """(m,) claimed to touch, and proved to be open."""
         return frozen(np.flatnonzero(self.claimed & (self.status == "open")))
 
-    @cached_property
-    def undecided(self) -> Indices:
-        """(m,) proved neither to touch nor to be open."""
-        return frozen(np.flatnonzero(self.status == "undecided"))
+    @property
+    def wrong(self) -> dict[str, Indices]:
+        """The claimed set where it is wrong."""
+        return {
+            "claimed open, proved to touch": self.wrongly_open,
+            "claimed to touch, proved open": self.wrongly_loaded,
+        }
+
+    @property
+    def decided_alone(self) -> bool:
+        """Every word follows from the loads alone."""
+        return self.certificate.holds
 
     @cached_property
-    def load_errors(self) -> Array:
+    def errors(self) -> Array:
         """(n,) [force] proved bounds on |load - solution|; infinite where nothing is proved."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
         errors = self.certificate.load_errors + ignored
-        if self.solution is not None:
-            apart = np.abs(self.loads - self.solution.loads)
-            errors = np.minimum(errors, apart + self.solution.certificate.load_errors)
+        if (nearby := self.nearby()) is not None:
+            errors = np.minimum(errors, np.abs(self.loads - nearby[0]) + nearby[1])
         return frozen(errors)
 
-    @property
-    def load_error(self) -> float:
-        """The largest of `load_errors`, in parts of the largest load."""
-        largest = float(self.loads.max())
-        return float(self.load_errors.max()) / largest if largest > 0 else np.inf
-
-    @property
-    def loads_hold(self) -> bool:
-        """Every load is proved near enough."""
-        return self.certificate.holds if self.within is None else not len(self.loads_off)
-
-    @cached_property
-    def loads_off(self) -> Indices:
-        """(m,) not proved to be `within`, furthest first; none where that is None."""
-        return beyond(self.load_errors, self.within, float(self.loads.max()))
-
-    @property
-    def total_given(self) -> float:
-        """[force] the sum of the loads."""
-        return float(self.loads.sum())
-
-    @property
-    def total_holds(self) -> bool:
-        """The loads add up to a prescribed total, within `within` of it or else 1e-6."""
-        if self.total_prescribed is None:
-            return True
-        return total_agrees(self.total_given, self.total_prescribed, self.within)
-
-    @cached_property
-    def suspects(self) -> Indices:
-        """(m,) whose loads are furthest from the solution, likeliest first; none if all hold.
-
-        A single load that is missing, spurious or wrong is the first; two that were exchanged are
-        the first two. Loads that do not add up to the solution's total are also tried in the unit
-        in which they do.
-        """
-        wrong = np.concatenate((self.wrongly_open, self.wrongly_loaded))
-        if self.solution is None or (self.loads_hold and not len(wrong)):
-            return frozen(wrong[np.argsort(-self.load_errors[wrong], kind="stable")])
-        scales = [1.0]
-        if (total := self.total_given) > 0:
-            scales.append(self.solution.load / total)
-        true = self.solution.loads
-        apart = min((np.abs(scale * self.loads - true) for scale in scales), key=np.sum)
-        return standing_out(apart, self.solution.certificate.load_errors)
+    def nearby(self) -> tuple[Array, Array] | None:
+        """The solution's loads and bounds."""
+        found = self.solution
+        return None if found is None else (found.loads, found.certificate.load_errors)
 
 
 def verify(

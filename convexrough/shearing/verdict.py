@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
-from convexrough.normal.claims import beyond, standing_out, total_agrees
+from convexrough.normal.claims import Claim
 from convexrough.shearing.certificate import ShearCertificate, certify_shear
 from convexrough.shearing.state import ShearState, shear
 
@@ -20,10 +20,11 @@ CLAIMS_SLIDING = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class ShearVerdict:
+class ShearVerdict(Claim):
     """What is proved of shear forces of first loading. Arrays are those of the scene's asperities.
 
-    contact : pressed;  force : [force] that is prescribed;  forces : (n,) [force] as given
+    contact : pressed;  forces : (n,) [force] as given
+    total_prescribed : [force] the shear force Q that they carry
     claimed : (n,) who is claimed to slide
     within  : forces must be proved this near, in parts of the largest; None: near enough for every
         word to follow from the forces alone
@@ -32,18 +33,17 @@ class ShearVerdict:
     """
 
     contact: Contact
-    force: float
     forces: Array
+    total_prescribed: float | None
     claimed: NDArray[np.bool_]
     within: float | None
     certificate: ShearCertificate
     solution: ShearState | None = None
 
     @property
-    def holds(self) -> bool:
-        """Everybody is proved to slide or not, as claimed; forces are within, the total agrees."""
-        wrong = len(self.wrongly_sliding) + len(self.wrongly_sticking) + len(self.undecided)
-        return not wrong and self.forces_hold and self.total_holds
+    def values(self) -> Array:
+        """(n,) [force] the shear forces."""
+        return self.forces
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
@@ -63,54 +63,31 @@ class ShearVerdict:
         """(m,) not claimed to slide, and proved to."""
         return frozen(np.flatnonzero(~self.claimed & (self.status == "sliding")))
 
-    @cached_property
-    def undecided(self) -> Indices:
-        """(m,) proved neither to slide nor not to."""
-        return frozen(np.flatnonzero(self.status == "undecided"))
+    @property
+    def wrong(self) -> dict[str, Indices]:
+        """The claims of sliding and sticking where they are wrong."""
+        return {
+            "claimed to slide, proved not to": self.wrongly_sliding,
+            "claimed to stick, proved to slide": self.wrongly_sticking,
+        }
+
+    @property
+    def decided_alone(self) -> bool:
+        """Every word follows from the forces alone."""
+        return self.certificate.holds
 
     @cached_property
-    def force_errors(self) -> Array:
+    def errors(self) -> Array:
         """(n,) [force] proved bounds on |force - solution|; infinite where nothing is proved."""
         errors = self.certificate.force_errors
-        if self.solution is not None:
-            apart = np.abs(self.forces - self.solution.forces)
-            errors = np.minimum(errors, apart + self.solution.certificate.force_errors)
+        if (nearby := self.nearby()) is not None:
+            errors = np.minimum(errors, np.abs(self.forces - nearby[0]) + nearby[1])
         return frozen(errors)
 
-    @property
-    def force_error(self) -> float:
-        """The largest of `force_errors`, in parts of the largest force."""
-        largest = float(np.abs(self.forces).max())
-        return float(self.force_errors.max()) / largest if largest > 0 else np.inf
-
-    @property
-    def forces_hold(self) -> bool:
-        """Every force is proved near enough."""
-        return self.certificate.holds if self.within is None else not len(self.forces_off)
-
-    @cached_property
-    def forces_off(self) -> Indices:
-        """(m,) not proved to be `within`, furthest first; none where that is None."""
-        return beyond(self.force_errors, self.within, float(np.abs(self.forces).max()))
-
-    @property
-    def total_given(self) -> float:
-        """[force] the sum of the forces."""
-        return float(self.forces.sum())
-
-    @property
-    def total_holds(self) -> bool:
-        """The forces add up to the shear force, within `within` of it or else 1e-6."""
-        return total_agrees(self.total_given, self.force, self.within)
-
-    @cached_property
-    def suspects(self) -> Indices:
-        """(m,) whose forces are furthest from the solution, likeliest first; none if all hold."""
-        wrong = np.concatenate((self.wrongly_sliding, self.wrongly_sticking))
-        if self.solution is None or (self.forces_hold and not len(wrong)):
-            return frozen(wrong)
-        apart = np.abs(self.forces - self.solution.forces)
-        return standing_out(apart, self.solution.certificate.force_errors)
+    def nearby(self) -> tuple[Array, Array] | None:
+        """The solution's forces and bounds."""
+        found = self.solution
+        return None if found is None else (found.forces, found.certificate.force_errors)
 
 
 def verify_shear(
@@ -138,5 +115,5 @@ def verify_shear(
         limits = checks.friction(contact.scene.friction) * contact.loads
         sliding = (limits > 0) & (np.abs(given) >= (1.0 - CLAIMS_SLIDING) * limits)
     claimed = frozen(np.array(np.broadcast_to(sliding, given.shape), dtype=bool))
-    verdict = ShearVerdict(contact, float(force), given, claimed, within, certificate)
+    verdict = ShearVerdict(contact, given, float(force), claimed, within, certificate)
     return verdict if verdict.holds else replace(verdict, solution=shear(contact, force=force))
