@@ -88,12 +88,12 @@ def verify(scene: Path, loads: Path, as_json: bool) -> int:
     LOADS is a CSV file with a column load, and x and y unless in the scene's order.
     """
     from convexrough.normal.certificate import judge
+    from convexrough.run.claims import read_loads
     from convexrough.run.scene_file import read_scene
     from convexrough.run.summary import certificate_summary
-    from convexrough.run.tables import read_loads
 
     file = read_scene(scene)
-    values = read_loads(loads, file.scene)
+    values = read_loads(loads, file.scene).values
     with _progress(f"judging the loads of {len(values)} asperities"):
         with _blamed_on(scene):
             problem = file.problem()

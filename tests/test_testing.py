@@ -75,8 +75,7 @@ def test_an_asperity_left_out(contact: cr.Contact, index: int) -> None:
 
 def test_a_spurious_load(contact: cr.Contact) -> None:
     loads = np.array(contact.loads)
-    loads[50] = 1e-9 * loads.max()  # far too little for the words of the others to change
-    assert cr.certify(paper(), loads, approach=PAPER_APPROACH).holds
+    loads[50] = 1e-9 * loads.max()
     message = failure(assert_certified, paper(), loads, approach=PAPER_APPROACH)
     assert message.startswith("1 claimed to touch, proved open: 50 at (")
     assert_certified(paper(), loads, approach=PAPER_APPROACH, floor=1e-8 * loads.max())
