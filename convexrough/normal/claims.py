@@ -110,7 +110,7 @@ class Claim(ABC):
 
     @cached_property
     def suspects(self) -> Indices:
-        """(m,) whose forces are furthest from the solution, likeliest first; none if all hold.
+        """(m,) wrongly claimed, or whose forces are far from the solution; likeliest first.
 
         A single force that is missing, spurious or wrong is the first; two that were exchanged are
         the first two. Forces that do not add up to the solution's total are also tried in the unit
@@ -126,4 +126,6 @@ class Claim(ABC):
         apart = min((np.abs(scale * self.values - true) for scale in scales), key=np.sum)
         least = np.maximum(np.where(np.isfinite(bounds), bounds, 0.0), SUSPICIOUS * apart.max())
         order = np.argsort(-apart, kind="stable")
-        return frozen(order[(apart > least)[order]])
+        stand_out = apart > least
+        stand_out[wrong] = True
+        return frozen(order[stand_out[order]])
