@@ -8,7 +8,7 @@ from convexrough.run.scene_file import SceneFile, read_scene
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
-from convexrough.shearing.certificate import ShearCertificate
+from convexrough.shearing.certificate import ShearCertificate, certify_shear
 from convexrough.shearing.cycle import Cycle, Loop, cycle, cycles
 from convexrough.shearing.history import History, history
 from convexrough.shearing.state import ShearState, onset_of_sliding, shear
@@ -43,6 +43,7 @@ __all__ = [
     "Verdict",
     "__version__",
     "certify",
+    "certify_shear",
     "cycle",
     "cycles",
     "history",

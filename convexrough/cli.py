@@ -42,6 +42,25 @@ def _output(command: Command) -> Command:
     return command
 
 
+def _claim_options(command: Command) -> Command:
+    """What `verify` is asked, and how it reads files."""
+    part = "Loads must be proved to this part of the largest."
+    floor = "A load up to X claims that its asperity is open."
+    apart = "How far positions may be off; default 1 % of the least spacing."
+    called = "The column of load, x, y, force or status: its header, or its number from 1."
+    for option in (
+        click.option("--out", metavar="DIR", type=_PATH, help="New folder: table, JSON, figure."),
+        click.option("--force", metavar="Q", type=float, help="The shear force they carry."),
+        click.option("--shear", metavar="FORCES", type=_PATH, help="A file of shear forces, too."),
+        click.option("--column", metavar="NAME=COLUMN", multiple=True, help=called),
+        click.option("--tolerance", metavar="X", type=float, help=apart),
+        click.option("--floor", metavar="X", type=float, default=0.0, help=floor),
+        click.option("--within", metavar="PART", type=float, help=part),
+    ):
+        command = option(command)
+    return command
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="convexrough")
 def program() -> None:
@@ -98,38 +117,68 @@ def run(
 @program.command()
 @click.argument("scene", type=_PATH)
 @click.argument("loads", type=_PATH)
+@_claim_options
 @_proof
 @_json
-def verify(scene: Path, loads: Path, as_json: bool, proof: bool) -> int:
-    """Certify loads that came from anywhere.
+def verify(
+    scene: Path, loads: Path, out: Path | None, as_json: bool, proof: bool, **options: Any
+) -> int:
+    """Hold loads that came from anywhere against what is proved.
 
-    LOADS is a CSV file with a column load, and x and y unless in the scene's order.
+    LOADS is a file of numbers with a column load, and x and y unless in the scene's order: CSV and
+    its kin, .npy, .npz or Parquet. It claims that asperities with a load touch, and no others.
+
+    Exit status: 0 only if the claimed set is proved right, every load is near enough and a
+    prescribed total agrees, and the like of shear forces; 2 wrong input; 3 otherwise; 4 no shear
+    state was found to compare with.
     """
-    from convexrough.normal.certificate import judge
+    from convexrough.run import verdict_report
+    from convexrough.run.report import describe
+    from convexrough.run.results import claim_folder
     from convexrough.run.scene_file import read_scene
-    from convexrough.run.summary import certificate_summary
-    from convexrough.run.tables import read_loads
+    from convexrough.run.summary import to_json
+    from convexrough.run.verification import Question, named_columns, verify_files
 
-    proof_path = Path("proof.json")
-    if proof and proof_path.exists():
-        raise FileError(f"{proof_path}: is there already; nothing is overwritten")
+    if (options["shear"] is None) != (options["force"] is None):
+        raise click.UsageError("--shear and --force go together.")
+    target = (out or Path()) / "proof.json"
+    if proof and target.exists():
+        raise FileError(f"{target}: is there already; nothing is overwritten")
+    question = Question(columns=named_columns(options.pop("column")), **options)
     file = read_scene(scene)
-    values = read_loads(loads, file.scene)
-    with _progress(f"judging the loads of {len(values)} asperities"):
-        with _blamed_on(scene):
-            problem = file.problem()
-        with _blamed_on(loads):
-            certificate = judge(problem, values)
-    summary = certificate_summary(certificate, values)
-    status = _say(summary, as_json, units=file.units)
+    if out is not None:
+        if out.is_dir() and any(out.iterdir()):
+            raise FileError(f"{out}: not empty; --out takes another")
+        claim_folder(out, force=False)
+    with _progress(f"judging the loads of {len(file.scene):,} asperities"):
+        found = verify_files(file, loads, question)
+    summary = verdict_report.verdict_summary(found)
+    length, force = file.units
+    lines = verdict_report.describe_verdict(found, file.units)
+    lines += ["", "the loads as given", *describe(summary, length_unit=length, force_unit=force)]
+    if out is not None:
+        with _progress("writing results"):
+            files = verdict_report.write_verdict(out, summary, found, file.units)
+        lines += _written(out, files)
+    click.echo(to_json(summary) if as_json else "\n".join(lines))
+    for hint in verdict_report.hints(found, file.units):
+        _say_aside("hint", hint)
+    if not found.holds:
+        _say_aside("warning", f"not certified: {verdict_report.reason(found)}")
+    status = DONE if found.holds else NOT_CERTIFIED
     if not proof:
         return status
     from convexrough.proof import prove
 
+    verdict = found.verdict
+    claimed = [
+        load if touches else 0.0
+        for load, touches in zip(verdict.loads, verdict.claimed, strict=True)
+    ]
     control: Any = {"approach": file.approach, "load": file.load}
-    work = partial(prove, file.scene, values, **control)
+    work = partial(prove, file.scene, claimed, **control)
     with _blamed_on(scene):
-        return _prove(proof_path, lambda show: work(announce=show), as_json) or status
+        return _prove(target, lambda show: work(announce=show), as_json) or status
 
 
 @program.command()

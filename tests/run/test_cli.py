@@ -388,7 +388,7 @@ LATTICE = 'pattern = "hexagonal"\nspacing = {}\ntip_radius = {}'
         (scene_text(LATTICE.format(1e-9, 1)), "spacing: found 3.63e+14 asperities"),
         (
             scene_text(
-                LATTICE.format(0.0025, 1), "approach = 1.0", more='[solver]\ninfluence = "dense"'
+                LATTICE.format(0.0025, 1), "approach = 0.1", more='[solver]\ninfluence = "dense"'
             ),
             "asperities that could touch",
         ),

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, KINDS, NAMES, exact, off, pressed
+from friction_scenes import FRICTION, KINDS, NAMES, exact, in_doubt, off, pressed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import MATERIAL, PAPER_APPROACH
@@ -54,21 +54,6 @@ def test_attacks_on_the_words(
     assert not (bounds.partial & truly_sliding).any()
     assert (np.abs(u - good.increments) <= bounds.increments * (1 + 1e-9)).all()
     assert (np.abs(wrong.rises - good.rises) <= bounds.rises * (1 + 1e-9)).all()
-
-
-def in_doubt(contact: cr.Contact, digits: int, control: str) -> cr.Contact:
-    """The contact with rounded loads, and the certificate of those."""
-    rounded = np.array([float(f"{load:.{digits - 1}e}") for load in contact.loads])
-    # Not symmetric: every other load is off the other way.
-    rounded[1::2] += 10.0 ** (-digits) * rounded[1::2]
-    given: Any = {control: getattr(contact, control)}
-    return replace(
-        contact,
-        loads=rounded,
-        load=float(rounded.sum()),
-        contact_radii=hertz.contact_radius(rounded, 1.0, contact.scene.relative_radii),
-        certificate=cr.certify(contact.scene, rounded, **given, influence=contact.influence),
-    )
 
 
 @pytest.mark.parametrize("digits", [3, 5, 8, 12])
