@@ -111,8 +111,8 @@ assert period > 1
 # .. math:: F(\delta) = \delta + A P(\delta) - D = 0 .
 #
 # It is once differentiable, so Newton's method applies, and the active set is the sign of the
-# answer. Where the energy is convex the step goes downhill (:doc:`03_why_cvxpy_refuses`); halve it
-# until the residual falls.
+# answer. A step that does not make the residual smaller is halved. (Where the energy is convex,
+# :doc:`03_why_cvxpy_refuses`, the linear system of a step always has an answer.)
 
 
 def normal_map(k: Array, A: Array, D: Array) -> tuple[Array, int]:
