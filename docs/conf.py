@@ -25,6 +25,8 @@ html_theme = "furo"
 html_title = "convexrough"
 html_show_copyright = False
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 
 # Pages
 
@@ -37,6 +39,7 @@ myst_dmath_double_inline = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {"Array": "Array", "ArrayLike": "ArrayLike", "Kind": "Kind"}
 python_maximum_signature_line_length = 80
 
 # Course

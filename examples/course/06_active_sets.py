@@ -111,8 +111,8 @@ assert period > 1
 # .. math:: F(\delta) = \delta + A P(\delta) - D = 0 .
 #
 # It is once differentiable, so Newton's method applies, and the active set is the sign of the
-# answer. Where the energy is convex the step goes downhill (:doc:`03_why_cvxpy_refuses`); halve it
-# until the residual falls.
+# answer. A step that does not make the residual smaller is halved. (Where the energy is convex,
+# :doc:`03_why_cvxpy_refuses`, the linear system of a step always has an answer.)
 
 
 def normal_map(k: Array, A: Array, D: Array) -> tuple[Array, int]:
@@ -150,7 +150,7 @@ right.set(aspect="equal", xlim=(-0.0025, 0.0025), ylim=(-0.0025, 0.0025))
 for number, (point, a) in enumerate(zip(points, contact.contact_radii, strict=True), start=1):
     right.add_patch(Circle(tuple(point), max(a, 2e-5), color="0.3" if a > 0 else "0.8"))
     inside = a > 5e-4
-    place = point if inside else (point[0], point[1] + 4e-4)
+    place = point if inside else (point[0] + 4e-4, point[1])
     look = dict(color="white" if inside else "black", ha="center", va="center")
     right.annotate(str(number), place, **look)
 right.set(xlabel="x / R [1]", ylabel="y / R [1]")
