@@ -1,6 +1,7 @@
 """Honest proofs: accepted, true by the 50-digit reference, and not weaker than the certificate."""
 
 import json
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -88,6 +89,31 @@ def test_loads_from_anywhere() -> None:
         claims = judged(prove(scene, near, approach=approach))
         assert max(map(width, claims["loads"])) > off * loads.max()
         claims = judged(prove(scene, near, load=float(loads.sum())))
+
+
+def test_loads_of_another_total_are_scaled() -> None:
+    scene = cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), scenes.MATERIAL)
+    low, high = judged(prove(scene, [1.001e-8], load=1e-8))["loads"][0]
+    assert float.fromhex(low) <= 1e-8 <= float.fromhex(high)
+
+
+def test_a_dropped_asperity_is_not_proved_open() -> None:
+    scene, approach = scenes.scattered(2, 6, 0.6, 0.0)
+    loads = cr.press(scene, approach=approach).loads.copy()
+    for dropped in range(6):
+        given = np.where(np.arange(6) == dropped, 0.0, loads)
+        with suppress(cr.ProofError):  # or nothing is proved
+            judged(prove(scene, given, approach=approach))
+
+
+def test_the_bound_holds_where_the_energy_is_flattest() -> None:
+    """Two equal contacts, as near to the end of convexity as is provable, off in opposite ways."""
+    a, apart = 0.75 * np.pi / 2, 1.0
+    scene = cr.Scene(1e30, cr.Asperities([[0, 0], [apart, 0]], 1e3), scenes.MATERIAL)
+    approach = a**2 / 1e3 * (1 + 4 * a / (3 * np.pi * apart))
+    loads = cr.press(scene, approach=approach).loads
+    claims = judged(prove(scene, loads * [1 + 1e-6, 1 - 1e-6], approach=approach))
+    assert claims["scope"] == "global"
 
 
 def test_nothing_touches() -> None:
