@@ -16,6 +16,7 @@ from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
 from convexrough.run.stages import Stages
 from convexrough.run.tables import read_summits, read_text
+from convexrough.run.toml_slips import explained
 from convexrough.scene.asperities import Asperities, largest_tip_radius
 from convexrough.scene.material import Material
 from convexrough.scene.patterns import CUT_DEVIATIONS
@@ -93,10 +94,11 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
 
 
 def _parse(path: Path) -> dict[str, object]:
+    text = read_text(path)
     try:
-        contents = tomllib.loads(read_text(path))
+        contents = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError: also a number of 5000 digits
-        raise FileError(f"{path}: not a TOML file: {error}") from error
+        raise FileError(explained(path, text, error)) from error
     if not contents:
         raise FileError(f"{path}: empty; `convexrough new` writes a scene to start from")
     return contents

@@ -116,7 +116,7 @@ def hints(verified: Verified, units: UnitNames) -> list[str]:
         part = f"{noise:.2g}, {noise / verdict.largest:.1g} of the largest"
         advice = f"--floor {rounded_up(noise)} counts them as open"
         found.append(
-            f"loads of asperities proved open ({len(small):,}) are at most {part}: {advice}"
+            f"{len(small):,} of the loads, on asperities proved open, are at most {part}: {advice}"
         )
     expected = verdict.total_prescribed
     if expected is None and verdict.solution is not None:

@@ -127,7 +127,9 @@ def _claims(path: Path | None, status: NDArray[np.str_] | None) -> NDArray[np.bo
     said = np.char.lower(np.char.strip(status))
     if len(unknown := np.unique(said[~np.isin(said, list(WORDS))])):
         valid = ", ".join(WORDS)
-        mistakes = [f"column status: found {each!r}, expected {valid}" for each in unknown[:10]]
+        mistakes = [
+            f"column status: found {str(each)!r}, expected {valid}" for each in unknown[:10]
+        ]
         raise TableError(str(path), mistakes)
     if (said == "undecided").any():
         return None
