@@ -23,11 +23,8 @@ from convexrough.convex.definite import proved_margin
 from convexrough.normal.judgement import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.judgement import LIMIT_ROUNDOFFS, Bounds, own_change
-from convexrough.shearing.load_errors import LoadErrors
+from convexrough.shearing.load_errors import MARGINS, LoadErrors
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
-
-#: Margins of convexity tried, the best first.
-MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 
 
 def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) -> Bounds:

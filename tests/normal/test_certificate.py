@@ -26,7 +26,7 @@ from scenes import (
 import convexrough as cr
 from convexrough.influence.coupling import Influence, Kind, Rounding
 from convexrough.normal.certificate import judge
-from convexrough.normal.judgement import _convex_margin, _find_box
+from convexrough.normal.judgement import MARGINS, _find_box, convex_margin
 from convexrough.normal.problem import NormalProblem
 
 Array = NDArray[np.float64]
@@ -285,7 +285,7 @@ def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     problem = NormalProblem.assemble(scene, approach=1e-4)
     h = problem.stiffness(problem.bounds(problem.ceiling) * size)
     hessian = problem.influence.matrix / np.sqrt(h) / np.sqrt(h)[:, None] + np.eye(12)
-    margin = _convex_margin(problem.influence, h)
+    margin = convex_margin(problem.influence, h, MARGINS)
     smallest = np.linalg.eigvalsh(hessian)[0]
     assert margin <= max(smallest, 0.0)
     assert margin > 0 or smallest < 1.1e-3

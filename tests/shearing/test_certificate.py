@@ -8,7 +8,7 @@ import pytest
 from friction_scenes import FRICTION, KINDS, NAMES, exact, off, pressed
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import MATERIAL, PAPER_APPROACH, solve_exactly
+from scenes import MATERIAL, PAPER_APPROACH, scattered, solve_exactly
 
 import convexrough as cr
 from convexrough.shearing.judgement import judge_states
@@ -233,6 +233,28 @@ def test_at_the_limit_with_one_that_may_not_touch() -> None:
     assert contact.status[3] == "undecided"
     state = cr.shear(contact, force=FRICTION * contact.load)
     assert state.status.tolist() == ["undecided", "sliding", "sliding", "undecided"]
+
+
+@pytest.mark.parametrize("seed", [0, 2, 6])
+@pytest.mark.parametrize("fraction", [1e-9, 0.3, 0.7])
+def test_a_crowded_contact_proved_by_cholesky(fraction: float, seed: int) -> None:
+    """No shells prove its convexity; what proved the contact proves its friction."""
+    scene, approach = scattered(seed, 8, 2.0, 0.1)
+    contact = cr.press(replace(scene, friction=FRICTION), approach=approach, influence="dense")
+    assert contact.crowding > 1
+    assert contact.certificate.scope == "global"
+    assert contact.certificate.convexity_number in (0.9, 0.999)
+    state = cr.shear(contact, force=fraction * FRICTION * contact.load)
+    assert state.certificate.holds
+    truth = cr.shear_vector(with_poisson(contact, 0.0), force=fraction * FRICTION * contact.load)
+    errors = state.certificate.force_errors + truth.certificate.force_errors
+    assert (np.abs(state.forces - truth.forces[:, 0]) <= errors).all()
+    assert errors.max() < 1e-8 * state.forces.max()
+
+
+def with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
+    material = cr.Material(contact.scene.material.contact_modulus, nu)
+    return replace(contact, scene=replace(contact.scene, material=material))
 
 
 def test_an_uncertified_contact_gets_no_word() -> None:
