@@ -95,7 +95,7 @@ class Judgement(NamedTuple):
         low = hertz.load(fit.indentation - error, problem.coefficients) * (1 - SAFETY)
         high = hertz.load(fit.indentation + error, problem.coefficients) * (1 + SAFETY)
         load_errors = np.minimum(errors, np.maximum(loads - low, high - loads))
-        load_errors += np.abs(loads - given) + 4 * ROUNDOFF * loads
+        load_errors += np.abs(loads - given) * (1 + SAFETY) + 4 * ROUNDOFF * loads
 
         everywhere = problem.to_scene(error)
         if screened.coupling is not None:
