@@ -275,8 +275,8 @@ class VectorProblem:
         asked = np.where(sizes < P, slope, np.minimum(slope, found))
         # One roundoff of a size near P changes the deflection by far more than one.
         steep = self.scalar.deflections(np.minimum(sizes * (1 + 8 * ROUNDOFF), P)) - own
-        loss: Array = np.abs(found - asked) + steep
-        return loss + 16 * ROUNDOFF * (own + shift * sizes + slope)
+        loss = np.abs(found - asked) + steep
+        return np.asarray(loss + 16 * ROUNDOFF * (own + shift * sizes + slope))
 
     @property
     def _slack(self) -> float:
