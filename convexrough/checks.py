@@ -42,10 +42,17 @@ def between(what: str, value: float, low: float, high: float) -> float:
     return number
 
 
-def array(what: str, values: ArrayLike, *, length: int | None = None, sign: str = "") -> Array:
+def array(
+    what: str,
+    values: ArrayLike,
+    *,
+    length: int | None = None,
+    sign: str = "",
+    smallest: float = 0.0,
+) -> Array:
     """A read-only copy of a vector; `sign` is "", "positive" or "not negative".
 
-    A number stands for a vector of `length` equal values.
+    A number stands for a vector of `length` equal values. smallest : least size, or 0
     """
     try:
         if np.iscomplexobj(values):
@@ -67,6 +74,9 @@ def array(what: str, values: ArrayLike, *, length: int | None = None, sign: str 
         first = int(np.argmin(good))
         kind = f"{sign}, finite" if sign else "finite"
         raise InputError(f"{what}[{first}]", found=vector[first], expected=f"a {kind} number")
+    if not (good := (vector == 0) | (np.abs(vector) >= smallest)).all():
+        first = int(np.argmin(good))
+        raise InputError(f"{what}[{first}]", found=vector[first], expected=SIZED)
     vector.flags.writeable = False
     return vector
 
