@@ -48,8 +48,8 @@ def array(what: str, values: ArrayLike, *, length: int | None = None, sign: str 
     A number stands for a vector of `length` equal values.
     """
     try:
-        if np.iscomplexobj(values):
-            raise TypeError("complex")
+        if np.iscomplexobj(values) or np.asarray(values).dtype.kind in "USV":
+            raise TypeError("no real numbers")
         vector = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(what, found=repr(values)[:60], expected="numbers") from error
@@ -82,8 +82,8 @@ def friction(coefficient: float | None) -> float:
 def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
     """Shear forces that friction can bear, |Q| <= limit = f P; of any shape."""
     try:
-        if np.iscomplexobj(forces):
-            raise TypeError("complex")
+        if np.iscomplexobj(forces) or np.asarray(forces).dtype.kind in "USV":
+            raise TypeError("no real numbers")
         given = np.asarray(forces, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(what, found=repr(forces)[:60], expected="numbers") from error
@@ -100,6 +100,15 @@ def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
             name, found=f"{worst:.17g}{over}", expected=f"at most f P = {limit:.17g} in size"
         )
     return given
+
+
+def instance(what: str, value: object, kind: type) -> None:
+    """An object of a class of this package: no class, and no other object."""
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        expected = f"{article} {kind.__name__}"
+        found = f"the class {value.__name__}" if isinstance(value, type) else repr(value)[:60]
+        raise InputError(what, found=found, expected=expected)
 
 
 def exactly_one(first: str, a: object, second: str, b: object) -> None:
@@ -147,7 +156,7 @@ def _checked(what: str, value: float, expected: str, holds: Callable[[float], bo
 
 
 def _number(what: str, value: float, expected: str) -> float:
-    if isinstance(value, bool):
+    if isinstance(value, (bool, str, bytes)):  # text stands for no number
         raise InputError(what, found=repr(value), expected=expected)
     try:
         return float(value)
