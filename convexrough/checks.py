@@ -18,15 +18,15 @@ SMALLEST, LARGEST = 1e-60, 1e60
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
-def finite(what: str, value: float) -> float:
+def finite(what: str, value: float | None) -> float:
     return _checked(what, value, "a finite number", lambda number: True)
 
 
-def positive(what: str, value: float) -> float:
+def positive(what: str, value: float | None) -> float:
     return _checked(what, value, "a positive number", lambda number: number > 0)
 
 
-def non_negative(what: str, value: float) -> float:
+def non_negative(what: str, value: float | None) -> float:
     return _checked(what, value, "a number that is not negative", lambda number: number >= 0)
 
 
@@ -35,7 +35,7 @@ def is_sized(number: float) -> bool:
     return number == 0 or SMALLEST <= abs(number) <= LARGEST
 
 
-def between(what: str, value: float, low: float, high: float) -> float:
+def between(what: str, value: float | None, low: float, high: float) -> float:
     number = _number(what, value, f"a number from {low} to {high}")
     if not low <= number <= high:
         raise InputError(what, found=number, expected=f"a number from {low} to {high}")
@@ -146,7 +146,9 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     return f"valid: {', '.join(names.values())}"
 
 
-def _checked(what: str, value: float, expected: str, holds: Callable[[float], bool]) -> float:
+def _checked(
+    what: str, value: float | None, expected: str, holds: Callable[[float], bool]
+) -> float:
     number = _number(what, value, expected)
     if not (math.isfinite(number) and holds(number)):
         raise InputError(what, found=number, expected=expected)
@@ -155,8 +157,8 @@ def _checked(what: str, value: float, expected: str, holds: Callable[[float], bo
     return number
 
 
-def _number(what: str, value: float, expected: str) -> float:
-    if isinstance(value, (bool, str, bytes)):  # text stands for no number
+def _number(what: str, value: float | None, expected: str) -> float:
+    if value is None or isinstance(value, (bool, str, bytes)):  # text stands for no number
         raise InputError(what, found=repr(value), expected=expected)
     try:
         return float(value)

@@ -204,7 +204,15 @@ def _npz_cells(path: Path) -> tuple[dict[str, list[Any]], list[str]]:
 def _numbers(name: str, cells: list[Any], rows: list[str]) -> Array:
     check = CHECKS[name]
     pairs = zip(rows, cells, strict=True)
-    return frozen(np.array([check(f"{row}, column {name}", cell) for row, cell in pairs]))
+    return frozen(np.array([check(f"{row}, column {name}", _read(cell)) for row, cell in pairs]))
+
+
+def _read(cell: Any) -> Any:
+    """The number that a cell says; or the cell itself, for a check to refuse."""
+    try:
+        return float(cell)
+    except (TypeError, ValueError):
+        return cell
 
 
 @contextmanager

@@ -247,7 +247,8 @@ def cycles(
         if minimum is not None:
             expected = "none beside a displacement, whose cycles are symmetric"
             raise InputError("minimum", found=minimum, expected=expected)
-        maximum = forces_at(contact, checks.array("displacement", displacement, sign="not negative"))
+        amplitudes = checks.array("displacement", displacement, sign="not negative")
+        maximum = forces_at(contact, amplitudes)
     assert maximum is not None  # exactly_one
     upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
     lower = -upper
