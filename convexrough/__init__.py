@@ -4,11 +4,17 @@ Nothing is imported before it is used: the command line starts at once, and an i
 import half done.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
 
+TYPE_CHECKING = False  # that of typing, which takes longer to import than all of this
 if TYPE_CHECKING:
-    from convexrough import compare, fields, plots, solvers, testing
+    from typing import Any
+
+    from convexrough import compare as compare
+    from convexrough import fields as fields
+    from convexrough import plots as plots
+    from convexrough import solvers as solvers
+    from convexrough import testing as testing
     from convexrough.contact import Contact, press
     from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
     from convexrough.normal.certificate import Certificate, certify
@@ -91,6 +97,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    from importlib import import_module
+
     if name in _MODULES:
         return import_module(f"convexrough.{name}")
     if name not in _HOME:

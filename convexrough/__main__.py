@@ -3,26 +3,32 @@
 Everything is imported inside, so that an interrupt is one line whenever it comes.
 """
 
+from __future__ import annotations
+
 import os
-import signal
 import sys
-from typing import Any
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
 
 INTERRUPTED = 130
 
 
 def main() -> int:
     """Run the command line and return its exit status."""
-    sys.unraisablehook = _unraisable
     try:
+        sys.unraisablehook = _unraisable
         from convexrough.cli import main as run
 
-        return run()
+        status = run()
+        import signal
+
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is only to end
+        return status
     except KeyboardInterrupt:
         _say_interrupted()
         return INTERRUPTED
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is only to end
 
 
 def _unraisable(unraised: Any) -> None:

@@ -107,7 +107,8 @@ def instance(what: str, value: object, kind: type) -> None:
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
         expected = f"{article} {kind.__name__}"
-        found = f"the class {value.__name__}" if isinstance(value, type) else repr(value)[:60]
+        name = type(value).__name__
+        found = f"the class {value.__name__}" if isinstance(value, type) else f"something of {name}"
         raise InputError(what, found=found, expected=expected)
 
 
