@@ -95,6 +95,3 @@ def test_figures_show_themselves_in_a_notebook() -> None:
     page: Any = figures._repr_html_()
     assert page.count('src="data:image/png;base64,') == 2
     assert figures["pressure"]._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]
-    formatters = pytest.importorskip("IPython.core.formatters")
-    shown, _ = formatters.DisplayFormatter().format(figures["pressure"])
-    assert shown["image/png"]
