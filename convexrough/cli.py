@@ -5,6 +5,8 @@ What is slow to import is imported by the command that needs it, when it runs.
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from convexrough.run.scene_file import UnitNames
     from convexrough.run.summary import Summary
 
-DONE, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2, 3, 4, 130
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 _PATH = click.Path(path_type=Path)
@@ -66,7 +68,8 @@ def _claim_options(command: Command) -> Command:
 def program() -> None:
     """Rough frictional contact, with a proof of which asperities touch.
 
-    Exit status: 0 done and certified; 2 wrong input; 3 done, not certified; 4 a solver failed.
+    Exit status: 0 done and certified; 1 standard output closed or full; 2 wrong input; 3 done, not
+    certified; 4 a solver failed; 130 interrupted.
     """
 
 
@@ -94,7 +97,7 @@ def run(
         with _blamed_on(scene):
             refuse_many(file.scene)
     folder = out or Path(f"{scene.stem}-results")
-    claim_folder(folder, force=force)
+    stale = claim_folder(folder, force=force)
     pressing = f"pressing {len(file.scene):,} asperities"
     with _blamed_on(scene), _progress(pressing) as show:
         contact = solve(
@@ -102,9 +105,20 @@ def run(
         )
     with _blamed_on(scene), _progress("shearing") as show:
         found = compute(contact, file, announce=lambda news: show(f"shearing: {news}"))
-    summary = summarise(found)
-    with _progress("writing results"):
-        files = write_results(folder, found, summary, figures=not no_figures, units=file.units)
+    with _progress("writing results") as show:
+        summary = summarise(found)
+        files = write_results(
+            folder,
+            found,
+            summary,
+            figures=not no_figures,
+            units=file.units,
+            source=file,
+            announce=lambda news: show(f"writing results: {news}"),
+        )
+    for path in stale:
+        if path not in files:
+            _say_aside("warning", f"{path}: of an earlier run, left as it was changed since")
     status = _say(summary, as_json, _written(folder, files), file.units)
     if not proof:
         return status
@@ -311,16 +325,36 @@ def bench(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; errors are a message, never a traceback."""
     try:
-        return int(program.main(arguments, prog_name="convexrough", standalone_mode=False) or DONE)
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        with program.make_context("convexrough", given) as context:
+            status = int(program.invoke(context) or DONE)
+        if sys.stdout is not None:  # it is None where a shell closed it
+            sys.stdout.flush()
+        return status
+    except click.exceptions.Exit as end:
+        return end.exit_code
     except click.ClickException as error:
         error.show()
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
+        _say_aside("interrupted")
         return INTERRUPTED
     except ConvexroughError as error:
         for line in str(error).splitlines():
             _say_aside("error", line)
         return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
+    except OSError as error:  # those of files are FileErrors
+        return _unheard(error)
+
+
+def _unheard(error: OSError) -> int:
+    """Nobody reads standard output any more, or it is full; results are written all the same."""
+    if error.errno != errno.EPIPE:
+        _say_aside("error", f"standard output: {error.strerror or error}")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)  # so that what is left is not written when the interpreter ends
+    os.close(nowhere)
+    return UNHEARD
 
 
 def _prove(path: Path, work: Callable[[Callable[[str], object]], Proof], as_json: bool) -> int:
@@ -347,19 +381,19 @@ def _say(
     from convexrough.run.report import describe, warnings
     from convexrough.run.summary import proved, to_json
 
+    length, force = units or ("", "")
     if as_json:
         click.echo(to_json(summary))
     else:
-        length, force = units or ("", "")
         described = describe(summary, length_unit=length, force_unit=force)
         click.echo("\n".join([*described, *lines]))
-    for warning in warnings(summary):
+    for warning in warnings(summary, length_unit=length, force_unit=force):
         _say_aside("warning", warning)
     return DONE if proved(summary) else NOT_CERTIFIED
 
 
-def _say_aside(kind: str, message: str) -> None:
-    click.echo(f"convexrough: {kind}: {message}", err=True)
+def _say_aside(*parts: str) -> None:
+    click.echo(": ".join(("convexrough", *parts)), err=True)
 
 
 @contextmanager

@@ -10,16 +10,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from convexrough import checks
+from convexrough import checks, solvers
 from convexrough.arrays import Array, frozen
+from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.influence import Influence, Kind
+from convexrough.influence.choice import couple
+from convexrough.influence.shells import shells
 from convexrough.kept import Keeper
 from convexrough.normal.certificate import Certificate, judge
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.units import Units
 from convexrough.progress import Announce
 from convexrough.scene.scene import Scene
-from convexrough.solvers import Newton, Solution, Solver
+from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
 
 if TYPE_CHECKING:
@@ -89,20 +93,26 @@ class Contact(Keeper):
             announce=announce,
         )
 
+    @property
+    def mean_pressures(self) -> Array:
+        """(n,) [force / length^2] load over contact area, 0 where open."""
+        areas = np.pi * self.contact_radii**2
+        return frozen(np.divide(self.loads, areas, out=np.zeros(len(areas)), where=areas > 0))
+
 
 def press(
     scene: Scene,
     *,
     approach: float | None = None,
     load: float | None = None,
-    solver: Solver | None = None,
+    solver: Solver | str | None = None,
     start: ArrayLike | None = None,
     influence: Kind | None = None,
     announce: Announce | None = None,
 ) -> Contact:
     """Press the sphere on the asperities by an approach [length] or with a load [force].
 
-    solver : default `solvers.Newton()`
+    solver : default `solvers.Newton()`; or its name in a scene file, such as "conic"
     start  : (n,) [force] loads to start from; in the convex range the answer is the same for all
     influence : how to couple the asperities: "dense" (a matrix), "lattice" (transforms, where they
         lie on a lattice), "scattered" (transforms on a mesh); None for the cheapest that is exact
@@ -112,6 +122,8 @@ def press(
     answer without a certificate is returned: look at `contact.certificate.scope`.
     """
     began = time.perf_counter()
+    checks.instance("scene", scene, Scene)
+    solver = solvers.named(solver)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
     contact = solve(problem, solver, start, announce)
     return replace(contact, seconds=time.perf_counter() - began)
@@ -119,13 +131,13 @@ def press(
 
 def solve(
     problem: NormalProblem,
-    solver: Solver | None = None,
+    solver: Solver | str | None = None,
     start: ArrayLike | None = None,
     announce: Announce | None = None,
 ) -> Contact:
     """`press` for a problem already assembled; its arguments are as there."""
     began = time.perf_counter()
-    solver = Newton() if solver is None else solver
+    solver = solvers.named(solver)
     scene = problem.scene
     force, length = problem.units.force, problem.units.length
     first = None
@@ -187,3 +199,35 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
     a = radii[touching]
     moved = A.scale * A.falloff(solution.loads[touching] * a**2 / 10, 3)
     return float((moved / prescribed[touching]).max()), A.crowding(a)
+
+
+def closest_changes(contact: Contact) -> Array:
+    """(n,) [force] what loads would gain, to first order, in the geometry "closest"; 0 in that.
+
+    There an asperity meets the sphere at r R / (R + rho): its drop is less by
+    r^2 rho / (2 R (R + rho)), and influences 1 / (pi E* r) are greater by about rho / R. Hence
+
+        (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,     at the same approach,
+
+    with H = (2/3) indentation / P the local part of the Hessian.
+    """
+    scene, touching = contact.scene, np.flatnonzero(contact.loads)
+    gains = np.zeros(len(scene))
+    if scene.geometry == "closest" or len(touching) == 0:
+        return frozen(gains)
+    k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii[touching])
+    loads, R, rho = (
+        contact.loads[touching],
+        scene.sphere_radius,
+        scene.asperities.tip_radii[touching],
+    )
+    indentations = hertz.indentation(loads, k)
+    units = Units.of(float(indentations.max()), float(np.median(k)))
+    scale = units.force / units.length / (np.pi * scene.material.contact_modulus)
+    A = couple(scene, touching, scale, contact.influence)
+    slopes = 1.5 * (loads / units.force) / (indentations / units.length)
+    rise = scene.asperities.distances[touching] ** 2 * rho / (2.0 * R * (R + rho)) / units.length
+    deeper = rise - rho / R * A.apply(loads / units.force)
+    change = correct(A, shells(A), np.sqrt(slopes), -deeper, balanced=False, tolerance=1e-3)
+    gains[touching] = slopes * change * units.force
+    return frozen(gains)

@@ -90,6 +90,7 @@ def certify(
 
     Raises InputError for loads of the wrong length, negative or not finite.
     """
+    checks.instance("scene", scene, Scene)
     values = checks.array("loads", loads, length=len(scene), sign="not negative")
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
     return judge(problem, values)

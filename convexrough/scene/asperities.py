@@ -149,6 +149,8 @@ def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
 
 def _points(positions: ArrayLike) -> Array:
     try:
+        if np.asarray(positions).dtype.kind in "USV":  # text stands for no number
+            raise TypeError("no numbers")
         points = np.array(positions, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError("positions", found=repr(positions)[:60], expected="numbers") from error

@@ -7,7 +7,7 @@ the loop. Only the range of the force matters.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -16,15 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.progress import Announce
 from convexrough.shearing.certificate import friction_words
 from convexrough.shearing.first_loading import FirstLoading
-from convexrough.shearing.history import history
 from convexrough.shearing.judgement import Bounds
 from convexrough.shearing.normal_map import States
+from convexrough.shearing.problem import TangentialProblem
+from convexrough.shearing.state import forces_at, indices
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
 
@@ -33,11 +34,13 @@ from convexrough.sphere.smooth import smooth
 class Loop:
     """Points of a closed loop, from the maximum to the minimum and back.
 
+    asperities : (k,) indices of those whose own loops follow
     forces : (m,) Q [force];  displacements : (m,) X [length], both bodies
-    asperity_forces : (m, n) Q_i [force]
-    asperity_displacements : (m, n) X_i + slip_i [length]
+    asperity_forces : (m, k) Q_i [force]
+    asperity_displacements : (m, k) X_i + slip_i [length]
     """
 
+    asperities: Indices
     forces: Array
     displacements: Array
     asperity_forces: Array
@@ -60,6 +63,8 @@ class Cycle:
     balance_defect         : relative difference to the energy from the trapezoid error
     energy_normalised      : energy / W0, W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H)
     smooth_normalised      : the same for the smooth sphere, e((maximum - minimum) / (2 f P))
+    displacement_amplitude : X_a, half the range of X [length]
+    displacement_error     : proved bound on |X_a - solution| [length], infinite without proof
     sliding, partial       : proved to slide in each half of the cycle; proved never to
     """
 
@@ -72,6 +77,8 @@ class Cycle:
     balance_defect: float
     energy_normalised: float
     smooth_normalised: float
+    displacement_amplitude: float
+    displacement_error: float
     sliding: NDArray[np.bool_]
     partial: NDArray[np.bool_]
 
@@ -85,57 +92,164 @@ class Cycle:
         """(n,) [force length] lost at each asperity."""
         return frozen(self.partial_slip_energies + self.sliding_energies)
 
-    def loop(self, points: int = 200, announce: Announce | None = None) -> Loop:
+    @property
+    def force_amplitude(self) -> float:
+        """Q_a [force], half the range of Q."""
+        return (self.maximum - self.minimum) / 2.0
+
+    @property
+    def secant_stiffness(self) -> float:
+        """Q_a / X_a [force / length]; nan where nothing moves."""
+        moved = self.displacement_amplitude
+        return self.force_amplitude / moved if moved > 0 else np.nan
+
+    @property
+    def loss_factor(self) -> float:
+        """W / (2 pi U), U = Q_a X_a / 2 (Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34, 954).
+
+        nan where nothing moves.
+        """
+        stored = self.force_amplitude * self.displacement_amplitude / 2.0
+        return self.energy / (2.0 * np.pi * stored) if stored > 0 else np.nan
+
+    def loop(
+        self,
+        points: int = 200,
+        announce: Announce | None = None,
+        asperities: ArrayLike | None = None,
+    ) -> Loop:
         """The loop through about `points` points, as many down as up, denser at the ends.
 
-        announce : told in a line how far long work has come
+        announce   : told in a line how far long work has come
+        asperities : indices of those whose own loops to keep, default all
         """
-        if not isinstance(points, int) or points < 4:
-            raise InputError("points", found=points, expected="a whole number, at least 4")
-        middle, amplitude = (self.maximum + self.minimum) / 2, (self.maximum - self.minimum) / 2
-        down = middle + amplitude * np.cos(np.linspace(0.0, np.pi, points // 2 + 1))
-        down[0], down[-1] = self.maximum, self.minimum
-        there_and_back = [self.maximum, self.minimum]
-        if abs(self.minimum) > abs(self.maximum):
-            there_and_back.insert(0, self.minimum)
-        path = np.concatenate((there_and_back[:-1], down[1:], down[-2::-1]))
-        past = history(self.contact, forces=path, announce=announce)
-        body = slice(len(there_and_back) - 2, None)
-        return Loop(
-            forces=frozen(path[body]),
-            displacements=past.displacements[body],
-            asperity_forces=past.forces[body],
-            asperity_displacements=past.asperity_displacements[body],
+        return loops([self], points, announce, asperities)[0]
+
+
+def loops(
+    cycles: Sequence[Cycle],
+    points: int = 200,
+    announce: Announce | None = None,
+    asperities: ArrayLike | None = None,
+) -> list[Loop]:
+    """The loops of several cycles of one contact, which share their states.
+
+    points : of the loop of the widest range, about; narrower ones have fewer
+    asperities : as in `Cycle.loop`
+
+    Half of the points are solved for: by Masing's rule the way back is the way there, mirrored.
+    """
+    if not isinstance(points, int) or points < 4:
+        raise InputError("points", found=points, expected="a whole number, at least 4")
+    if not cycles:
+        return []
+    contact = cycles[0].contact
+    chosen = indices("asperities", asperities, len(contact.scene))
+    widest = max(each.force_amplitude for each in cycles)
+    shared = widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))
+    ways = [np.append(shared[shared < each.force_amplitude], each.force_amplitude)
+            for each in cycles]  # fmt: skip
+    if contact.load == 0.0:
+        return [_still(way, chosen) for way in ways]
+    problem = FirstLoading(contact).problem
+    firsts = [max(abs(each.maximum), abs(each.minimum)) for each in cycles]
+    asked = np.concatenate((*ways, firsts)) / problem.force_unit
+    states, back = FirstLoading(contact).states(asked, announce)
+    held = np.searchsorted(problem.touching, chosen).clip(max=len(problem) - 1)
+    loaded = problem.touching[held] == chosen
+    turns = np.cumsum([len(way) for way in ways])
+    return [
+        _around(problem, each, way, states.take(np.append(places, first)), held, loaded, chosen)
+        for each, way, places, first in zip(
+            cycles, ways, np.split(back, turns), back[turns[-1] :], strict=False
         )
+    ]
+
+
+def _around(
+    problem: TangentialProblem,
+    cycle: Cycle,
+    way: Array,
+    states: States,
+    held: Indices,
+    loaded: NDArray[np.bool_],
+    chosen: Indices,
+) -> Loop:
+    """The loop from the states at T = way / f and, the last, at the larger of the two forces.
+
+    way : (m,) (maximum - Q) / 2 on the way down [force]
+
+    On a branch everything is that at its beginning -+ twice its first loading
+    (docs/theory/shear.md, "Any history").
+    """
+
+    def closed(field: Array, unit: float) -> Array:
+        there, first = 2.0 * unit * field[:-1], unit * field[-1]
+        top = first if abs(cycle.maximum) >= abs(cycle.minimum) else there[-1] - first
+        return frozen(np.concatenate((top - there, (top - there[-1] + there)[1:])))
+
+    def of_chosen(field: Array) -> Array:
+        return np.where(loaded, field[:, held], 0.0)
+
+    forces = np.concatenate((cycle.maximum - 2.0 * way, (cycle.minimum + 2.0 * way)[1:]))
+    forces[len(way) - 1], forces[-1] = cycle.minimum, cycle.maximum
+    return Loop(
+        asperities=chosen,
+        forces=frozen(forces),
+        displacements=closed(states.rises, problem.travel_unit),
+        asperity_forces=closed(of_chosen(states.increments), problem.force_unit),
+        asperity_displacements=closed(of_chosen(states.deflections), problem.travel_unit),
+    )
+
+
+def _still(way: Array, chosen: Indices) -> Loop:
+    """Where nothing is loaded, so that no force is borne either."""
+    zero = frozen(np.zeros(2 * len(way) - 1))
+    none = frozen(np.zeros((len(zero), len(chosen))))
+    return Loop(chosen, zero, zero, none, none)
 
 
 def cycle(
     contact: Contact,
     *,
-    maximum: float,
+    maximum: float | None = None,
     minimum: float | None = None,
+    displacement: float | None = None,
     announce: Announce | None = None,
 ) -> Cycle:
     """The steady cycle between two shear forces [force]; `minimum` defaults to -maximum.
 
-    announce : told in a line how far long work has come
+    displacement : amplitude of X [length] of a symmetric cycle, instead of its forces
+    announce     : told in a line how far long work has come
 
     Raises InputError where the scene has no friction, the minimum exceeds the maximum, or either
-    exceeds f P in size.
+    exceeds f P in size, or the displacement that of gross sliding.
     """
+    upper = None if maximum is None else [maximum]
     lower = None if minimum is None else [minimum]
-    return cycles(contact, [maximum], lower, announce=announce)[0]
+    moved = None if displacement is None else [displacement]
+    return cycles(contact, upper, lower, displacement=moved, announce=announce)[0]
 
 
 def cycles(
     contact: Contact,
-    maximum: ArrayLike,
+    maximum: ArrayLike | None = None,
     minimum: ArrayLike | None = None,
     *,
+    displacement: ArrayLike | None = None,
     announce: Announce | None = None,
 ) -> list[Cycle]:
     """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives."""
+    checks.instance("contact", contact, Contact)
     limit = checks.friction(contact.scene.friction) * contact.load
+    checks.exactly_one("maximum", maximum, "displacement", displacement)
+    if displacement is not None:
+        if minimum is not None:
+            expected = "none beside a displacement, whose cycles are symmetric"
+            raise InputError("minimum", found=minimum, expected=expected)
+        amplitudes = checks.array("displacement", displacement, sign="not negative")
+        maximum = forces_at(contact, amplitudes)
+    assert maximum is not None  # exactly_one
     upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
     lower = -upper
     if minimum is not None:
@@ -165,6 +279,8 @@ def cycles(
             balance_defect=each.defect,
             energy_normalised=each.energy / whole,
             smooth_normalised=float(mindlin.loss(each.total / problem.limit)),
+            displacement_amplitude=each.rise * problem.travel_unit,
+            displacement_error=each.rise_error * problem.travel_unit,
             sliding=each.sliding,
             partial=each.partial,
         )
@@ -176,6 +292,8 @@ class _Loss(NamedTuple):
     """What a cycle of one amplitude costs, and which asperities slide; as in Cycle."""
 
     total: float  # T
+    rise: float
+    rise_error: float
     energy: float
     partial_slip: Array
     sliding_slip: Array
@@ -194,6 +312,8 @@ def _losses(loading: FirstLoading, states: States, bounds: Bounds) -> Iterator[_
     for i, total in enumerate(states.totals):
         yield _Loss(
             float(total),
+            float(states.rises[i]),
+            float(bounds.rises[i]),
             float(energies[i]),
             frozen(slip[i]),
             frozen(slide[i]),
@@ -205,4 +325,4 @@ def _losses(loading: FirstLoading, states: States, bounds: Bounds) -> Iterator[_
 
 def _empty(contact: Contact, maximum: float, minimum: float) -> Cycle:
     zero, no = frozen(np.zeros(len(contact.scene))), frozen(np.zeros(len(contact.scene), bool))
-    return Cycle(contact, maximum, minimum, 0.0, zero, zero, 0.0, 0.0, 0.0, no, no)
+    return Cycle(contact, maximum, minimum, 0.0, zero, zero, 0.0, 0.0, 0.0, 0.0, 0.0, no, no)

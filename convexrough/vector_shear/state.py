@@ -86,6 +86,7 @@ def shear_vector(
     SolverError where the solver stops without an answer, is missing, or finds asperities so dense
     that the program is not convex.
     """
+    checks.instance("contact", contact, Contact)
     solver = FrictionNewton() if solver is None else solver
     scene = contact.scene
     friction = checks.friction(scene.friction)

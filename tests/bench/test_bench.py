@@ -265,7 +265,7 @@ def test_command(command: Any, tmp_path: Path) -> None:
     assert "The default solver is on the work-precision frontier in " in ran.out
     names = {path.name for path in (tmp_path / "bench-results").iterdir()}
     assert names == {
-        *("bench.json", "work-precision.csv", "cost.csv", "shear.csv"),
+        *("files.json", "bench.json", "work-precision.csv", "cost.csv", "shear.csv"),
         *("work-precision.png", "work-precision.svg", "cost.png", "cost.svg"),
     }
     with (tmp_path / "bench-results" / "work-precision.csv").open() as file:
