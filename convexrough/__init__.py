@@ -29,8 +29,9 @@ if TYPE_CHECKING:
     from convexrough.scene.material import Material
     from convexrough.scene.scene import Scene
     from convexrough.shearing.certificate import ShearCertificate, certify_shear
-    from convexrough.shearing.cycle import Cycle, Loop, cycle, cycles, loops
+    from convexrough.shearing.cycle import Cycle, cycle, cycles, loops
     from convexrough.shearing.history import History, history
+    from convexrough.shearing.loop import Loop
     from convexrough.shearing.state import ShearState, onset_of_sliding, shear
     from convexrough.sphere.smooth import SmoothSphere, smooth
     from convexrough.vector_shear.cones import FrictionConic
@@ -49,7 +50,8 @@ _HOMES = {
     "scene.material": ("Material",),
     "scene.scene": ("Scene",),
     "shearing.certificate": ("ShearCertificate", "certify_shear"),
-    "shearing.cycle": ("Cycle", "Loop", "cycle", "cycles", "loops"),
+    "shearing.loop": ("Loop",),
+    "shearing.cycle": ("Cycle", "cycle", "cycles", "loops"),
     "shearing.history": ("History", "history"),
     "shearing.state": ("ShearState", "onset_of_sliding", "shear"),
     "sphere.smooth": ("SmoothSphere", "smooth"),

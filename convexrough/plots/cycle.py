@@ -13,6 +13,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from convexrough.arrays import Array
+from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     DASHED,
     DOUBLE,
@@ -20,16 +21,15 @@ from convexrough.plots.style import (
     ROUGH,
     SMOOTH,
     TICK,
-    Figure,
-    Figures,
     ShearScale,
     label,
     no_contact_figure,
     round_ticks,
 )
 from convexrough.scene.rings import one_of_each_ring
-from convexrough.shearing.cycle import Cycle, Loop
+from convexrough.shearing.cycle import Cycle
 from convexrough.shearing.cycle import loops as steady_loops
+from convexrough.shearing.loop import Loop
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
 

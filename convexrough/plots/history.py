@@ -14,12 +14,11 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from convexrough.arrays import Array
+from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     DOUBLE,
     SMOOTH,
     TICK,
-    Figure,
-    Figures,
     ShearScale,
     label,
     no_contact_figure,

@@ -10,6 +10,7 @@ from matplotlib.colors import Normalize
 from convexrough import fields
 from convexrough.arrays import Array
 from convexrough.contact import Contact
+from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     COLOURS,
     CROWDED,
@@ -19,8 +20,6 @@ from convexrough.plots.style import (
     SMOOTH,
     TICK,
     UNSURE,
-    Figure,
-    Figures,
     Scale,
     abscissae,
     census,

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 
 from convexrough.arrays import Array
 from convexrough.contact import Contact
+from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     CROWDED,
     DASHED,
@@ -23,8 +24,6 @@ from convexrough.plots.style import (
     SINGLE,
     SMOOTH,
     TICK,
-    Figure,
-    Figures,
     Scale,
     ShearScale,
     doubt,

@@ -6,22 +6,20 @@ the same load. Shear forces are in f P, displacements in X0 and energies in W0 (
 
 from __future__ import annotations
 
-from base64 import b64encode
 from dataclasses import dataclass
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
-from matplotlib.figure import Figure as MatplotlibFigure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
+from convexrough.plots.notebook import Figure
 from convexrough.sphere import hertz
 from convexrough.sphere.smooth import SmoothSphere, smooth
 
@@ -35,27 +33,6 @@ DASHED = (0, (4, 2.5))
 #: From these numbers of touching asperities on, the discs are pixels inside a vector file, and
 #: too small to be drawn.
 DENSE, CROWDED = 200, 3000
-
-
-class Figure(MatplotlibFigure):
-    """A figure of matplotlib that shows itself in a notebook, without pyplot."""
-
-    def _repr_png_(self) -> bytes:
-        file = BytesIO()
-        self.savefig(file, format="png", dpi=100)
-        return file.getvalue()
-
-
-class Figures(dict[str, MatplotlibFigure]):
-    """Figures by the stem of the file each belongs in; a notebook shows them all."""
-
-    def _repr_html_(self) -> str:
-        parts = []
-        for stem, figure in self.items():
-            figure.savefig(file := BytesIO(), format="png", dpi=100)
-            picture = b64encode(file.getvalue()).decode()
-            parts.append(f'<img alt="{stem}" src="data:image/png;base64,{picture}">')
-        return "<br>".join(parts)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.progress import Announce
 from convexrough.scene.rings import one_of_each_ring
-from convexrough.shearing.cycle import Cycle, Loop, cycles, loops
+from convexrough.shearing.cycle import Cycle, cycles, loops
 from convexrough.shearing.history import History, history
+from convexrough.shearing.loop import Loop
 from convexrough.shearing.state import ShearState, shear
 
 Fractions = tuple[float, ...]

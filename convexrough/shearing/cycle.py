@@ -16,40 +16,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.progress import Announce
 from convexrough.shearing.certificate import friction_words
 from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.judgement import Bounds
+from convexrough.shearing.loop import Loop, loops_between
 from convexrough.shearing.normal_map import States
-from convexrough.shearing.problem import TangentialProblem
-from convexrough.shearing.state import forces_at, indices
+from convexrough.shearing.state import forces_at
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
-
-
-@dataclass(frozen=True, eq=False)
-class Loop:
-    """Points of a closed loop, from the maximum to the minimum and back.
-
-    asperities : (k,) indices of those whose own loops follow
-    forces : (m,) Q [force];  displacements : (m,) X [length], both bodies
-    asperity_forces : (m, k) Q_i [force]
-    asperity_displacements : (m, k) X_i + slip_i [length]
-    """
-
-    asperities: Indices
-    forces: Array
-    displacements: Array
-    asperity_forces: Array
-    asperity_displacements: Array
-
-    @property
-    def area(self) -> float:
-        """[force length] of the polygon through the points: the loss, from inside."""
-        return float(np.trapezoid(self.forces, self.displacements))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,77 +114,11 @@ def loops(
 
     points : of the loop of the widest range, about; narrower ones have fewer
     asperities : as in `Cycle.loop`
-
-    Half of the points are solved for: by Masing's rule the way back is the way there, mirrored.
     """
-    if not isinstance(points, int) or points < 4:
-        raise InputError("points", found=points, expected="a whole number, at least 4")
     if not cycles:
         return []
-    contact = cycles[0].contact
-    chosen = indices("asperities", asperities, len(contact.scene))
-    widest = max(each.force_amplitude for each in cycles)
-    shared = widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))
-    ways = [np.append(shared[shared < each.force_amplitude], each.force_amplitude)
-            for each in cycles]  # fmt: skip
-    if contact.load == 0.0:
-        return [_still(way, chosen) for way in ways]
-    problem = FirstLoading(contact).problem
-    firsts = [max(abs(each.maximum), abs(each.minimum)) for each in cycles]
-    asked = np.concatenate((*ways, firsts)) / problem.force_unit
-    states, back = FirstLoading(contact).states(asked, announce)
-    held = np.searchsorted(problem.touching, chosen).clip(max=len(problem) - 1)
-    loaded = problem.touching[held] == chosen
-    turns = np.cumsum([len(way) for way in ways])
-    return [
-        _around(problem, each, way, states.take(np.append(places, first)), held, loaded, chosen)
-        for each, way, places, first in zip(
-            cycles, ways, np.split(back, turns), back[turns[-1] :], strict=False
-        )
-    ]
-
-
-def _around(
-    problem: TangentialProblem,
-    cycle: Cycle,
-    way: Array,
-    states: States,
-    held: Indices,
-    loaded: NDArray[np.bool_],
-    chosen: Indices,
-) -> Loop:
-    """The loop from the states at T = way / f and, the last, at the larger of the two forces.
-
-    way : (m,) (maximum - Q) / 2 on the way down [force]
-
-    On a branch everything is that at its beginning -+ twice its first loading
-    (docs/theory/shear.md, "Any history").
-    """
-
-    def closed(field: Array, unit: float) -> Array:
-        there, first = 2.0 * unit * field[:-1], unit * field[-1]
-        top = first if abs(cycle.maximum) >= abs(cycle.minimum) else there[-1] - first
-        return frozen(np.concatenate((top - there, (top - there[-1] + there)[1:])))
-
-    def of_chosen(field: Array) -> Array:
-        return np.where(loaded, field[:, held], 0.0)
-
-    forces = np.concatenate((cycle.maximum - 2.0 * way, (cycle.minimum + 2.0 * way)[1:]))
-    forces[len(way) - 1], forces[-1] = cycle.minimum, cycle.maximum
-    return Loop(
-        asperities=chosen,
-        forces=frozen(forces),
-        displacements=closed(states.rises, problem.travel_unit),
-        asperity_forces=closed(of_chosen(states.increments), problem.force_unit),
-        asperity_displacements=closed(of_chosen(states.deflections), problem.travel_unit),
-    )
-
-
-def _still(way: Array, chosen: Indices) -> Loop:
-    """Where nothing is loaded, so that no force is borne either."""
-    zero = frozen(np.zeros(2 * len(way) - 1))
-    none = frozen(np.zeros((len(zero), len(chosen))))
-    return Loop(chosen, zero, zero, none, none)
+    ranges = [(each.maximum, each.minimum) for each in cycles]
+    return loops_between(cycles[0].contact, ranges, points, announce, asperities)
 
 
 def cycle(

@@ -391,3 +391,9 @@ def test_a_folder_is_claimed_before_computing(tmp_path: Path) -> None:
 def test_json_has_no_infinities() -> None:
     summary: Summary = {"a": {"b": [1.0, float("inf")]}, "c": float("nan"), "d": -float("inf")}
     assert json.loads(to_json(summary)) == {"a": {"b": [1.0, None]}, "c": None, "d": None}
+
+
+def test_writing_says_how_far_it_is(tmp_path: Path, contact: cr.Contact) -> None:
+    found, told = Findings(contact), list[str]()
+    write_results(tmp_path, found, summarise(found), figures=True, announce=told.append)
+    assert told == ["asperities", "figures", "pressure", "loads"]
