@@ -144,7 +144,8 @@ def test_arrays(tmp_path: Path) -> None:
     np.savez(tmp_path / "e.npz", load=LOADS)
     np.savez(tmp_path / "f.npz", np.array(LOADS))
     np.savez(tmp_path / "g.npz", x=table[:, 0], y=table[:, 1], load=LOADS, more=["a", "b", "c"])
-    for name in "efg":
+    np.savez(tmp_path / "h.npz", force=3.0, grid=np.eye(4), load=LOADS, other=np.ones(9))
+    for name in "efgh":
         assert read_loads(tmp_path / f"{name}.npz", small()).values.tolist() == LOADS, name
 
 
@@ -156,6 +157,9 @@ def test_parquet(tmp_path: Path) -> None:
     columns = {"x": x[::-1], "y": y[::-1], "status": ["a", "b", "c"], "load": LOADS[::-1]}
     parquet.write_table(pyarrow.table(columns), tmp_path / "a.parquet")
     assert read_loads(tmp_path / "a.parquet", small()).values.tolist() == LOADS
+    parquet.write_table(pyarrow.table({"load": [1.0, None, 2.0]}), tmp_path / "gap.parquet")
+    with pytest.raises(cr.InputError, match="entry 1, column load: found None, expected a finite"):
+        read_loads(tmp_path / "gap.parquet", small())
     (tmp_path / "b.parquet").write_bytes(b"PAR1 and then nothing")
     with pytest.raises(cr.FileError, match=r"not an \.parquet file"):
         read_loads(tmp_path / "b.parquet", small())
@@ -377,6 +381,7 @@ def test_summits_without_optional_columns(tmp_path: Path) -> None:
         ("x,y\n0,nan\n", "row 2, column y: found nan, expected a finite number: 0,nan"),
         ("x,y\n-inf,0\n", "row 2, column x: found -inf, expected a finite number"),
         ("x,y\n0,0\n1,2,3\n", "row 3: found 3 cells, expected 2, as in the header: 1,2,3"),
+        ("x,y\n0,0,1\n1,2,3\n", "row 2: found 3 cells, expected 2"),
         ("x,y\n0,0\n1", "row 3: found 1 cells, expected 2"),
         ('x,y\n0,"1\n', 'row 2: unexpected end of data: 0,"1'),
         ("x,y\n0,1_000\n", "row 2, column y: found '1_000', expected a finite number"),
