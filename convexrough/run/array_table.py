@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,48 +11,56 @@ from numpy.typing import NDArray
 
 from convexrough.errors import FileError
 
-Columns = dict[str, NDArray[Any]]
+Columns = dict[str, list[Any]]
 
 
-def read_arrays(path: Path) -> Columns:
+def read_arrays(path: Path, known: Sequence[str]) -> Columns:
     """Columns by name; by number, from "1", where they have none.
+
+    known : names that may be wanted, in lower case; of others only those as long as these are kept
 
     Raises FileError where what reads Parquet is not installed, and whatever the readers raise.
     """
     columns = _parquet(path) if path.suffix.lower() == ".parquet" else _arrays(path)
-    if len({len(values) for values in columns.values()}) > 1:
-        raise ValueError("arrays of different lengths")
-    return columns
+    wanted = [name for name in columns if name.lower() in known] or list(columns)
+    lengths = {len(columns[name]) for name in wanted}
+    if len(lengths) > 1:
+        raise ValueError(f"arrays of lengths {sorted(lengths)}")
+    return {name: values for name, values in columns.items() if len(values) in lengths}
 
 
 def _arrays(path: Path) -> Columns:
-    """Columns of .npy or .npz by name, or by number where they have none."""
     with path.open("rb") as raw:
         loaded = np.load(raw, allow_pickle=False)
         if isinstance(loaded, np.ndarray):
-            named = {"": loaded}
-        else:
-            with loaded:
-                named = {name: loaded[name] for name in loaded.files}
-    if len(named) > 1 or not named:
-        return {name: np.atleast_1d(values) for name, values in named.items()}
-    (name, values), *_ = named.items()
+            return _table(loaded)
+        with loaded:
+            named = {name: np.asarray(loaded[name]) for name in loaded.files}
+    (first, values), *others = named.items() or [("", np.zeros(0))]
+    if not others and (values.ndim > 1 or first.startswith("arr_")):
+        return _table(values)
+    return {name: values.tolist() for name, values in named.items() if values.ndim == 1}
+
+
+def _table(values: NDArray[Any]) -> Columns:
+    """Columns of a record array, of a matrix, or the one that a vector is."""
     if values.dtype.names:
-        return {each: np.atleast_1d(values[each]) for each in values.dtype.names}
-    table = np.atleast_2d(values.T)  # columns, or the one
+        return {name: np.atleast_1d(values[name]).tolist() for name in values.dtype.names}
     if values.ndim > 2:
         raise ValueError(f"{values.ndim} dimensions")
-    if len(table) == 1 and name and not name.startswith("arr_"):
-        return {name: table[0]}
-    return {str(i + 1): column for i, column in enumerate(table)}
+    return {str(i + 1): column.tolist() for i, column in enumerate(np.atleast_2d(values.T))}
 
 
 def _parquet(path: Path) -> Columns:
     try:
+        import pyarrow
         from pyarrow import parquet
     except ImportError as error:
         advice = "needs pyarrow: pip install 'convexrough[parquet]'"
         raise FileError(f"{path}: {advice}") from error
-    with path.open("rb") as raw:
-        read = parquet.read_table(raw)
-    return {name: read.column(name).to_numpy() for name in read.column_names}
+    try:
+        with path.open("rb") as raw:
+            read = parquet.read_table(raw)
+        return {name: read.column(name).to_pylist() for name in read.column_names}
+    except pyarrow.ArrowException as error:
+        raise ValueError(str(error)) from error

@@ -155,11 +155,11 @@ def read_summits(path: Path, *, tip_radius: ArrayLike | None) -> Asperities:
 def _source(path: Path, known: Sequence[str]) -> _Source:
     """Everything in a file, by its kind."""
     if path.suffix.lower() in ARRAYS:
-        arrays = read_arrays(path)
-        count = len(next(iter(arrays.values()))) if arrays else 0
+        arrays = read_arrays(path, known)
+        count = len(next(iter(arrays.values()), []))
         return _Source(
             header=None if "1" in arrays else list(arrays),
-            columns=[values.tolist() for values in arrays.values()],
+            columns=list(arrays.values()),
             rows=[f"entry {i}" for i in range(count)],
             lines=[""] * count,
             style="",

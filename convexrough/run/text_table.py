@@ -213,7 +213,7 @@ def _trimmed(
         header = _stripped(header)
         width = len(header)
         longer = [row.cells for row in rows if len(_stripped(row.cells)) == width + 1]
-        if longer and len(longer) == len(rows):
+        if style.separator in " \t" and longer and len(longer) == len(rows):
             count = [style.number(cells[0]) for cells in longer]
             if count in ([*range(len(rows))], [*range(1, len(rows) + 1)]):
                 header, width = ["", *header], width + 1

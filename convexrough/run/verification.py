@@ -11,18 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.contact import solve
+from convexrough.contact import Contact, solve
 from convexrough.errors import InputError, TableError
 from convexrough.normal.claims import Claim
 from convexrough.normal.problem import NormalProblem
 from convexrough.run.claims import Claimed, read_loads, read_shear_forces
 from convexrough.run.scene_file import SceneFile
-from convexrough.shearing.verdict import ShearVerdict, verify_shear
+from convexrough.shearing.verdict import ShearVerdict, claims_sliding, verify_shear
 from convexrough.verdict import Verdict, verify_on
 
-#: What a file may call an asperity under shear: whether that claims that it slides. "undecided"
-#: claims nothing: then the force does.
-WORDS = {"sliding": True, "partial": False, "sticking": False, "open": False, "undecided": None}
+#: What a file may call an asperity under shear. "undecided" claims nothing: then the force does.
+WORDS = ("sliding", "partial", "sticking", "open", "undecided")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,21 +115,19 @@ def _sheared(
         forces.values,
         force=question.force,
         within=question.within,
-        sliding=_claims(question.shear, forces.status),
+        sliding=_claims(question.shear, forces, contact),
     )
 
 
-def _claims(path: Path | None, status: NDArray[np.str_] | None) -> NDArray[np.bool_] | None:
-    """(n,) who is said to slide; None where nothing is said of somebody."""
-    if status is None:
+def _claims(path: Path | None, forces: Claimed, contact: Contact) -> NDArray[np.bool_] | None:
+    """(n,) who is said to slide; None where the file has no words."""
+    if forces.status is None:
         return None
-    said = np.char.lower(np.char.strip(status))
-    if len(unknown := np.unique(said[~np.isin(said, list(WORDS))])):
+    said = np.char.lower(np.char.strip(forces.status))
+    if len(unknown := np.unique(said[~np.isin(said, WORDS)])):
         valid = ", ".join(WORDS)
-        mistakes = [
-            f"column status: found {str(each)!r}, expected {valid}" for each in unknown[:10]
-        ]
+        named = [repr(str(each)) for each in unknown[:10]]
+        mistakes = [f"column status: found {each}, expected {valid}" for each in named]
         raise TableError(str(path), mistakes)
-    if (said == "undecided").any():
-        return None
-    return np.asarray(said == "sliding")
+    by_force = claims_sliding(contact, forces.values)
+    return np.where(said == "undecided", by_force, said == "sliding")

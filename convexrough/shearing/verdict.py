@@ -112,8 +112,13 @@ def verify_shear(
     certificate = certify_shear(contact, forces, force=force)
     given = checks.array("forces", forces, length=len(contact.scene))
     if sliding is None:
-        limits = checks.friction(contact.scene.friction) * contact.loads
-        sliding = (limits > 0) & (np.abs(given) >= (1.0 - CLAIMS_SLIDING) * limits)
+        sliding = claims_sliding(contact, given)
     claimed = frozen(np.array(np.broadcast_to(sliding, given.shape), dtype=bool))
     verdict = ShearVerdict(contact, given, float(force), claimed, within, certificate)
     return verdict if verdict.holds else replace(verdict, solution=shear(contact, force=force))
+
+
+def claims_sliding(contact: Contact, forces: Array) -> NDArray[np.bool_]:
+    """(n,) whose force is f P, or short of it by no more than 1e-4 of that."""
+    limits = checks.friction(contact.scene.friction) * contact.loads
+    return np.asarray((limits > 0) & (np.abs(forces) >= (1.0 - CLAIMS_SLIDING) * limits))

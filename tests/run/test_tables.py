@@ -13,7 +13,7 @@ from scene_files import scene_text, write_loads
 import convexrough as cr
 from convexrough.run.claims import power_of_ten, read_loads, read_shear_forces, rounded_up
 from convexrough.run.scene_file import read_scene
-from convexrough.run.tables import read_summits
+from convexrough.run.tables import read_summits, read_table
 
 PLACES = [[0.0, 0.0], [1.0, 0.0], [0.5, 2.5]]
 LOADS = [1.5, 0.0, 2.5e-5]
@@ -144,7 +144,8 @@ def test_arrays(tmp_path: Path) -> None:
     np.savez(tmp_path / "e.npz", load=LOADS)
     np.savez(tmp_path / "f.npz", np.array(LOADS))
     np.savez(tmp_path / "g.npz", x=table[:, 0], y=table[:, 1], load=LOADS, more=["a", "b", "c"])
-    for name in "efg":
+    np.savez(tmp_path / "h.npz", force=3.0, grid=np.eye(4), load=LOADS, other=np.ones(9))
+    for name in "efgh":
         assert read_loads(tmp_path / f"{name}.npz", small()).values.tolist() == LOADS, name
 
 
@@ -156,6 +157,9 @@ def test_parquet(tmp_path: Path) -> None:
     columns = {"x": x[::-1], "y": y[::-1], "status": ["a", "b", "c"], "load": LOADS[::-1]}
     parquet.write_table(pyarrow.table(columns), tmp_path / "a.parquet")
     assert read_loads(tmp_path / "a.parquet", small()).values.tolist() == LOADS
+    parquet.write_table(pyarrow.table({"load": [1.0, None, 2.0]}), tmp_path / "gap.parquet")
+    with pytest.raises(cr.InputError, match="entry 1, column load: found None, expected a finite"):
+        read_loads(tmp_path / "gap.parquet", small())
     (tmp_path / "b.parquet").write_bytes(b"PAR1 and then nothing")
     with pytest.raises(cr.FileError, match=r"not an \.parquet file"):
         read_loads(tmp_path / "b.parquet", small())
@@ -311,7 +315,7 @@ def test_an_endless_line_is_refused_quickly(tmp_path: Path, unit: bytes) -> None
     began = time.perf_counter()
     with pytest.raises(cr.FileError, match="row 2: longer than 16,777,216 characters"):
         read_loads(path, small())
-    assert time.perf_counter() - began < 2.0
+    assert time.perf_counter() - began < 5.0
     path.unlink()
 
 
@@ -377,6 +381,7 @@ def test_summits_without_optional_columns(tmp_path: Path) -> None:
         ("x,y\n0,nan\n", "row 2, column y: found nan, expected a finite number: 0,nan"),
         ("x,y\n-inf,0\n", "row 2, column x: found -inf, expected a finite number"),
         ("x,y\n0,0\n1,2,3\n", "row 3: found 3 cells, expected 2, as in the header: 1,2,3"),
+        ("x,y\n0,0,1\n1,2,3\n", "row 2: found 3 cells, expected 2"),
         ("x,y\n0,0\n1", "row 3: found 1 cells, expected 2"),
         ('x,y\n0,"1\n', 'row 2: unexpected end of data: 0,"1'),
         ("x,y\n0,1_000\n", "row 2, column y: found '1_000', expected a finite number"),
@@ -399,3 +404,29 @@ def test_summits_need_a_tip_radius(tmp_path: Path) -> None:
     path.write_text("x,y\n0,0\n")
     with pytest.raises(cr.InputError, match="tip radii: found neither"):
         read_summits(path, tip_radius=None)
+
+
+NUMBERS = st.one_of(
+    st.floats(-1e60, 1e60).map(lambda each: each if abs(each) > 1e-60 else 0.0),
+    st.integers(-9, 9).map(float),
+    st.floats(0, 1).map(lambda each: round(each, 2)),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS.map(abs)), min_size=1, max_size=8),
+    st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("  ", ".")]),
+    st.sampled_from(["x{0}y{0}load", "x [m]{0}y [m]{0}load [N]", '"x"{0}"y"{0}"load"']),
+    st.sampled_from(["{}", "{:.17e}", "{:.17g}"]),
+)
+def test_what_is_written_is_read(
+    tmp_path_factory: Any, rows: Any, style: tuple[str, str], header: str, form: str
+) -> None:
+    separator, mark = style
+    lines = [separator.join(form.format(x).replace(".", mark) for x in row) for row in rows]
+    path = tmp_path_factory.mktemp("any") / "a.csv"
+    path.write_text("\n".join([header.format(separator), *lines]))
+    read = read_table(path, required=("x", "y", "load")).columns
+    expected = np.array([[float(form.format(x)) for x in row] for row in rows])
+    assert np.array_equal(np.column_stack([read[name] for name in ("x", "y", "load")]), expected)

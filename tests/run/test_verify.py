@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -285,3 +286,13 @@ def test_the_figure_of_many(monkeypatch: pytest.MonkeyPatch, contact: cr.Contact
     (image,) = figure.axes[0].images
     assert set(np.unique(image.get_array().compressed())) == {0, 1}
     assert "loads: the claim holds" in {text.get_text() for text in words(figure)}
+
+
+def test_the_page_has_every_option_and_exit_status(command: Any) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "verify.md").read_text()
+    told = command("verify", "--help").out
+    for option in re.findall(r"^ +(--\w+)", told, re.M):
+        assert f"`{option}" in page or f" {option} " in page, option
+    for status in ("0 only if", "2 wrong", "3 otherwise", "4 no"):
+        assert status in " ".join(told.split())
+        assert f"| {status[0]} |" in page
