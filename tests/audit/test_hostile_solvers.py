@@ -120,7 +120,7 @@ def test_what_are_no_forces_is_an_error(field: str, value: float) -> None:
         return state._replace(**{field: values})
 
     contact = pressed("paper")
-    with pytest.raises(cr.SolverError, match="liar: no .* were found"):
+    with pytest.raises(cr.SolverError, match=r"liar: no .* were found"):
         shear_vector(contact, force=0.3 * FRICTION * contact.load, solver=VectorLiar(spoil))
 
 
