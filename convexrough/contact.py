@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks, solvers
 from convexrough.arrays import Array, frozen
 from convexrough.convex.newton_step import correct
-from convexrough.errors import SolverError
+from convexrough.errors import InputError, SolverError
 from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
@@ -153,6 +153,8 @@ def solve(
     if announce is not None:
         announce("certifying")
     certificate = judge(problem, loads)
+    if not abs(solution.approach * length - certificate.approach) <= certificate.approach_error:
+        solution = replace(solution, approach=certificate.approach / length)
     model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
     return Contact(
         scene=scene,
@@ -175,13 +177,18 @@ def solve(
 def _solved(
     solver: Solver, problem: NormalProblem, start: Array | None, announce: Announce | None
 ) -> Solution:
-    """The solver's answer; the last loads of an error in the scene's units and order."""
+    """The solver's answer, if it is one; the last loads of an error in scene units and order."""
     try:
-        return solver.solve(problem, start, announce)
+        solution = solver.solve(problem, start, announce)
     except SolverError as error:
         if error.iterate is not None:
             error.iterate = problem.to_scene(error.iterate * problem.units.force)
         raise
+    try:
+        loads = checks.array("loads", solution.loads, length=len(problem), sign="not negative")
+    except InputError as error:
+        raise SolverError(f"no loads were found: {error}", solver=solver.name) from error
+    return replace(solution, loads=loads)
 
 
 def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> tuple[float, float]:

@@ -32,6 +32,10 @@ from convexrough.shearing.problem import TangentialProblem
 #: Where P* is within a tenth of P, |ceiling* - ceiling| <= LOCAL h |P* - P|: 1.1 / 0.9^(1/3).
 LOCAL = 1.15
 
+#: Roundoffs of a share u / P that are counted apart: near full slip each changes the own deflection
+#: by (2/3) (1 - t)^(-1/3), up to 1e5, roundoffs of its own.
+SHARE_ROUNDOFFS = 4
+
 #: Roundoffs, for each asperity, of sum P and of T, which is moved to sum P where it is that to
 #: rounding (`TangentialEnergy.at_limit`): 2 (n - 1) and 2 (4 + log2 n), and a few of Q / f.
 LIMIT_ROUNDOFFS = 12
@@ -194,7 +198,9 @@ def _residual(given: _Given, image: _Image) -> _Residual:
     sums = np.abs(own) + given.magnitude + given.states.rises[:, None]
     uncertainty = SUM_ROUNDOFFS * ROUNDOFF * sums
     uncertainty += given.rounding + known.stray_effect + known.loose_effect
-    change = own_change(problem, size, np.abs(own), image.shifts)
+    change = own_change(
+        problem, size, np.abs(own), image.shifts + SHARE_ROUNDOFFS * ROUNDOFF * size
+    )
     beyond = available * np.sign(u) - problem.ceilings
     sticks = np.abs(available - own) + uncertainty + change
     values = np.where(size < problem.loads, sticks, np.maximum(uncertainty - beyond, 0.0))
@@ -244,7 +250,8 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: Array) -
     )
     uncertainty += (distance + image.carried_norm)[:, None] * known.reach * (1 + SAFETY)
     sticks = known.sure & (distances < 0.5 * (P - size))
-    change = own_change(problem, size, np.abs(own), distances)
+    moved = distances + SHARE_ROUNDOFFS * ROUNDOFF * size
+    change = own_change(problem, size, np.abs(own), moved)
     available = given.available
     at_each = np.where(sticks, np.abs(available - own) + uncertainty + change, np.inf)
     rise_errors = at_each.min(axis=1)

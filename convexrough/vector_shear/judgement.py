@@ -22,7 +22,12 @@ from convexrough.arrays import Array
 from convexrough.convex.definite import proved_margin
 from convexrough.normal.judgement import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.judgement import LIMIT_ROUNDOFFS, Bounds, own_change
+from convexrough.shearing.judgement import (
+    LIMIT_ROUNDOFFS,
+    SHARE_ROUNDOFFS,
+    Bounds,
+    own_change,
+)
 from convexrough.shearing.load_errors import MARGINS, LoadErrors
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
@@ -142,9 +147,14 @@ def _residual(given: _Given, image: _Image) -> _Residual:
     sums = own + reach @ sizes + float(np.hypot(*state.rise))
     uncertainty = (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * sums
     uncertainty += reach @ (image.carried + image.shifts) + own * known.relative
-    change = own_change(problem.scalar, sizes, own, image.shifts)
+    change = own_change(problem.scalar, sizes, own, image.shifts + _blur(sizes))
     values = np.where(known.sure, mapped + uncertainty + change, 0.0)
     return _Residual(mapped, uncertainty, values)
+
+
+def _blur(sizes: Array) -> Array:
+    """What rounding of a share |q| / P can be read as: near full slip the law is steep."""
+    return SHARE_ROUNDOFFS * ROUNDOFF * sizes
 
 
 def _distance(given: _Given, residual: _Residual, margin: float) -> float:
@@ -165,7 +175,7 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
     coupled = distance * np.sqrt(reach**2 @ (1.0 / h)) * (1 + SAFETY)
     uncertainty = residual.uncertainty + coupled
     sticks = known.sure & (distances < 0.5 * (problem.scalar.loads - sizes))
-    change = own_change(problem.scalar, sizes, own, distances)
+    change = own_change(problem.scalar, sizes, own, distances + _blur(sizes))
     at_each = residual.mapped + uncertainty + change
     rise_error = float(at_each.min(where=sticks, initial=np.inf))
     slip_errors = uncertainty + rise_error + ceilings * known.relative

@@ -52,6 +52,14 @@ def solved(family: Any, refinement: float) -> tuple[NormalProblem, reference.Ref
     return problem, reference.refine(problem, Newton().solve(problem).loads)
 
 
+def test_no_reference_where_long_double_is_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("convexrough.bench.reference.Long", np.float64)
+    each = scene("lattice", 1.0)
+    problem = NormalProblem.assemble(each, approach=APPROACH)
+    with pytest.raises(cr.InputError, match="numbers longer than float64"):
+        reference.refine(problem, Newton().solve(problem).loads)
+
+
 @extended
 @pytest.mark.parametrize("few", [0, reference.FEW], ids=["transforms", "pairs"])
 @pytest.mark.parametrize("family", ["lattice", "rough"])

@@ -5,13 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flint import arb, ctx
 from friction_scenes import FRICTION, KINDS, NAMES, exact, in_doubt, off, pressed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import MATERIAL, PAPER_APPROACH, scattered, solve_exactly
 
 import convexrough as cr
-from convexrough.shearing.judgement import judge_states
+from convexrough.normal.judgement import SUM_ROUNDOFFS
+from convexrough.roundoff import ROUNDOFF
+from convexrough.shearing.judgement import SHARE_ROUNDOFFS, judge_states, own_change
 from convexrough.shearing.load_errors import LoadErrors
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.sphere import hertz
@@ -156,6 +159,29 @@ def test_just_before_gross_sliding_the_last_one_sticks() -> None:
     assert (state.status == "sliding").sum() == 36
     assert state.status[0] == "partial"
     assert state.certificate.holds
+
+
+def test_the_law_near_full_slip_loses_more_than_a_few_roundoffs() -> None:
+    """Read forwards, from a force to its deflection; the bounds count a roundoff of the force."""
+    problem = TangentialProblem.of(pressed("rough"))
+    rng = np.random.default_rng(2)
+    P, worst = problem.loads, 0.0
+    for _ in range(20):
+        u = P * (1 - 2.0 ** rng.uniform(-53, -5, len(P)))
+        own = problem.deflections(u)
+        with ctx.workprec(300):
+            shares = [1 - arb(float(a)) / arb(float(b)) for a, b in zip(u, P, strict=True)]
+            true = [
+                arb(float(c)) * (1 - s.root(3) ** 2)
+                for c, s in zip(problem.ceilings, shares, strict=True)
+            ]
+            off_by = np.array(
+                [abs(float(arb(float(a)) - b)) for a, b in zip(own, true, strict=True)]
+            )
+        few = SUM_ROUNDOFFS * ROUNDOFF * own
+        worst = max(worst, float((off_by / few).max()))
+        assert (off_by <= few + own_change(problem, u, own, SHARE_ROUNDOFFS * ROUNDOFF * u)).all()
+    assert worst > 100
 
 
 def ring_of_six(turns: float = 0.0) -> cr.Scene:
