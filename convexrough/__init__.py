@@ -4,6 +4,8 @@ from convexrough import solvers
 from convexrough.contact import Contact, press
 from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
 from convexrough.normal.certificate import Certificate, certify
+from convexrough.paths.memory import MemoryCurve
+from convexrough.paths.path import LoadPath, load_path
 from convexrough.run.scene_file import SceneFile, read_scene
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
@@ -30,8 +32,10 @@ __all__ = [
     "FrictionNewton",
     "History",
     "InputError",
+    "LoadPath",
     "Loop",
     "Material",
+    "MemoryCurve",
     "Scene",
     "SceneFile",
     "ShearCertificate",
@@ -45,6 +49,7 @@ __all__ = [
     "cycle",
     "cycles",
     "history",
+    "load_path",
     "onset_of_sliding",
     "press",
     "read_scene",

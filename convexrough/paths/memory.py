@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
 from typing import NamedTuple
 
 from convexrough.errors import InputError
@@ -67,10 +68,13 @@ class MemoryCurve:
 
     @property
     def bends(self) -> list[tuple[Fraction, Fraction]]:
-        """(s_k, th_(k-1) - th_k) at each vertex but the origin; above the top the slope is 0."""
-        above = (*self.slopes[1:], Fraction(0))
-        pairs = zip(self.slopes, above, strict=True)
-        return list(zip(self.levels[1:], [low - high for low, high in pairs], strict=True))
+        """(s_k, th_(k-1) - th_k) at each vertex; below the origin and above the top the slope is 0.
+
+        The state is the sum of these bends times the normal solutions at their levels.
+        """
+        slopes = (Fraction(0), *self.slopes, Fraction(0))
+        bends = [below - above for below, above in pairwise(slopes)]
+        return list(zip(self.levels, bends, strict=True))
 
     def go(
         self, load: Fraction | float, height: Fraction | float
