@@ -6,6 +6,8 @@ from convexrough.errors import ConvexroughError, FileError, InputError, SolverEr
 from convexrough.normal.certificate import Certificate, certify
 from convexrough.paths.memory import MemoryCurve
 from convexrough.paths.path import LoadPath, load_path
+from convexrough.paths.shapes import elliptic_path
+from convexrough.paths.steady import Steady, steady
 from convexrough.run.scene_file import SceneFile, read_scene
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
@@ -42,12 +44,14 @@ __all__ = [
     "ShearState",
     "SmoothSphere",
     "SolverError",
+    "Steady",
     "VectorShearState",
     "Verdict",
     "__version__",
     "certify",
     "cycle",
     "cycles",
+    "elliptic_path",
     "history",
     "load_path",
     "onset_of_sliding",
@@ -57,5 +61,6 @@ __all__ = [
     "shear_vector",
     "smooth",
     "solvers",
+    "steady",
     "verify",
 ]

@@ -6,6 +6,7 @@ is 0 at no load: only differences enter the tangential state.
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Iterable
 from dataclasses import replace
 from fractions import Fraction
@@ -24,6 +25,9 @@ from convexrough.progress import Announce
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
+
+#: Levels closer than this, relative to themselves, are one: errors of the answer include it.
+SAME = 16 * ROUNDOFF
 
 
 class Level(NamedTuple):
@@ -66,6 +70,7 @@ class Levels:
             NormalProblem.assemble(scene, load=highest, influence=influence) if highest else None
         )
         self._known = {0.0: self._no_load()}
+        self._sorted = [0.0]
 
     @property
     def presses(self) -> int:
@@ -75,15 +80,19 @@ class Levels:
     @property
     def known(self) -> list[Level]:
         """All of them so far, lowest first."""
-        return [self._known[load] for load in sorted(self._known)]
+        return [self._known[load] for load in self._sorted]
 
     def at(self, level: Fraction | float) -> Level:
-        """The solution at a level up to the highest."""
+        """The solution at a level up to the highest, or at one that is the same to rounding."""
         load = float(level)
-        if load not in self._known:
-            if self._announce is not None:
-                self._announce(f"pressing level {len(self._known)}")
-            self._known[load] = self._press(load)
+        place = bisect(self._sorted, load)
+        for near in self._sorted[max(place - 1, 0) : place + 1]:
+            if abs(near - load) <= SAME * near:
+                return self._known[near]
+        if self._announce is not None:
+            self._announce(f"pressing level {len(self._known)}")
+        self._known[load] = self._press(load)
+        self._sorted.insert(place, load)
         return self._known[load]
 
     def need(self, levels: Iterable[Fraction]) -> None:
@@ -125,8 +134,8 @@ class Levels:
         high = hertz.indentation(contact.loads + proof.load_errors, k)
         loaded = contact.loads > 0
         errors = np.where(loaded, np.maximum(own - low, high - own), proof.gap_errors)
-        # The level is known to a rounding; dD0/ds is no more than 1 / (2 E* a) of any asperity.
-        blur = ROUNDOFF * load
+        # dD0/ds is no more than 1 / (2 E* a) of any asperity.
+        blur = (SAME + 2 * ROUNDOFF) * load
         softest = 2.0 * scene.material.contact_modulus * contact.contact_radii.max()
         energy, energy_error = self._energy(problem, contact.loads, proof.duality_gap)
         approach = contact.approach + self._top
@@ -179,7 +188,7 @@ class Levels:
             indentations=below,
             indentation_errors=errors,
             touching=np.zeros(n, dtype=bool),
-            open=below < -errors,
+            open=np.ones(n, dtype=bool),  # the last to leave has no gap, but carries nothing
             rate=np.nan,
         )
 

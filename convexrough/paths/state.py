@@ -97,17 +97,16 @@ def words(levels: Levels, curve: MemoryCurve) -> NDArray[np.str_]:
     Proved where the indentations are ordered at these levels.
     """
     here = levels.at(curve.load)
-    if curve.load == 0:  # the last asperity to leave has no gap yet
-        return _worded(here, open=np.ones_like(here.open))
     if curve.front is None:
-        return _worded(here, stuck=here.touching)
+        return worded(here, stuck=here.touching)
     front = levels.at(curve.front)
-    return _worded(here, partial=front.touching, sliding=here.touching & front.open)
+    return worded(here, partial=front.touching, sliding=here.touching & front.open)
 
 
-def _worded(here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
-    found = np.full(len(here.open), "undecided", dtype="<U9")
+def worded(here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
+    """(n,) "open" where open here, and each word where that is proved; else "undecided"."""
+    found = np.full(len(here.open), "undecided", dtype="<U12")
     found[here.open] = "open"
     for word, which in proved.items():
         found[which] = word
-    return found
+    return frozen(found)

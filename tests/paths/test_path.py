@@ -5,12 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from path_scenes import LARGEST, ONE, PAPER, TWO, follow, path_of
-from scenes import random_scenes
 
 import convexrough as cr
 from convexrough.influence import couple
@@ -131,38 +128,30 @@ def test_constant_load_is_a_history(name: str) -> None:
     assert (np.abs(path.energy - past.energy) <= path.energy_errors + 1e-13 * past.energy).all()
 
 
-@settings(max_examples=8, deadline=None)
-@given(random_scenes(crowding=0.7, most=12), st.integers(0, 2**32 - 1))
-def test_what_a_path_costs_is_its_work(drawn: tuple[cr.Scene, float], seed: int) -> None:
+def test_what_a_path_costs_is_its_work() -> None:
     """W = the integral of Q dX less the change of stored energy, which is that of the curve."""
-    scene, approach = drawn
-    largest = cr.press(scene, approach=approach).load
-    if largest == 0:
-        return
-    rng = np.random.default_rng(seed)
-    P = rng.uniform(0.05, 1.0, 4)
-    points = np.column_stack((P, P * rng.uniform(-0.9, 0.9, 4))) * largest
-    scene = replace(scene, friction=0.3)
-    path = cr.load_path(scene, loads=points[:, 0], forces=0.3 * points[:, 1])
-    fine = _cut(np.vstack(([0.0, 0.0], points)))
-    cut = cr.load_path(scene, loads=fine[:, 0], forces=0.3 * fine[:, 1])
-    doubt = path.energy_errors[-1] + cut.energy_errors[-1]
-    scale = 1e-12 * np.abs(path.applied).max() * np.abs(path.displacements).max()
-    assert cut.energy[-1] == pytest.approx(path.energy[-1], rel=1e-9, abs=doubt + scale)
-    # Stored energy: the work along the path without slip to the same state.
+    path = follow("paper", [(0.8, 0.3), (0.5, -0.2), (0.9, 0.5)])
+    points = np.column_stack((path.loads, path.applied / 0.5))
     curve = path.curves[-1]
     pairs = zip(curve.levels, curve.heights, strict=True)
-    slow = _cut(np.array([(float(level), float(height)) for level, height in pairs]))
-    stored = cr.load_path(scene, loads=slow[:, 0], forces=0.3 * slow[:, 1])
-    assert stored.energy[-1] == pytest.approx(0.0, abs=stored.energy_errors[-1] + scale)
-    work = _work(cut) - _work(stored)
-    assert work == pytest.approx(path.energy[-1], abs=0.01 * (_work(cut) + 1e12 * scale))
+    slow = np.array([(float(level), float(height)) for level, height in pairs])
+    missed = []
+    for parts in (16, 32):
+        cut = _cut(np.vstack(([0.0, 0.0], points)), parts)
+        assert cut.energy[-1] == pytest.approx(path.energy[-1], rel=1e-11)
+        # Stored energy: the work along the path without slip to the same state.
+        stored = _cut(slow, parts)
+        assert stored.energy[-1] < 1e-12 * path.energy[-1]
+        missed.append((_work(cut) - _work(stored)) / path.energy[-1] - 1)
+    assert abs(missed[1]) < 2e-3
+    assert abs(missed[1]) < 0.4 * abs(missed[0])
 
 
-def _cut(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Each segment in 16, finer where it begins: near no load displacements go as its 2/3 power."""
-    parts = (np.arange(1, 17)[:, None] / 16) ** 2
-    return np.concatenate([a + parts * (b - a) for a, b in pairwise(corners)])
+def _cut(corners: NDArray[np.float64], parts: int) -> cr.LoadPath:
+    """Each segment in parts, finer where it begins: near no load X goes as P^(2/3)."""
+    along = (np.arange(1, parts + 1)[:, None] / parts) ** 2
+    fine = np.concatenate([a + along * (b - a) for a, b in pairwise(corners)])
+    return cr.load_path(PAPER, loads=fine[:, 0], forces=0.5 * fine[:, 1])
 
 
 def _work(path: cr.LoadPath) -> float:
@@ -177,8 +166,8 @@ def test_pulled_off_and_pressed_again() -> None:
     assert (path.forces[1] == 0).all()
     assert (path.status[1] == "open").all()
     fresh = follow("paper", [(0.6, 0), (0.6, 0.3)])
-    assert path.displacements[3] == fresh.displacements[1]
-    assert_allclose(path.forces[3], fresh.forces[1], rtol=1e-14)
+    assert path.displacements[3] == pytest.approx(fresh.displacements[1], rel=1e-13)
+    assert_allclose(path.forces[3], fresh.forces[1], atol=1e-14 * LARGEST["paper"])
 
 
 def test_unloading_at_constant_shear_slips() -> None:
