@@ -6,6 +6,7 @@ from convexrough.errors import ConvexroughError, FileError, InputError, SolverEr
 from convexrough.normal.certificate import Certificate, certify
 from convexrough.paths.memory import MemoryCurve
 from convexrough.paths.path import LoadPath, load_path
+from convexrough.paths.shakedown import Shakedown, shakedown
 from convexrough.paths.shapes import elliptic_path
 from convexrough.paths.steady import Steady, steady
 from convexrough.run.scene_file import SceneFile, read_scene
@@ -40,6 +41,7 @@ __all__ = [
     "MemoryCurve",
     "Scene",
     "SceneFile",
+    "Shakedown",
     "ShearCertificate",
     "ShearState",
     "SmoothSphere",
@@ -57,6 +59,7 @@ __all__ = [
     "onset_of_sliding",
     "press",
     "read_scene",
+    "shakedown",
     "shear",
     "shear_vector",
     "smooth",

@@ -100,14 +100,6 @@ class Levels:
         for level in levels:
             self.at(level)
 
-    def indentation_bounds(self) -> tuple[Array, Array]:
-        """(K, n) of the known levels, lowest first: indentations and their errors."""
-        known = self.known
-        return (
-            np.array([level.indentations for level in known]),
-            np.array([level.indentation_errors for level in known]),
-        )
-
     @property
     def crowding_bound(self) -> float:
         """The largest row sum of A C with radii no solution up to the highest load exceeds.
