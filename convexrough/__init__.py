@@ -24,6 +24,11 @@ if TYPE_CHECKING:
         SolverError,
     )
     from convexrough.normal.certificate import Certificate, certify
+    from convexrough.paths.memory import MemoryCurve
+    from convexrough.paths.path import LoadPath, load_path
+    from convexrough.paths.shakedown import Shakedown, shakedown
+    from convexrough.paths.shapes import elliptic_path
+    from convexrough.paths.steady import Steady, steady
     from convexrough.run.scene_file import SceneFile, read_scene
     from convexrough.scene.asperities import Asperities
     from convexrough.scene.material import Material
@@ -45,6 +50,11 @@ _HOMES = {
     "contact": ("Contact", "press"),
     "errors": ("ConvexroughError", "FileError", "InputError", "ProofError", "SolverError"),
     "normal.certificate": ("Certificate", "certify"),
+    "paths.memory": ("MemoryCurve",),
+    "paths.path": ("LoadPath", "load_path"),
+    "paths.shakedown": ("Shakedown", "shakedown"),
+    "paths.shapes": ("elliptic_path",),
+    "paths.steady": ("Steady", "steady"),
     "run.scene_file": ("SceneFile", "read_scene"),
     "scene.asperities": ("Asperities",),
     "scene.material": ("Material",),
@@ -77,15 +87,19 @@ __all__ = [
     "FrictionNewton",
     "History",
     "InputError",
+    "LoadPath",
     "Loop",
     "Material",
+    "MemoryCurve",
     "ProofError",
     "Scene",
     "SceneFile",
+    "Shakedown",
     "ShearCertificate",
     "ShearState",
     "SmoothSphere",
     "SolverError",
+    "Steady",
     "VectorShearState",
     "Verdict",
     "__version__",
@@ -93,15 +107,19 @@ __all__ = [
     "certify_shear",
     "cycle",
     "cycles",
+    "elliptic_path",
     "history",
+    "load_path",
     "loops",
     "onset_of_sliding",
     "press",
     "read_scene",
+    "shakedown",
     "shear",
     "shear_vector",
     "smooth",
     "solvers",
+    "steady",
     "verify",
 ]
 

@@ -1,0 +1,203 @@
+"""`shakedown`: how far a load path may be scaled until asperities slide in every cycle.
+
+The path is (P0, Q0) + factor (p, q). With T = Q / f, r+ and r- the largest -(p + t) and -(p - t) of
+its points, the permanently stuck level is  L* = P0 - factor (r+ + r-) / 2,  and asperity i slides
+for ever once L* falls below its onset sigma_i: docs/theory/load-paths.md, "Shakedown".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.arrays import Array, frozen
+from convexrough.contact import Contact, press
+from convexrough.errors import InputError
+from convexrough.influence import Kind
+from convexrough.paths import melan
+from convexrough.paths.levels import Levels
+from convexrough.paths.onset import last_to_touch, onsets
+from convexrough.paths.order import Order, order_of
+from convexrough.roundoff import SAFETY
+from convexrough.scene.scene import Scene
+from convexrough.shearing.state import MOST_ONSETS
+
+Theory = Literal["exact", "elastic", "vector"]
+
+
+@dataclass(frozen=True, eq=False)
+class Shakedown:
+    """The factor up to which sliding shakes down, from below by a state and above by slips.
+
+    kind    : "exact": partial slip, any path; sliding of whole asperities ceases. "elastic" and
+        "vector": Melan's theorem for asperities that stick until they slide, at constant load
+    factor  : least of `factors`, or of the program;  lower, upper : proved bounds on it
+    factors : (n,) of each asperity that touches at the mean load, nan of others and where not
+        looked for; one number for all by "vector"
+    gross   : the factor at which all of them slide at once, beyond which there is no such path
+    witness : (n,) or (n, 2) [force] shear at rest that keeps all within friction up to `lower`,
+        with what the path adds elastically
+    mechanism : (n,) slips just beyond, the largest 1; (m, n, 2) of each vertex by "vector"
+    order   : what "exact" rests on, at the levels used; None of the others
+    """
+
+    scene: Scene
+    kind: Theory
+    factor: float
+    lower: float
+    upper: float
+    factors: Array
+    gross: float
+    witness: Array
+    mechanism: Array
+    order: Order | None = None
+
+    @property
+    def gap(self) -> float:
+        """(upper - lower) / factor."""
+        return (self.upper - self.lower) / self.factor if np.isfinite(self.factor) else 0.0
+
+
+def shakedown(
+    scene: Scene,
+    *,
+    loads: float,
+    forces: ArrayLike = 0.0,
+    load_amplitudes: ArrayLike = 0.0,
+    force_amplitudes: ArrayLike,
+    kind: Theory = "exact",
+    influence: Kind | None = None,
+) -> Shakedown:
+    """The largest factor of a closed path around (loads, forces) that shakes down.
+
+    loads, forces : P0 and Q0 [force]; Q0 is (2,) for "vector"
+    load_amplitudes, force_amplitudes : (m,) p and q of the points of the path [force], a number
+        for all; q is (m, 2) for "vector". The other two kinds need p = 0.
+
+    Raises InputError for bad values, |Q0| >= f P0, or a path on which nothing moves.
+    """
+    f = checks.friction(scene.friction)
+    P0 = checks.positive("loads", loads)
+    if kind not in ("exact", "elastic", "vector"):
+        raise InputError("kind", found=repr(kind), expected='"exact", "elastic" or "vector"')
+    if kind == "vector":
+        Q0, q = _vectors("forces", forces, 1)[0], _vectors("force_amplitudes", force_amplitudes, 2)
+        p = checks.array("load_amplitudes", load_amplitudes, length=len(q))
+        t0, t = Q0 / f, q / f
+    else:
+        Q0 = checks.finite("forces", float(np.asarray(forces)))
+        q = np.atleast_1d(checks.array("force_amplitudes", np.atleast_1d(force_amplitudes)))
+        p = checks.array("load_amplitudes", load_amplitudes, length=len(q))
+        t0, t = Q0 / f, q / f
+    if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
+        raise InputError("forces", found=forces, expected=f"less than f P = {f * P0:g} in size")
+    if not (np.any(p) or np.any(q)):
+        raise InputError("force_amplitudes", found="none", expected="a path that moves")
+    if kind == "exact":
+        return _exact(scene, P0, float(t0), p, t, Levels(scene, P0, influence))
+    if np.any(p):
+        expected = 'none: only "exact" holds where the normal load varies'
+        raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)
+    contact = press(scene, load=P0, influence=influence)
+    return (_elastic if kind == "elastic" else _vector)(contact, t0, t)
+
+
+def _exact(scene: Scene, P0: float, t0: float, p: Array, t: Array, levels: Levels) -> Shakedown:
+    f = checks.friction(scene.friction)
+    plus, minus = float((-(p + t)).max()), float((-(p - t)).max())
+    fall = (plus + minus) / 2  # of L*, per factor
+    gross = min((P0 + c * t0) / r if r > 0 else np.inf for c, r in ((1, plus), (-1, minus)))
+    last, worst = last_to_touch(levels, P0)
+    touching = np.flatnonzero(levels.at(P0).loads)
+    found = {last: worst}
+    if len(touching) <= MOST_ONSETS:
+        found |= onsets(levels, touching.tolist(), P0)
+    factors = np.full(len(scene), np.nan)
+    for asperity, each in found.items():
+        factors[asperity] = (P0 - each.load) / fall if fall > 0 else np.inf
+    sure = next((each for each in levels.known if each.touching[touching].all()), levels.at(P0))
+    beyond = levels.at(worst.lower)
+    lower, upper = ((P0 - s) / fall if fall > 0 else np.inf for s in (sure.load, beyond.load))
+    height = t0 - lower * (plus - minus) / 2 if fall > 0 else t0
+    gaps = np.maximum(-beyond.indentations, 0.0) * (levels.at(P0).loads > 0)
+    return Shakedown(
+        scene=scene,
+        kind="exact",
+        factor=float(factors[last]),
+        lower=lower * (1 - SAFETY),
+        upper=upper * (1 + SAFETY),
+        factors=frozen(factors),
+        gross=gross,
+        witness=frozen(f * height / (sure.load or 1.0) * sure.loads),
+        mechanism=frozen(gaps / (gaps.max() or 1.0)),
+        order=order_of(levels, [levels.at(0.0), sure, levels.at(P0)]),
+    )
+
+
+def _elastic(contact: Contact, t0: float, t: Array) -> Shakedown:
+    """The scalar program in closed form: alternating slip of one asperity, or gross sliding."""
+    f = checks.friction(contact.scene.friction)
+    shares = melan.elastic_shares(contact)
+    high, low = float(t.max()), float(t.min())
+    reach = np.abs(shares) * (high - low)
+    alternating = np.divide(
+        2.0 * contact.loads, reach, out=np.full_like(reach, np.inf), where=reach > 0
+    )
+    gross = min(
+        (contact.load - t0) / high if high > 0 else np.inf,
+        (contact.load + t0) / -low if low < 0 else np.inf,
+    )
+    loaded = contact.loads > 0
+    factors = np.where(loaded, alternating, np.nan)
+    critical = int(np.nanargmin(factors))
+    factor = min(float(factors[critical]), gross)
+    # At rest each asperity has room from -P_i - factor q_i low to P_i - factor q_i high.
+    room_low = -contact.loads - factor * np.minimum(shares * low, shares * high)
+    room_high = contact.loads - factor * np.maximum(shares * low, shares * high)
+    width = room_high - room_low
+    part = (t0 - room_low.sum()) / (width.sum() or 1.0)
+    mechanism = (np.arange(len(loaded)) == critical) | (factor == gross) & loaded
+    doubt = float((contact.certificate.load_errors[loaded] / contact.loads[loaded]).max()) + 1e-12
+    return Shakedown(
+        scene=contact.scene,
+        kind="elastic",
+        factor=factor,
+        lower=factor * (1 - doubt),
+        upper=factor * (1 + doubt),
+        factors=frozen(factors),
+        gross=gross,
+        witness=frozen(f * (room_low + part * width)),
+        mechanism=frozen(mechanism.astype(np.float64)),
+    )
+
+
+def _vector(contact: Contact, t0: Array, t: Array) -> Shakedown:
+    f = checks.friction(contact.scene.friction)
+    found = melan.solve(contact, t0, t)
+    slips = np.hypot(*np.moveaxis(found.slips, -1, 0)).max()
+    return Shakedown(
+        scene=contact.scene,
+        kind="vector",
+        factor=(found.lower + found.upper) / 2,
+        lower=found.lower,
+        upper=found.upper,
+        factors=frozen(np.where(contact.loads > 0, (found.lower + found.upper) / 2, np.nan)),
+        gross=found.gross,
+        witness=frozen(f * found.residual),
+        mechanism=frozen(found.slips / (slips or 1.0)),
+    )
+
+
+def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
+    """(m, 2) of forces in the plane; one of them, or a number along x, if one is expected."""
+    given = np.asarray(values, dtype=np.float64)
+    if given.ndim == 0 and dimensions == 1:
+        given = np.array([float(given), 0.0])
+    if given.ndim != dimensions or given.shape[-1] != 2 or not np.isfinite(given).all():
+        shape = "two finite numbers" if dimensions == 1 else "finite numbers of shape (m, 2)"
+        raise InputError(what, found=f"shape {given.shape}", expected=shape)
+    return np.atleast_2d(given)

@@ -1,0 +1,53 @@
+"""Smooth paths by chords, with corners where the front of slip starts, stops or turns."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from convexrough import checks
+from convexrough.arrays import Array, frozen
+from convexrough.errors import InputError
+
+
+def elliptic_path(
+    *,
+    load: float,
+    load_amplitude: float,
+    force: float = 0.0,
+    force_amplitude: float,
+    phase: float = 0.0,
+    friction: float,
+    chords: int = 96,
+) -> tuple[Array, Array]:
+    """(m,) P and (m,) Q around an ellipse.
+
+        P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
+
+    phase : [rad] 0 for a full ellipse, pi/2 for loads in phase on a straight line
+    friction : f of the scene, which says where P + Q/f and P - Q/f are extreme
+    chords : about as many; those extremes and the extremes of P are always corners, so that the
+        loss is off by about chords^-2, and the permanently stuck level is exact
+    """
+    if not isinstance(chords, int) or chords < 6:
+        raise InputError("chords", found=chords, expected="a whole number, at least 6")
+    p, q = (
+        checks.finite("load_amplitude", load_amplitude),
+        checks.finite("force_amplitude", force_amplitude),
+    )
+    t = q / checks.positive("friction", friction)
+    phase = checks.finite("phase", phase)
+    across, along = t * np.cos(phase), t * np.sin(phase)
+    corners = [0.0, np.arctan2(across, p + along), np.arctan2(-across, p - along)]
+    halves = np.sort(np.mod(corners, np.pi))
+    ends = np.append(np.concatenate((halves, halves + np.pi)), halves[0] + 2 * np.pi)
+    arcs = [
+        np.linspace(a, b, max(1, int(np.ceil(chords * (b - a) / (2 * np.pi)))), endpoint=False)
+        for a, b in pairwise(ends)
+        if b - a > 1e-9
+    ]
+    angles = np.concatenate(arcs)
+    loads = checks.finite("load", load) + p * np.cos(angles)
+    forces = checks.finite("force", force) + q * np.sin(angles + phase)
+    return frozen(loads), frozen(forces)

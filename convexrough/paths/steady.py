@@ -1,0 +1,127 @@
+"""`steady`: what a closed load path settles to, after one cycle.
+
+With m+ and m- the least P + T and P - T along the path, T = Q / f, the memory curve passes through
+the point  L* = (m+ + m-) / 2, T* = (m+ - m-) / 2  for ever: below L* nothing slips again, and above
+it the state repeats, whatever was before (docs/theory/load-paths.md, "Closed paths").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough.arrays import Array, frozen
+from convexrough.influence import Kind
+from convexrough.paths.energy import loss, shares
+from convexrough.paths.levels import Levels
+from convexrough.paths.memory import MemoryCurve, Piece
+from convexrough.paths.order import Order, order_of
+from convexrough.paths.path import follow, points_of
+from convexrough.paths.state import Friction, levels_of, worded
+from convexrough.progress import Announce
+from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz
+
+#: Cells that all fronts of a cycle together are cut into, to share its loss out: about 0.1 %.
+CELLS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Steady:
+    """A closed load path, repeated. Arrays are (n,), in the scene's order; errors are proved.
+
+    loads, applied : (m,) P and Q at the points of the path [force]
+    level, force_level : L* and f T* [force]
+    energy         : lost in each cycle but the first, both bodies [force length];  energy_error
+    energy_first   : lost on the way from no load through the first cycle;  energy_first_error
+    status         : "stuck" where a cycle has no slip, "partial" where a disc sticks for ever,
+        "sliding" once in each direction per cycle, "intermittent" where contact is lost in the
+        cycle, "open" all along, or "undecided"
+    slips          : [length] of gross slip, in each direction per cycle; nan where intermittent
+    stick_radii    : [length] of the disc that sticks for ever
+    order          : whether indentations rise with the load, which errors and words rest on
+    presses        : how many normal problems were solved
+    """
+
+    scene: Scene
+    loads: Array
+    applied: Array
+    level: float
+    force_level: float
+    energy: float
+    energy_error: float
+    energy_first: float
+    energy_first_error: float
+    status: NDArray[np.str_]
+    slips: Array
+    stick_radii: Array
+    order: Order
+    presses: int
+    _levels: Levels = field(repr=False)
+    _pieces: tuple[Piece, ...] = field(repr=False)
+
+    @cached_property
+    def energies(self) -> Array:
+        """(n,) [force length] lost at each asperity per cycle, to about 0.1 %; exact at constant P.
+
+        Takes two normal solutions for each of 64 cells, where P is not constant.
+        """
+        return frozen(shares(self._levels, self._pieces, CELLS))
+
+
+def steady(
+    scene: Scene,
+    *,
+    loads: ArrayLike,
+    forces: ArrayLike,
+    influence: Kind | None = None,
+    announce: Announce | None = None,
+) -> Steady:
+    """The steady state of a closed path of P and Q, |Q| <= f P, straight between its points.
+
+    loads, forces : (m,) P and Q at its points [force]; from the last it goes back to the first
+    influence, announce : as in `load_path`
+
+    Raises what `load_path` raises.
+    """
+    points = points_of(scene, loads, forces)
+    closed = [*points, points[0]]
+    start, costs = follow(MemoryCurve(), closed)
+    again, costs_again = follow(start[-1], points[1:] + points[:1])
+    pieces = [piece for cost in costs_again for piece in cost if piece.slope * piece.sign != 1]
+    first = [piece for cost in costs for piece in cost]
+    high, low = min(p + t for p, t in points), min(p - t for p, t in points)
+    still, least, most = (high + low) / 2, min(points)[0], max(points)[0]
+
+    levels = Levels(scene, float(most), influence, announce)
+    levels.need((still, least, most))
+    levels.need(levels_of(again[-1], [*first, *pieces]))
+    energy, energy_error = loss(levels, pieces)
+    energy_first, energy_first_error = loss(levels, first)
+    rest, bottom, top = levels.at(still), levels.at(least), levels.at(most)
+    sliding = bottom.touching & rest.open
+    intermittent = top.touching & bottom.open
+    sticking = {"partial" if pieces else "stuck": rest.touching}
+    slips = 2.0 * Friction.of(levels).travel * np.maximum(-rest.indentations, 0.0)
+    modulus = scene.material.contact_modulus
+    return Steady(
+        scene=scene,
+        loads=frozen(np.array(loads, dtype=np.float64)),
+        applied=frozen(np.array(forces, dtype=np.float64)),
+        level=float(still),
+        force_level=Friction.of(levels).coefficient * float((high - low) / 2),
+        energy=energy,
+        energy_error=energy_error,
+        energy_first=energy_first,
+        energy_first_error=energy_first_error,
+        status=worded(top, intermittent=intermittent, sliding=sliding, **sticking),
+        slips=frozen(np.where(intermittent, np.nan, np.where(sliding, slips, 0.0))),
+        stick_radii=frozen(hertz.contact_radius(rest.loads, modulus, scene.relative_radii)),
+        order=order_of(levels),
+        presses=levels.presses,
+        _levels=levels,
+        _pieces=tuple(pieces),
+    )

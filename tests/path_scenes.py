@@ -1,0 +1,28 @@
+"""The two scenes of the load paths, with friction, and their largest loads."""
+
+from dataclasses import replace
+
+import numpy as np
+from scenes import paper, rough
+
+import convexrough as cr
+from convexrough.arrays import Array
+
+PAPER, ROUGH = replace(paper(), friction=0.5), replace(rough(), friction=0.5)
+LARGEST = {"paper": 3.6085338874666633e-07, "rough": 3.541076216864549e-07}
+SCENES = {"paper": PAPER, "rough": ROUGH}
+
+#: (P, T) over the largest load.
+ONE = [(0.6, 0), (0.6, 0.3), (1, 0.3), (1, -0.15), (0.7, -0.15), (0.7, 0.2), (0.5, 0.1)]
+TWO = [(1, 0.5), (0.3, -0.2), (0.9, 0.35), (0.9, -0.6), (0.05, 0), (0.8, 0.6)]
+
+
+def path_of(name: str, points: list[tuple[float, float]]) -> tuple[cr.Scene, Array, Array]:
+    """The scene, and P and Q of these points."""
+    P, T = np.array(points).T * LARGEST[name]
+    return SCENES[name], P, 0.5 * T
+
+
+def follow(name: str, points: list[tuple[float, float]]) -> cr.LoadPath:
+    scene, loads, forces = path_of(name, points)
+    return cr.load_path(scene, loads=loads, forces=forces)

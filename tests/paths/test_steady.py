@@ -1,0 +1,150 @@
+"""Closed paths: values of the prototypes, closed forms, and today's cycles as the special case."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from path_scenes import LARGEST, SCENES, path_of
+from scenes import random_scenes
+
+import convexrough as cr
+from convexrough.arrays import Array
+from convexrough.paths.levels import Levels
+
+
+def octagon(name: str) -> tuple[cr.Scene, Array, Array]:
+    t = np.arange(8) * np.pi / 4
+    points = np.column_stack((1 + 0.4 * np.cos(t), 0.5 * np.sin(t + np.pi / 4))) / 1.4
+    return path_of(name, [tuple(point) for point in points])
+
+
+def settled(case: tuple[cr.Scene, Array, Array]) -> cr.Steady:
+    scene, P, Q = case
+    return cr.steady(scene, loads=P, forces=Q)
+
+
+def test_the_octagon() -> None:
+    found = settled(octagon("paper"))
+    mean = LARGEST["paper"] / 1.4
+    assert found.energy_first == pytest.approx(9.5663629049784e-14, rel=1e-12)
+    assert found.energy == pytest.approx(1.9339188634987e-13, rel=1e-12)
+    assert found.level / mean == pytest.approx(0.4318019484661, rel=1e-12)
+    assert found.force_level / (0.5 * mean) == pytest.approx(-0.2146446609407, rel=1e-12)
+    assert found.order == "proved at the levels used"
+    assert found.energy_error < 1e-10 * found.energy
+    assert found.energies.sum() == pytest.approx(found.energy, rel=1e-3)
+    words, counts = np.unique(found.status, return_counts=True)
+    assert dict(zip(words.tolist(), counts.tolist(), strict=True)) == {
+        "intermittent": 6,
+        "open": 24,
+        "partial": 19,
+        "sliding": 12,
+    }
+    assert settled(octagon("rough")).energy == pytest.approx(1.9572569969746e-13, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "loss"), [("paper", 1.4398575935045e-13), ("rough", 1.3935046228750e-13)]
+)
+def test_a_straight_line(name: str, loss: float) -> None:
+    """Against its closed form, a divided difference of V, too."""
+    found = settled(path_of(name, [(0.9, 0.4), (0.5, -0.4)]))
+    assert found.energy == pytest.approx(loss, rel=1e-12)
+    assert found.level / LARGEST[name] == pytest.approx(0.3)
+    P, p, q = 0.7, 0.2, 0.4
+    levels = Levels(SCENES[name], LARGEST[name])
+    still, low, high = (levels.at(x * LARGEST[name]) for x in (P - q, P - p, P + p))
+
+    def mean(a: float, b: float, Va: float, Vb: float) -> float:
+        return (Vb - Va) / ((b - a) * LARGEST[name])
+
+    bracket = (
+        mean(P - q, P + p, still.energy, high.energy)
+        + mean(P - q, P - p, still.energy, low.energy)
+        - mean(P - p, P + p, low.energy, high.energy)
+        - still.approach
+    )
+    travel = (2 - 0.3) / (2 * (1 - 0.3)) * 0.5**2
+    assert found.energy == pytest.approx(4 * travel * q * LARGEST[name] * bracket, rel=1e-10)
+
+
+def test_loads_that_follow_cost_nothing() -> None:
+    found = settled(path_of("paper", [(0.9, 0.2), (0.5, -0.1)]))
+    assert found.energy == 0
+    assert found.level == pytest.approx(0.5 * LARGEST["paper"])
+    assert set(found.status) == {"stuck", "intermittent", "open"}
+
+
+@pytest.mark.parametrize(
+    ("degrees", "loss"), [(0, 2.3311e-13), (45, 2.2997e-13), (90, 4.879666e-14), (135, 1.0184e-13)]
+)
+def test_ellipses(degrees: float, loss: float) -> None:
+    """The stuck level in closed form; the loss converges at second order."""
+    mean, phase = LARGEST["paper"] / 1.4, np.radians(degrees)
+    al, be = 0.4, 0.5
+    losses = []
+    for chords in (24, 48, 96):
+        P, Q = cr.elliptic_path(
+            load=mean,
+            load_amplitude=al * mean,
+            force_amplitude=0.5 * be * mean,
+            phase=phase,
+            friction=0.5,
+            chords=chords,
+        )
+        found = cr.steady(SCENES["paper"], loads=P, forces=Q)
+        rounds = [np.sqrt(al**2 + be**2 + 2 * c * al * be * np.sin(phase)) for c in (1, -1)]
+        assert found.level / mean == pytest.approx(1 - sum(rounds) / 2, rel=1e-12)
+        losses.append(found.energy)
+    assert losses[-1] == pytest.approx(loss, rel=5e-4)
+    assert abs(losses[2] / losses[1] - 1) < 0.45 * abs(losses[1] / losses[0] - 1) + 1e-9
+
+
+@pytest.mark.parametrize("name", ["paper", "rough"])
+def test_constant_load_is_a_cycle(name: str) -> None:
+    scene, P, Q = path_of(name, [(1, 0.7), (1, -0.3)])
+    contact = cr.press(scene, load=P[0])
+    cycle = cr.cycle(contact, maximum=Q[0], minimum=Q[1])
+    found = cr.steady(scene, loads=P, forces=Q)
+    assert found.energy == pytest.approx(cycle.energy, rel=1e-11)
+    assert_allclose(found.energies, cycle.energies, rtol=1e-8, atol=1e-12 * cycle.energy)
+    assert (found.status == cycle.status).all()
+    first = cr.shear(contact, force=0.5 * (Q[0] - Q[1]))
+    assert_allclose(found.slips, 2 * first.slips, atol=1e-12 * first.displacement)
+    sticking = found.status == "partial"
+    assert_allclose(found.stick_radii[sticking], first.stick_radii[sticking], rtol=1e-9)
+
+
+@settings(max_examples=8, deadline=None)
+@given(random_scenes(crowding=0.7, most=12), st.integers(0, 2**32 - 1))
+def test_every_later_cycle_is_the_same(drawn: tuple[cr.Scene, float], seed: int) -> None:
+    scene, approach = drawn
+    largest = cr.press(scene, approach=approach).load
+    if largest == 0:
+        return
+    rng = np.random.default_rng(seed)
+    P = rng.uniform(0.1, 1.0, 4)
+    T = P * rng.uniform(-0.9, 0.9, 4)
+    scene = replace(scene, friction=0.4)
+    found = cr.steady(scene, loads=P * largest, forces=0.4 * T * largest)
+    past = rng.uniform(0.1, 1.0, 2)
+    loads = np.concatenate((past, *[P] * 3, P[:1])) * largest
+    forces = np.concatenate((0.9 * past, *[T] * 3, T[:1])) * 0.4 * largest
+    path = cr.load_path(scene, loads=loads, forces=forces)
+    cost = path.energy[14] - path.energy[10]
+    doubt = path.energy_errors[-1] + found.energy_error
+    assert cost == pytest.approx(found.energy, abs=doubt)
+    assert_allclose(path.forces[10], path.forces[14], atol=1e-14 * largest)
+
+
+def test_bad_input() -> None:
+    scene, P, Q = octagon("paper")
+    with pytest.raises(cr.InputError, match="gross sliding"):
+        cr.steady(scene, loads=P, forces=4 * Q)
+    with pytest.raises(cr.InputError, match="at least one"):
+        cr.steady(scene, loads=[], forces=[])
+    with pytest.raises(cr.InputError, match="chords"):
+        cr.elliptic_path(load=1.0, load_amplitude=0.1, force_amplitude=0.1, friction=0.5, chords=2)
