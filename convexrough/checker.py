@@ -370,14 +370,27 @@ def scope(scene: Scene, box: Box, state: State, load: Interval | None) -> str:
     R, d, b = scene.radii, scene.offsets, box.radii
     ceiling = state.approach.high
     if load is not None:
-        pairs = zip(state.local, state.pushed, strict=True)
-        highest = max((u * Fraction(2, 3) + w).high for u, w in pairs)
-        terms = (state.near[i] * (state.local[i] / 3 - d[i]) for i in box.able)
-        ceiling = (sum(terms, Interval(0)) / load + highest).high
+        pairs = list(zip(state.local, state.pushed, strict=True))
+        least = max(w.high for _, w in pairs)
+        most = max((u * Fraction(2, 3) + w).high for u, w in pairs)
+        ceiling = min(
+            ceiling_at(scene, box, state, load, least + (most - least) * Fraction(3, 4) ** k)
+            for k in range(12)
+        )
     deepest = [(offset + ceiling).high for offset in d]
     if any(b[i] <= 0 < deepest[i] for i in range(len(b))):
         raise Refused("an asperity that could touch is left out of the box")
     return "global" if all(b[i] ** 2 >= R[i] * deepest[i] for i in box.able) else "local"
+
+
+def ceiling_at(scene: Scene, box: Box, state: State, load: Interval, top: Fraction) -> Fraction:
+    """A bound on the approach of all solutions with this load, for any top from max A P on (8)."""
+    total = Interval(0)
+    for i in (i for i in box.able if state.near[i].high > 0):
+        q, below = state.near[i] / load, Interval(top) - state.pushed[i]
+        total += q * (state.near[i] / below) * (state.near[i] / below) / (12 * scene.radii[i])
+        total -= q * scene.offsets[i]
+    return (total + top).high
 
 
 def load_of(scene: Scene, i: int, depth: Interval) -> Interval:

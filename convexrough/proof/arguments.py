@@ -87,11 +87,14 @@ class Trial:
         """A bound on the approach of every solution: (4) of docs/theory/proof-file.md."""
         if self.approach is not None:
             return self.approach
-        share = self.loads / self.loads.sum()
-        highest = float((2 / 3 * self.local + self.pushed).max())
-        mean = float(share @ self.local / 3), -float(share @ self.scene.offsets)
-        terms = np.array([highest, *mean])
-        return float(terms.sum() + ROUNDING * np.abs(terms).sum())
+        loaded = self.loads > 0
+        p, w, R = self.loads[loaded], self.pushed[loaded], self.scene.relative_radii[loaded]
+        share = p / p.sum()
+        least, most = self.pushed.max(), (2 / 3 * self.local + self.pushed).max()
+        tops = [least + (most - least) * 0.75**k for k in range(12)]
+        bounds = [top + float(share @ ((p / (top - w)) ** 2 / (12 * R))) for top in tops]
+        drop = float(share @ self.scene.offsets[loaded])
+        return float(min(bounds) - drop + ROUNDING * (min(bounds) + abs(drop)))
 
     def arguments(self) -> Iterator[Argument]:
         """The most general first; those that fail already in floating point are left out."""
