@@ -1,28 +1,80 @@
-"""Rough frictional contact as one convex program, with a proof of which asperities touch."""
+"""Rough frictional contact as one convex program, with a proof of which asperities touch.
 
-from convexrough import solvers
-from convexrough.contact import Contact, press
-from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
-from convexrough.normal.certificate import Certificate, certify
-from convexrough.paths.memory import MemoryCurve
-from convexrough.paths.path import LoadPath, load_path
-from convexrough.paths.shakedown import Shakedown, shakedown
-from convexrough.paths.shapes import elliptic_path
-from convexrough.paths.steady import Steady, steady
-from convexrough.run.scene_file import SceneFile, read_scene
-from convexrough.scene.asperities import Asperities
-from convexrough.scene.material import Material
-from convexrough.scene.scene import Scene
-from convexrough.shearing.certificate import ShearCertificate
-from convexrough.shearing.cycle import Cycle, Loop, cycle, cycles
-from convexrough.shearing.history import History, history
-from convexrough.shearing.state import ShearState, onset_of_sliding, shear
-from convexrough.sphere.smooth import SmoothSphere, smooth
-from convexrough.vector_shear.cones import FrictionConic
-from convexrough.vector_shear.newton import FrictionNewton
-from convexrough.vector_shear.state import VectorShearState, shear_vector
-from convexrough.verdict import Verdict, verify
-from convexrough.version import __version__
+Nothing is imported before it is used: the command line starts at once, and an interrupt finds no
+import half done.
+"""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False  # that of typing, which takes longer to import than all of this
+if TYPE_CHECKING:
+    from typing import Any
+
+    from convexrough import compare as compare
+    from convexrough import fields as fields
+    from convexrough import plots as plots
+    from convexrough import solvers as solvers
+    from convexrough import testing as testing
+    from convexrough.contact import Contact, press
+    from convexrough.errors import (
+        ConvexroughError,
+        FileError,
+        InputError,
+        ProofError,
+        SolverError,
+    )
+    from convexrough.normal.certificate import Certificate, certify
+    from convexrough.paths.memory import MemoryCurve
+    from convexrough.paths.path import LoadPath, load_path
+    from convexrough.paths.shakedown import Shakedown, shakedown
+    from convexrough.paths.shapes import elliptic_path
+    from convexrough.paths.steady import Steady, steady
+    from convexrough.run.scene_file import SceneFile, read_scene
+    from convexrough.scene.asperities import Asperities
+    from convexrough.scene.material import Material
+    from convexrough.scene.scene import Scene
+    from convexrough.shearing.certificate import ShearCertificate, certify_shear
+    from convexrough.shearing.cycle import Cycle, cycle, cycles, loops
+    from convexrough.shearing.history import History, history
+    from convexrough.shearing.loop import Loop
+    from convexrough.shearing.state import ShearState, onset_of_sliding, shear
+    from convexrough.sphere.smooth import SmoothSphere, smooth
+    from convexrough.vector_shear.cones import FrictionConic
+    from convexrough.vector_shear.newton import FrictionNewton
+    from convexrough.vector_shear.state import VectorShearState, shear_vector
+    from convexrough.verdict import Verdict, verify
+    from convexrough.version import __version__
+
+#: Where each public name lives.
+_HOMES = {
+    "contact": ("Contact", "press"),
+    "errors": ("ConvexroughError", "FileError", "InputError", "ProofError", "SolverError"),
+    "normal.certificate": ("Certificate", "certify"),
+    "paths.memory": ("MemoryCurve",),
+    "paths.path": ("LoadPath", "load_path"),
+    "paths.shakedown": ("Shakedown", "shakedown"),
+    "paths.shapes": ("elliptic_path",),
+    "paths.steady": ("Steady", "steady"),
+    "run.scene_file": ("SceneFile", "read_scene"),
+    "scene.asperities": ("Asperities",),
+    "scene.material": ("Material",),
+    "scene.scene": ("Scene",),
+    "shearing.certificate": ("ShearCertificate", "certify_shear"),
+    "shearing.loop": ("Loop",),
+    "shearing.cycle": ("Cycle", "cycle", "cycles", "loops"),
+    "shearing.history": ("History", "history"),
+    "shearing.state": ("ShearState", "onset_of_sliding", "shear"),
+    "sphere.smooth": ("SmoothSphere", "smooth"),
+    "vector_shear.cones": ("FrictionConic",),
+    "vector_shear.newton": ("FrictionNewton",),
+    "vector_shear.state": ("VectorShearState", "shear_vector"),
+    "verdict": ("Verdict", "verify"),
+    "version": ("__version__",),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+
+#: Modules that are public whole; those not in `__all__` draw, or are for tests.
+_MODULES = ("compare", "fields", "plots", "solvers", "testing")
 
 __all__ = [
     "Asperities",
@@ -39,6 +91,7 @@ __all__ = [
     "Loop",
     "Material",
     "MemoryCurve",
+    "ProofError",
     "Scene",
     "SceneFile",
     "Shakedown",
@@ -51,11 +104,13 @@ __all__ = [
     "Verdict",
     "__version__",
     "certify",
+    "certify_shear",
     "cycle",
     "cycles",
     "elliptic_path",
     "history",
     "load_path",
+    "loops",
     "onset_of_sliding",
     "press",
     "read_scene",
@@ -67,3 +122,19 @@ __all__ = [
     "steady",
     "verify",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    from importlib import import_module
+
+    if name in _MODULES:
+        return import_module(f"convexrough.{name}")
+    if name not in _HOME:
+        raise AttributeError(f"module 'convexrough' has no attribute {name!r}")
+    value = getattr(import_module(f"convexrough.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*__all__, *_MODULES})

@@ -27,5 +27,6 @@ def among_zeros(
     shape = list(values.shape)
     shape[axis] = count
     full = np.zeros(shape, dtype=values.dtype)
-    np.moveaxis(full, axis, 0)[places] = np.moveaxis(values, axis, 0)
+    where: tuple[Any, ...] = (slice(None),) * (axis % values.ndim)
+    full[*where, places] = values
     return full

@@ -18,15 +18,15 @@ SMALLEST, LARGEST = 1e-60, 1e60
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
-def finite(what: str, value: float) -> float:
+def finite(what: str, value: float | None) -> float:
     return _checked(what, value, "a finite number", lambda number: True)
 
 
-def positive(what: str, value: float) -> float:
+def positive(what: str, value: float | None) -> float:
     return _checked(what, value, "a positive number", lambda number: number > 0)
 
 
-def non_negative(what: str, value: float) -> float:
+def non_negative(what: str, value: float | None) -> float:
     return _checked(what, value, "a number that is not negative", lambda number: number >= 0)
 
 
@@ -35,21 +35,28 @@ def is_sized(number: float) -> bool:
     return number == 0 or SMALLEST <= abs(number) <= LARGEST
 
 
-def between(what: str, value: float, low: float, high: float) -> float:
+def between(what: str, value: float | None, low: float, high: float) -> float:
     number = _number(what, value, f"a number from {low} to {high}")
     if not low <= number <= high:
         raise InputError(what, found=number, expected=f"a number from {low} to {high}")
     return number
 
 
-def array(what: str, values: ArrayLike, *, length: int | None = None, sign: str = "") -> Array:
+def array(
+    what: str,
+    values: ArrayLike,
+    *,
+    length: int | None = None,
+    sign: str = "",
+    smallest: float = 0.0,
+) -> Array:
     """A read-only copy of a vector; `sign` is "", "positive" or "not negative".
 
-    A number stands for a vector of `length` equal values.
+    A number stands for a vector of `length` equal values. smallest : least size, or 0
     """
     try:
-        if np.iscomplexobj(values):
-            raise TypeError("complex")
+        if np.iscomplexobj(values) or np.asarray(values).dtype.kind in "USV":
+            raise TypeError("no real numbers")
         vector = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(what, found=repr(values)[:60], expected="numbers") from error
@@ -67,6 +74,9 @@ def array(what: str, values: ArrayLike, *, length: int | None = None, sign: str 
         first = int(np.argmin(good))
         kind = f"{sign}, finite" if sign else "finite"
         raise InputError(f"{what}[{first}]", found=vector[first], expected=f"a {kind} number")
+    if not (good := (vector == 0) | (np.abs(vector) >= smallest)).all():
+        first = int(np.argmin(good))
+        raise InputError(f"{what}[{first}]", found=vector[first], expected=SIZED)
     vector.flags.writeable = False
     return vector
 
@@ -82,8 +92,8 @@ def friction(coefficient: float | None) -> float:
 def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
     """Shear forces that friction can bear, |Q| <= limit = f P; of any shape."""
     try:
-        if np.iscomplexobj(forces):
-            raise TypeError("complex")
+        if np.iscomplexobj(forces) or np.asarray(forces).dtype.kind in "USV":
+            raise TypeError("no real numbers")
         given = np.asarray(forces, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(what, found=repr(forces)[:60], expected="numbers") from error
@@ -100,6 +110,16 @@ def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
             name, found=f"{worst:.17g}{over}", expected=f"at most f P = {limit:.17g} in size"
         )
     return given
+
+
+def instance(what: str, value: object, kind: type) -> None:
+    """An object of a class of this package: no class, and no other object."""
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        expected = f"{article} {kind.__name__}"
+        name = type(value).__name__
+        found = f"the class {value.__name__}" if isinstance(value, type) else f"something of {name}"
+        raise InputError(what, found=found, expected=expected)
 
 
 def exactly_one(first: str, a: object, second: str, b: object) -> None:
@@ -137,7 +157,9 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     return f"valid: {', '.join(names.values())}"
 
 
-def _checked(what: str, value: float, expected: str, holds: Callable[[float], bool]) -> float:
+def _checked(
+    what: str, value: float | None, expected: str, holds: Callable[[float], bool]
+) -> float:
     number = _number(what, value, expected)
     if not (math.isfinite(number) and holds(number)):
         raise InputError(what, found=number, expected=expected)
@@ -146,8 +168,8 @@ def _checked(what: str, value: float, expected: str, holds: Callable[[float], bo
     return number
 
 
-def _number(what: str, value: float, expected: str) -> float:
-    if isinstance(value, bool):
+def _number(what: str, value: float | None, expected: str) -> float:
+    if value is None or isinstance(value, (bool, str, bytes)):  # text stands for no number
         raise InputError(what, found=repr(value), expected=expected)
     try:
         return float(value)

@@ -5,25 +5,30 @@ What is slow to import is imported by the command that needs it, when it runs.
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from convexrough.errors import ConvexroughError, FileError, InputError, SolverError
+from convexrough.errors import ConvexroughError, FileError, InputError, ProofError, SolverError
 from convexrough.version import __version__
 
 if TYPE_CHECKING:
+    from convexrough.proof import Proof
     from convexrough.run.scene_file import UnitNames
     from convexrough.run.summary import Summary
 
-DONE, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2, 3, 4, 130
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 _PATH = click.Path(path_type=Path)
+_proof = click.option("--proof", is_flag=True, help="Write proof.json, for anybody to check.")
 _json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object, no text.")
 
 
@@ -39,19 +44,42 @@ def _output(command: Command) -> Command:
     return command
 
 
+def _claim_options(command: Command) -> Command:
+    """What `verify` is asked, and how it reads files."""
+    part = "Loads must be proved to this part of the largest."
+    floor = "A load up to X claims that its asperity is open."
+    apart = "How far positions may be off; default 1 % of the least spacing."
+    called = "The column of load, x, y, force or status: its header, or its number from 1."
+    for option in (
+        click.option("--out", metavar="DIR", type=_PATH, help="New folder: table, JSON, figure."),
+        click.option("--force", metavar="Q", type=float, help="The shear force they carry."),
+        click.option("--shear", metavar="FORCES", type=_PATH, help="A file of shear forces, too."),
+        click.option("--column", metavar="NAME=COLUMN", multiple=True, help=called),
+        click.option("--tolerance", metavar="X", type=float, help=apart),
+        click.option("--floor", metavar="X", type=float, default=0.0, help=floor),
+        click.option("--within", metavar="PART", type=float, help=part),
+    ):
+        command = option(command)
+    return command
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="convexrough")
 def program() -> None:
     """Rough frictional contact, with a proof of which asperities touch.
 
-    Exit status: 0 done and certified; 2 wrong input; 3 done, not certified; 4 a solver failed.
+    Exit status: 0 done and certified; 1 standard output closed or full; 2 wrong input; 3 done, not
+    certified; 4 a solver failed; 130 interrupted.
     """
 
 
 @program.command()
 @click.argument("scene", type=_PATH)
+@_proof
 @_output
-def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int:
+def run(
+    scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: bool, proof: bool
+) -> int:
     """Press and shear the scene of a TOML file; write tables, certificate and figures.
 
     Results go to the folder SCENE-results unless --out names another.
@@ -63,8 +91,13 @@ def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: b
     from convexrough.run.summary import summarise
 
     file = read_scene(scene)
+    if proof:
+        from convexrough.proof import refuse_many
+
+        with _blamed_on(scene):
+            refuse_many(file.scene)
     folder = out or Path(f"{scene.stem}-results")
-    claim_folder(folder, force=force)
+    stale = claim_folder(folder, force=force)
     pressing = f"pressing {len(file.scene):,} asperities"
     with _blamed_on(scene), _progress(pressing) as show:
         contact = solve(
@@ -72,35 +105,107 @@ def run(scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: b
         )
     with _blamed_on(scene), _progress("shearing") as show:
         found = compute(contact, file, announce=lambda news: show(f"shearing: {news}"))
-    summary = summarise(found)
-    with _progress("writing results"):
-        files = write_results(folder, found, summary, figures=not no_figures, units=file.units)
-    return _say(summary, as_json, _written(folder, files), file.units)
+    with _progress("writing results") as show:
+        summary = summarise(found)
+        files = write_results(
+            folder,
+            found,
+            summary,
+            figures=not no_figures,
+            units=file.units,
+            source=file,
+            announce=lambda news: show(f"writing results: {news}"),
+        )
+    for path in stale:
+        if path not in files:
+            _say_aside("warning", f"{path}: of an earlier run, left as it was changed since")
+    status = _say(summary, as_json, _written(folder, files), file.units)
+    if not proof:
+        return status
+    from convexrough.run.proving import prove_findings
+
+    work = partial(prove_findings, found)
+    return _prove(folder / "proof.json", lambda show: work(announce=show), as_json) or status
 
 
 @program.command()
 @click.argument("scene", type=_PATH)
 @click.argument("loads", type=_PATH)
+@_claim_options
+@_proof
 @_json
-def verify(scene: Path, loads: Path, as_json: bool) -> int:
-    """Certify loads that came from anywhere.
+def verify(
+    scene: Path, loads: Path, out: Path | None, as_json: bool, proof: bool, **options: Any
+) -> int:
+    """Hold loads that came from anywhere against what is proved.
 
-    LOADS is a CSV file with a column load, and x and y unless in the scene's order.
+    LOADS is a file of numbers with a column load, and x and y unless in the scene's order: CSV and
+    its kin, .npy, .npz or Parquet. It claims that asperities with a load touch, and no others.
+
+    Exit status: 0 only if the claimed set is proved right, every load is near enough and a
+    prescribed total agrees, and the like of shear forces; 2 wrong input; 3 otherwise; 4 no shear
+    state was found to compare with.
     """
-    from convexrough.normal.certificate import judge
+    from convexrough.run import verdict_report
+    from convexrough.run.report import describe
+    from convexrough.run.results import claim_folder
     from convexrough.run.scene_file import read_scene
-    from convexrough.run.summary import certificate_summary
-    from convexrough.run.tables import read_loads
+    from convexrough.run.summary import to_json
+    from convexrough.run.verification import Question, named_columns, verify_files
 
+    if (options["shear"] is None) != (options["force"] is None):
+        raise click.UsageError("--shear and --force go together.")
+    target = (out or Path()) / "proof.json"
+    if proof and target.exists():
+        raise FileError(f"{target}: is there already; nothing is overwritten")
+    question = Question(columns=named_columns(options.pop("column")), **options)
     file = read_scene(scene)
-    values = read_loads(loads, file.scene)
-    with _progress(f"judging the loads of {len(values)} asperities"):
-        with _blamed_on(scene):
-            problem = file.problem()
-        with _blamed_on(loads):
-            certificate = judge(problem, values)
-    summary = certificate_summary(certificate, values)
-    return _say(summary, as_json, units=file.units)
+    if out is not None:
+        if out.is_dir() and any(out.iterdir()):
+            raise FileError(f"{out}: not empty; --out takes another")
+        claim_folder(out, force=False)
+    with _progress(f"judging the loads of {len(file.scene):,} asperities"):
+        found = verify_files(file, loads, question)
+    summary = verdict_report.verdict_summary(found)
+    length, force = file.units
+    lines = verdict_report.describe_verdict(found, file.units)
+    lines += ["", "the loads as given", *describe(summary, length_unit=length, force_unit=force)]
+    if out is not None:
+        with _progress("writing results"):
+            files = verdict_report.write_verdict(out, summary, found, file.units)
+        lines += _written(out, files)
+    click.echo(to_json(summary) if as_json else "\n".join(lines))
+    for hint in verdict_report.hints(found, file.units):
+        _say_aside("hint", hint)
+    if not found.holds:
+        _say_aside("warning", f"not certified: {verdict_report.reason(found)}")
+    status = DONE if found.holds else NOT_CERTIFIED
+    if not proof:
+        return status
+    from convexrough.proof import prove
+
+    verdict = found.verdict
+    claimed = [
+        load if touches else 0.0
+        for load, touches in zip(verdict.loads, verdict.claimed, strict=True)
+    ]
+    control: Any = {"approach": file.approach, "load": file.load}
+    work = partial(prove, file.scene, claimed, **control)
+    with _blamed_on(scene):
+        return _prove(target, lambda show: work(announce=show), as_json) or status
+
+
+@program.command()
+@click.argument("proof", type=_PATH)
+def check(proof: Path) -> int:
+    """Check a proof in exact arithmetic, believing nothing in the file.
+
+    Exit status: 0 all that it claims is proved; 1 refused, with the reason; 2 unreadable. The
+    checker is one file that needs Python only: python checker.py PROOF does the same.
+    """
+    from convexrough import checker
+
+    return checker.main([str(proof)])
 
 
 @program.command()
@@ -220,16 +325,49 @@ def bench(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; errors are a message, never a traceback."""
     try:
-        return int(program.main(arguments, prog_name="convexrough", standalone_mode=False) or DONE)
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        with program.make_context("convexrough", given) as context:
+            status = int(program.invoke(context) or DONE)
+        if sys.stdout is not None:  # it is None where a shell closed it
+            sys.stdout.flush()
+        return status
+    except click.exceptions.Exit as end:
+        return end.exit_code
     except click.ClickException as error:
         error.show()
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
+        _say_aside("interrupted")
         return INTERRUPTED
     except ConvexroughError as error:
         for line in str(error).splitlines():
             _say_aside("error", line)
         return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
+    except OSError as error:  # those of files are FileErrors
+        return _unheard(error)
+
+
+def _unheard(error: OSError) -> int:
+    """Nobody reads standard output any more, or it is full; results are written all the same."""
+    if error.errno != errno.EPIPE:
+        _say_aside("error", f"standard output: {error.strerror or error}")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)  # so that what is left is not written when the interpreter ends
+    os.close(nowhere)
+    return UNHEARD
+
+
+def _prove(path: Path, work: Callable[[Callable[[str], object]], Proof], as_json: bool) -> int:
+    """Write a proof; NOT_CERTIFIED where there is none."""
+    try:
+        with _progress("proving") as show:
+            proof = work(lambda news: show(f"proving: {news}"))
+    except ProofError as error:
+        _say_aside("warning", str(error))
+        return NOT_CERTIFIED
+    proof.save(path)
+    click.echo(f"{proof.proved}\nwritten  {path}", err=as_json)
+    return DONE
 
 
 def _written(folder: Path, files: Sequence[Path]) -> list[str]:
@@ -243,19 +381,19 @@ def _say(
     from convexrough.run.report import describe, warnings
     from convexrough.run.summary import proved, to_json
 
+    length, force = units or ("", "")
     if as_json:
         click.echo(to_json(summary))
     else:
-        length, force = units or ("", "")
         described = describe(summary, length_unit=length, force_unit=force)
         click.echo("\n".join([*described, *lines]))
-    for warning in warnings(summary):
+    for warning in warnings(summary, length_unit=length, force_unit=force):
         _say_aside("warning", warning)
     return DONE if proved(summary) else NOT_CERTIFIED
 
 
-def _say_aside(kind: str, message: str) -> None:
-    click.echo(f"convexrough: {kind}: {message}", err=True)
+def _say_aside(*parts: str) -> None:
+    click.echo(": ".join(("convexrough", *parts)), err=True)
 
 
 @contextmanager

@@ -1,10 +1,10 @@
 """Every formulation and solver on one scene: do they agree, what is proved, what does it cost?
 
-Answers found in different ways are certified by the same code, which knows no solver. Each bound
-is on the distance to one and the same solution: certificates of different scope and box speak of
-boxes of which one holds the other, and each box holds one solution. So two certified answers that
-are further apart than their bounds allow would be a contradiction in the mathematics of this
-package, or a mistake in its code.
+Answers found in different ways are certified by the same code, which knows no solver. A proof of
+global scope speaks of the only solution that there is, so an answer with any proof that is further
+from it than their bounds allow would be a contradiction in the mathematics of this package, or a
+mistake in its code. Two local proofs need not contradict each other: their boxes, fitted to
+different loads, need not hold each other, and each may hold a solution of its own.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class Entry:
 class Comparison:
     """All entries, that of the reference (Newton's method) first.
 
-    contradictions : pairs of certified answers that exclude each other, in words; each would be a
-        mistake in the mathematics or in the code
+    contradictions : pairs of certified answers, one of them globally, that exclude each other, in
+        words; each would be a mistake in the mathematics or in the code
     """
 
     entries: tuple[Entry, ...]
@@ -110,7 +110,12 @@ def compare(
     pairs = combinations([Answer.of(contact) for contact in answers], 2)
     return Comparison(
         entries=tuple(entries),
-        contradictions=tuple(found for pair in pairs for found in contradictions(*pair)),
+        contradictions=tuple(
+            found
+            for pair in pairs
+            if any(answer.certificate.scope == "global" for answer in pair)
+            for found in contradictions(*pair)
+        ),
     )
 
 
@@ -192,7 +197,7 @@ class Answer(NamedTuple):
 
 
 def contradictions(first: Answer, second: Answer) -> list[str]:
-    """Where two answers to one problem exclude each other, one line for each kind; else none.
+    """Where two answers exclude each other as one solution, one line for each kind; else none.
 
     Loads, gaps or approaches further apart than the sum of their bounds, or an asperity that is
     proved to touch by one and to be open by the other. An answer without proof excludes nothing.

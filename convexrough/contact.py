@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from convexrough import checks
+from convexrough import checks, solvers
 from convexrough.arrays import Array, frozen
-from convexrough.errors import SolverError
+from convexrough.convex.newton_step import correct
+from convexrough.errors import InputError, SolverError
 from convexrough.influence import Influence, Kind
+from convexrough.influence.choice import couple
+from convexrough.influence.shells import shells
 from convexrough.kept import Keeper
 from convexrough.normal.certificate import Certificate, judge
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.units import Units
 from convexrough.progress import Announce
 from convexrough.scene.scene import Scene
-from convexrough.solvers import Newton, Solution, Solver
+from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
+
+if TYPE_CHECKING:
+    from convexrough.proof import Proof, Sheared
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +37,7 @@ class Contact(Keeper):
     loads         : [force]
     contact_radii : [length]
     approach      : D0 [length];  load : total [force]
+    prescribed_load : [force] None where the approach was prescribed
     certificate   : what is proved of the loads, whatever the solver said
     model_error   : largest relative error of the indentations from treating each asperity's
         pressure as a point force, to leading order: max sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i
@@ -50,6 +60,7 @@ class Contact(Keeper):
     solver: str
     iterations: int
     seconds: float
+    prescribed_load: float | None = None
 
     @property
     def gaps(self) -> Array:
@@ -61,20 +72,47 @@ class Contact(Keeper):
         """(n,) "contact", "open" or "undecided"; each of the first two is proved."""
         return self.certificate.status
 
+    def proof(self, *, sheared: Sequence[Sheared] = (), announce: Announce | None = None) -> Proof:
+        """A proof that `convexrough check` and anybody's checker can judge: `.save(path)` it.
+
+        sheared : friction states of this contact to prove, too, with the loss of their cycles
+        announce : told in a line how far long work has come
+
+        Raises InputError for scenes too large for exact arithmetic, ProofError where nothing is
+        proved.
+        """
+        from convexrough.proof import prove  # it reads and writes: only when asked
+
+        by_load = self.prescribed_load is not None
+        return prove(
+            self.scene,
+            self.loads,
+            approach=None if by_load else self.approach,
+            load=self.prescribed_load,
+            sheared=sheared,
+            announce=announce,
+        )
+
+    @property
+    def mean_pressures(self) -> Array:
+        """(n,) [force / length^2] load over contact area, 0 where open."""
+        areas = np.pi * self.contact_radii**2
+        return frozen(np.divide(self.loads, areas, out=np.zeros(len(areas)), where=areas > 0))
+
 
 def press(
     scene: Scene,
     *,
     approach: float | None = None,
     load: float | None = None,
-    solver: Solver | None = None,
+    solver: Solver | str | None = None,
     start: ArrayLike | None = None,
     influence: Kind | None = None,
     announce: Announce | None = None,
 ) -> Contact:
     """Press the sphere on the asperities by an approach [length] or with a load [force].
 
-    solver : default `solvers.Newton()`
+    solver : default `solvers.Newton()`; or its name in a scene file, such as "conic"
     start  : (n,) [force] loads to start from; in the convex range the answer is the same for all
     influence : how to couple the asperities: "dense" (a matrix), "lattice" (transforms, where they
         lie on a lattice), "scattered" (transforms on a mesh); None for the cheapest that is exact
@@ -84,6 +122,8 @@ def press(
     answer without a certificate is returned: look at `contact.certificate.scope`.
     """
     began = time.perf_counter()
+    checks.instance("scene", scene, Scene)
+    solver = solvers.named(solver)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
     contact = solve(problem, solver, start, announce)
     return replace(contact, seconds=time.perf_counter() - began)
@@ -91,13 +131,13 @@ def press(
 
 def solve(
     problem: NormalProblem,
-    solver: Solver | None = None,
+    solver: Solver | str | None = None,
     start: ArrayLike | None = None,
     announce: Announce | None = None,
 ) -> Contact:
     """`press` for a problem already assembled; its arguments are as there."""
     began = time.perf_counter()
-    solver = Newton() if solver is None else solver
+    solver = solvers.named(solver)
     scene = problem.scene
     force, length = problem.units.force, problem.units.length
     first = None
@@ -113,6 +153,8 @@ def solve(
     if announce is not None:
         announce("certifying")
     certificate = judge(problem, loads)
+    if not abs(solution.approach * length - certificate.approach) <= certificate.approach_error:
+        solution = replace(solution, approach=certificate.approach / length)
     model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
     return Contact(
         scene=scene,
@@ -128,19 +170,25 @@ def solve(
         solver=solver.name,
         iterations=solution.iterations,
         seconds=time.perf_counter() - began,
+        prescribed_load=None if problem.load is None else problem.load * force,
     )
 
 
 def _solved(
     solver: Solver, problem: NormalProblem, start: Array | None, announce: Announce | None
 ) -> Solution:
-    """The solver's answer; the last loads of an error in the scene's units and order."""
+    """The solver's answer, if it is one; the last loads of an error in scene units and order."""
     try:
-        return solver.solve(problem, start, announce)
+        solution = solver.solve(problem, start, announce)
     except SolverError as error:
         if error.iterate is not None:
             error.iterate = problem.to_scene(error.iterate * problem.units.force)
         raise
+    try:
+        loads = checks.array("loads", solution.loads, length=len(problem), sign="not negative")
+    except InputError as error:
+        raise SolverError(f"no loads were found: {error}", solver=solver.name) from error
+    return replace(solution, loads=loads)
 
 
 def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> tuple[float, float]:
@@ -158,3 +206,35 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
     a = radii[touching]
     moved = A.scale * A.falloff(solution.loads[touching] * a**2 / 10, 3)
     return float((moved / prescribed[touching]).max()), A.crowding(a)
+
+
+def closest_changes(contact: Contact) -> Array:
+    """(n,) [force] what loads would gain, to first order, in the geometry "closest"; 0 in that.
+
+    There an asperity meets the sphere at r R / (R + rho): its drop is less by
+    r^2 rho / (2 R (R + rho)), and influences 1 / (pi E* r) are greater by about rho / R. Hence
+
+        (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,     at the same approach,
+
+    with H = (2/3) indentation / P the local part of the Hessian.
+    """
+    scene, touching = contact.scene, np.flatnonzero(contact.loads)
+    gains = np.zeros(len(scene))
+    if scene.geometry == "closest" or len(touching) == 0:
+        return frozen(gains)
+    k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii[touching])
+    loads, R, rho = (
+        contact.loads[touching],
+        scene.sphere_radius,
+        scene.asperities.tip_radii[touching],
+    )
+    indentations = hertz.indentation(loads, k)
+    units = Units.of(float(indentations.max()), float(np.median(k)))
+    scale = units.force / units.length / (np.pi * scene.material.contact_modulus)
+    A = couple(scene, touching, scale, contact.influence)
+    slopes = 1.5 * (loads / units.force) / (indentations / units.length)
+    rise = scene.asperities.distances[touching] ** 2 * rho / (2.0 * R * (R + rho)) / units.length
+    deeper = rise - rho / R * A.apply(loads / units.force)
+    change = correct(A, shells(A), np.sqrt(slopes), -deeper, balanced=False, tolerance=1e-3)
+    gains[touching] = slopes * change * units.force
+    return frozen(gains)

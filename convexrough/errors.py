@@ -34,8 +34,8 @@ class InputError(ConvexroughError, ValueError):
         return InputError(self.what, found=self.found, expected=self.expected, where=place)
 
 
-class SceneFileError(InputError):
-    """Everything that is wrong in a scene file; the message has one line per mistake."""
+class MistakesError(InputError):
+    """Everything that is wrong in a file; the message has one line per mistake."""
 
     def __init__(self, path: str, mistakes: Sequence[str]) -> None:
         super().__init__("mistakes", found=len(mistakes), expected="none", where=path)
@@ -43,6 +43,14 @@ class SceneFileError(InputError):
 
     def __str__(self) -> str:
         return "\n".join(self.mistakes)
+
+
+class SceneFileError(MistakesError):
+    """Everything that is wrong in a scene file."""
+
+
+class TableError(MistakesError):
+    """Everything that is wrong in a file of numbers."""
 
 
 class FileError(ConvexroughError):
@@ -70,3 +78,7 @@ class SolverError(ConvexroughError):
         self.what, self.solver, self.advice, self.iterate = what, solver, advice, iterate
         place = f"{solver}: " if solver else ""
         super().__init__(place + what + (f"; {advice}" if advice else ""))
+
+
+class ProofError(ConvexroughError):
+    """Nothing could be proved; the message says why."""

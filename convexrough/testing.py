@@ -1,7 +1,7 @@
-"""For the tests of other software: assert that loads are certified, or that two answers agree.
+"""For the tests of other software: assert that forces are certified, or that two answers agree.
 
-Both raise AssertionError with a message that says which asperities, by how much, and which word;
-neither needs a test framework. Loads that no certificate can judge (negative, not finite, of the
+All raise AssertionError with a message that says which asperities, by how much, and which word;
+none needs a test framework. Loads that no certificate can judge (negative, not finite, of the
 wrong number) raise InputError, as everywhere.
 """
 
@@ -10,12 +10,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Indices
 from convexrough.compare import Answer, contradictions, listed
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.normal.certificate import Certificate, certify
+from convexrough.normal.claims import Claim
 from convexrough.scene.scene import Scene
+from convexrough.shearing.certificate import ShearCertificate
+from convexrough.shearing.verdict import verify_shear
+from convexrough.verdict import verify
 
 
 def assert_certified(
@@ -25,32 +29,41 @@ def assert_certified(
     approach: float | None = None,
     load: float | None = None,
     within: float | None = None,
+    floor: float = 0.0,
 ) -> Certificate:
-    """Every asperity is proved to touch or proved to be open; returns the proof.
+    """The asperities that these loads claim to touch are proved to, and only they; the proof.
 
     loads  : (n,) [force] from anywhere, in the order of the scene's asperities
-    approach [length] or load [force] : what is prescribed, exactly one
+    approach [length] or load [force] : what is prescribed, exactly one; it is that of the loads
     within : also, no load is further from the solution than this part of the largest load. Without
         it the loads need only be good enough for the words
+    floor  : [force] a load up to this claims that its asperity is open
     """
-    certificate = certify(scene, loads, approach=approach, load=load)
-    values = np.asarray(loads, dtype=np.float64) * np.ones(len(scene))
-    _check_proof(certificate)
-    doubtful = np.flatnonzero(certificate.status == "undecided")
-    if len(doubtful):
-        least = certificate.gaps[doubtful] / certificate.gap_errors[doubtful]
-        doubtful = doubtful[np.argsort(least, kind="stable")]
-        count = f"{len(doubtful)} of {len(scene)} asperities are undecided"
-        raise AssertionError(f"{count}: {_described(scene, doubtful, values, certificate)}")
-    if within is not None:
-        limit = within * float(values.max())
-        wide = np.flatnonzero(certificate.load_errors > limit)
-        if len(wide):
-            wide = wide[np.argsort(-certificate.load_errors[wide])]
-            bound = f"loads are proved to {_part(certificate.load_error, values)} of the largest"
-            found = f"{bound}, expected {within:g}"
-            raise AssertionError(f"{found}: {_described(scene, wide, values, certificate)}")
-    return certificate
+    verdict = verify(scene, loads, approach=approach, load=load, within=within, floor=floor)
+    if len(verdict.undecided) == len(scene):
+        _check_proof(verdict.certificate)
+    _check(verdict, "load", scene)
+    return verdict.certificate
+
+
+def assert_shear_certified(
+    contact: Contact,
+    forces: ArrayLike,
+    *,
+    force: float,
+    within: float | None = None,
+    sliding: ArrayLike | None = None,
+) -> ShearCertificate:
+    """The asperities that these forces claim to slide are proved to, and only they; the proof.
+
+    forces  : (n,) [force] of first loading, along the shear force, from anywhere
+    force   : [force] the shear force that they carry
+    within  : also, no force is further from the solution than this part of the largest
+    sliding : (n,) who is claimed to slide; default: those whose force is f P to 1e-4 of it
+    """
+    verdict = verify_shear(contact, forces, force=force, within=within, sliding=sliding)
+    _check(verdict, "force", contact.scene)
+    return verdict.certificate
 
 
 def assert_agree(
@@ -124,16 +137,41 @@ def _check_proof(certificate: Certificate, whose: str = "") -> None:
         )
 
 
-def _described(scene: Scene, which: Indices, loads: Array, certificate: Certificate) -> str:
-    """The asperities with their loads, gaps, bounds and words."""
-    return listed(
-        f"{i} at ({scene.asperities.positions[i, 0]:.6g}, {scene.asperities.positions[i, 1]:.6g}) "
-        f"has load {loads[i]:.6g} +- {certificate.load_errors[i]:.2g}, gap "
-        f"{certificate.gaps[i]:.6g} +- {certificate.gap_errors[i]:.2g}, {certificate.status[i]}"
-        for i in which
+def _check(claim: Claim, name: str, scene: Scene) -> None:
+    """Raise AssertionError unless the claim holds; `name` is what its numbers are called."""
+    if claim.holds:
+        return
+
+    def described(which: Indices) -> str:
+        return _described(claim, name, scene, which)
+
+    if len(wrong := claim.wrongly_claimed):
+        first = claim.suspects[np.isin(claim.suspects, wrong)]
+        named = np.append(first, np.setdiff1d(wrong, first))
+        kinds = ", ".join(f"{len(who)} {what}" for what, who in claim.wrong.items() if len(who))
+        raise AssertionError(f"{kinds}: {described(named)}")
+    if len(doubtful := claim.undecided):
+        count = f"{len(doubtful)} of {len(scene)} asperities are undecided"
+        raise AssertionError(f"{count}: {described(doubtful)}")
+    if not claim.near_enough:
+        worst = claim.suspects if len(claim.suspects) else claim.off
+        bound = f"{name}s are proved to {claim.error:.2g} of the largest"
+        needed = "enough for every word" if claim.within is None else f"{claim.within:g}"
+        raise AssertionError(f"{bound}, expected {needed}: {described(worst)}")
+    raise AssertionError(
+        f"{name}s add up to {claim.total_given:.17g}, expected {claim.total_prescribed:.17g}"
     )
 
 
-def _part(error: float, loads: Array) -> str:
-    largest = float(loads.max())
-    return f"{error / largest:.2g}" if largest > 0 else "any multiple"
+def _described(claim: Claim, name: str, scene: Scene, which: Indices) -> str:
+    """The asperities with what is claimed of them, how far that may be off, and their words."""
+    points, nearby = scene.asperities.positions, claim.nearby()
+
+    def solved(i: int) -> str:
+        return "" if nearby is None else f", solved {nearby[0][i]:.6g}"
+
+    return listed(
+        f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g}) has {name} {claim.values[i]:.6g} +- "
+        f"{claim.errors[i]:.2g}{solved(i)}, {claim.status[i]}"
+        for i in which
+    )

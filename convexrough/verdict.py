@@ -4,36 +4,31 @@ Loads from anywhere make three claims: these asperities touch (load > floor), th
 these are the loads. `certify` judges how near the loads are to the solution and what that proves of
 the solution; here the claimed set itself is held against the proved words. Where the loads are too
 far off for every word to follow from them alone, Newton's method goes on from them to a solution
-nearby, and what is proved of that one names the asperities that are wrong.
+nearby, and what is proved of that one names the asperities that are wrong. `shearing.verdict` does
+the same for shear forces.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.contact import Contact, press
+from convexrough.contact import Contact, solve
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.coupling import Kind
-from convexrough.normal.certificate import Certificate, certify
+from convexrough.normal.certificate import Certificate, judge
+from convexrough.normal.claims import Claim
+from convexrough.normal.problem import NormalProblem
 from convexrough.scene.scene import Scene
-
-#: How far the sum of the loads may be off a prescribed total, relatively, unless `within` says so.
-TOTAL_WITHIN = 1e-6
-
-#: A suspect is off by at least this part of what the worst one is off by.
-SUSPICIOUS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class Verdict(Claim):
     """What is proved of a claim. Indices and arrays are those of the scene's asperities.
 
     loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"
@@ -54,10 +49,9 @@ class Verdict:
     solution: Contact | None = None
 
     @property
-    def holds(self) -> bool:
-        """The claimed set is proved right, every load is within, and the total agrees."""
-        wrong = len(self.wrongly_open) + len(self.wrongly_loaded) + len(self.undecided)
-        return not wrong and self.loads_hold and self.total_holds
+    def values(self) -> Array:
+        """(n,) [force] the loads."""
+        return self.loads
 
     @cached_property
     def claimed(self) -> NDArray[np.bool_]:
@@ -82,64 +76,32 @@ class Verdict:
         """(m,) claimed to touch, and proved to be open."""
         return frozen(np.flatnonzero(self.claimed & (self.status == "open")))
 
-    @cached_property
-    def undecided(self) -> Indices:
-        """(m,) proved neither to touch nor to be open."""
-        return frozen(np.flatnonzero(self.status == "undecided"))
+    @property
+    def wrong(self) -> dict[str, Indices]:
+        """The claimed set where it is wrong."""
+        return {
+            "claimed open, proved to touch": self.wrongly_open,
+            "claimed to touch, proved open": self.wrongly_loaded,
+        }
+
+    @property
+    def decided_alone(self) -> bool:
+        """Every word follows from the loads alone."""
+        return self.certificate.holds
 
     @cached_property
-    def load_errors(self) -> Array:
+    def errors(self) -> Array:
         """(n,) [force] proved bounds on |load - solution|; infinite where nothing is proved."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
         errors = self.certificate.load_errors + ignored
-        if self.solution is not None:
-            apart = np.abs(self.loads - self.solution.loads)
-            errors = np.minimum(errors, apart + self.solution.certificate.load_errors)
+        if (nearby := self.nearby()) is not None:
+            errors = np.minimum(errors, np.abs(self.loads - nearby[0]) + nearby[1])
         return frozen(errors)
 
-    @property
-    def load_error(self) -> float:
-        """The largest of `load_errors`, in parts of the largest load."""
-        largest = float(self.loads.max())
-        return float(self.load_errors.max()) / largest if largest > 0 else np.inf
-
-    @property
-    def loads_hold(self) -> bool:
-        """Every load is proved near enough."""
-        return self.certificate.holds if self.within is None else self.load_error <= self.within
-
-    @property
-    def total_given(self) -> float:
-        """[force] the sum of the loads."""
-        return float(self.loads.sum())
-
-    @property
-    def total_holds(self) -> bool:
-        """The loads add up to a prescribed total, within `within` of it or else 1e-6."""
-        if self.total_prescribed is None:
-            return True
-        missing = abs(self.total_given - self.total_prescribed)
-        return missing <= (self.within or TOTAL_WITHIN) * self.total_prescribed
-
-    @cached_property
-    def suspects(self) -> Indices:
-        """(m,) whose loads are furthest from the solution, likeliest first; none if all hold.
-
-        A single load that is missing, spurious or wrong is the first; two that were exchanged are
-        the first two. Loads that do not add up to the solution's total are also tried in the unit
-        in which they do.
-        """
-        wrong = np.concatenate((self.wrongly_open, self.wrongly_loaded))
-        if self.solution is None or (self.loads_hold and not len(wrong)):
-            return frozen(wrong[np.argsort(-self.load_errors[wrong], kind="stable")])
-        true, bounds = self.solution.loads, self.solution.certificate.load_errors
-        scales = [1.0]
-        if (total := self.total_given) > 0:
-            scales.append(self.solution.load / total)
-        apart = min((np.abs(scale * self.loads - true) for scale in scales), key=np.sum)
-        least = np.maximum(np.where(np.isfinite(bounds), bounds, 0.0), SUSPICIOUS * apart.max())
-        order = np.argsort(-apart, kind="stable")
-        return frozen(order[(apart > least)[order]])
+    def nearby(self) -> tuple[Array, Array] | None:
+        """The solution's loads and bounds."""
+        found = self.solution
+        return None if found is None else (found.loads, found.certificate.load_errors)
 
 
 def verify(
@@ -163,19 +125,34 @@ def verify(
 
     Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.
     """
+    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
+    return verify_on(problem, loads, within=within, floor=floor)
+
+
+def verify_on(
+    problem: NormalProblem,
+    loads: ArrayLike,
+    *,
+    within: float | None = None,
+    floor: float = 0.0,
+) -> Verdict:
+    """`verify` for a problem already assembled; its arguments are as there."""
     floor = checks.non_negative("floor", floor)
     within = None if within is None else checks.positive("within", within)
-    given = checks.array("loads", loads, length=len(scene))
+    given = checks.array("loads", loads, length=len(problem.scene))
     if (given < -floor).any():
         first = int(np.argmax(given < -floor))
         expected = "a load that is not negative; a floor lets noise up to its size count as 0"
         raise InputError(f"loads[{first}]", found=given[first], expected=expected)
-    prescribed: Any = {"approach": approach, "load": load, "influence": influence}
     claimed = np.where(given > floor, given, 0.0)
-    certificate = certify(scene, claimed, **prescribed)
-    verdict = Verdict(scene, given, floor, within, load, certificate)
+    total = None if problem.load is None else problem.load * problem.units.force
+    certificate = judge(problem, claimed)
+    verdict = Verdict(problem.scene, given, floor, within, total, certificate)
     if verdict.holds:
         return verdict
-    with suppress(SolverError):  # without a solution nearby only the loads' own certificate speaks
-        return replace(verdict, solution=press(scene, start=claimed, **prescribed))
-    return verdict
+    for start in (claimed, None):  # from loads that are far off, it may not arrive
+        try:
+            return replace(verdict, solution=solve(problem, start=start))
+        except SolverError:
+            continue
+    return verdict  # of which only the loads' own certificate speaks

@@ -17,6 +17,10 @@ if os.environ.get("CI"):
     settings.load_profile("ci")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--full", action="store_true", help="the word audit on ten thousand scenes")
+
+
 class Outcome(NamedTuple):
     status: int
     out: str

@@ -1,5 +1,6 @@
 """Pressed scenes with friction, and their states by definition, that the tests of shear share."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ from scenes import NAMED, solve_exactly
 
 import convexrough as cr
 from convexrough import FrictionConic, VectorShearState, shear_vector
+from convexrough.sphere import hertz
 
 FRICTION = 0.5
 DIGITS = 80
@@ -29,6 +31,21 @@ def pressed(
     if control == "load":
         return cr.press(contact.scene, load=contact.load, influence=influence)
     return contact
+
+
+def in_doubt(contact: cr.Contact, digits: int, control: str) -> cr.Contact:
+    """The contact with rounded loads, and the certificate of those."""
+    rounded = np.array([float(f"{load:.{digits - 1}e}") for load in contact.loads])
+    # Not symmetric: every other load is off the other way.
+    rounded[1::2] += 10.0 ** (-digits) * rounded[1::2]
+    given: Any = {control: getattr(contact, control)}
+    return replace(
+        contact,
+        loads=rounded,
+        load=float(rounded.sum()),
+        contact_radii=hertz.contact_radius(rounded, 1.0, contact.scene.relative_radii),
+        certificate=cr.certify(contact.scene, rounded, **given, influence=contact.influence),
+    )
 
 
 def with_friction(scene: cr.Scene, friction: float = FRICTION, nu: float = 0.3) -> cr.Scene:

@@ -273,6 +273,20 @@ def test_contradictions_of_a_scene() -> None:
     assert all("bristles: loads of asperities" in each for each in found)
 
 
+@pytest.mark.usefixtures("contradicting")
+def test_two_local_proofs_may_be_of_two_solutions(monkeypatch: pytest.MonkeyPatch) -> None:
+    lying = comparing.press
+
+    def local(*arguments: Any, **options: Any) -> cr.Contact:
+        contact = lying(*arguments, **options)
+        return replace(contact, certificate=replace(contact.certificate, scope="local"))
+
+    monkeypatch.setattr(comparing, "press", local)
+    comparison = compare(paper(), approach=5e-5)
+    assert comparison.contradictions == ()
+    assert contradictions(*map(Answer.of, (comparison.contacts[0], comparison.contacts[-1])))
+
+
 # The command.
 
 

@@ -1,36 +1,121 @@
-"""The README and the pages: their Python runs, their links lead somewhere."""
+"""The README and the pages: what they show is run in an empty folder, and links lead somewhere.
+
+A block of Python is executed. A block of TOML whose first line names a file, `# scene.toml`, is
+written to it. Of a console block the lines `$ convexrough ...` are run, and must end with status 0
+unless the line says `# exit status 3`. A block that is not to be run has its reason in a comment
+before it: `<!-- not run: why -->`.
+"""
 
 import re
+import shlex
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
+import convexrough
+from convexrough import cli
+
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(
+    r"(?:<!-- not run: (?P<why>\S.*?) -->\n+)?^```(?P<language>.*)\n(?P<text>(?s:.*?))^```$", re.M
+)
+COMMAND = re.compile(r"^\$ (.*?)(?:\s+# exit status (\d))?$", re.M)
+#: Directives of the site, which the site's own build checks.
+DIRECTIVES = {"{toctree}", "{eval-rst}"}
+#: Longer than a page should be: tables a command wrote, derivations that belong together.
+LONG = {"performance.md", "certificate.md", "convexity.md", "exact-cones.md", "friction.md"}
+LONG |= {"operators.md", "shear.md"}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_python_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The blocks of a page run one after the other, in an empty folder."""
+class Block(NamedTuple):
+    language: str
+    text: str
+    why_not: str | None
+
+
+def blocks(page: Path) -> Iterator[Block]:
+    for found in BLOCK.finditer(page.read_text("utf-8")):
+        yield Block(found["language"].strip(), found["text"], found["why"])
+
+
+def each_page(function):  # type: ignore[no-untyped-def]
+    return pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))(
+        function
+    )
+
+
+@each_page
+def test_blocks_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    for block in re.findall(r"^```python\n(.*?)^```", page.read_text("utf-8"), re.M | re.S):
-        exec(compile(block, str(page), "exec"), names)
+    names: dict[str, object] = {"__name__": "page"}
+    for language, text, why_not in blocks(page):
+        if why_not is not None or language in DIRECTIVES:
+            continue
+        if language == "python":
+            exec(compile(text, str(page), "exec"), names)
+        elif language == "toml":
+            name = re.match(r"# (\S+\.toml)\n", text)
+            assert name, "a block of TOML begins with the name of its file"
+            Path(name[1]).write_text(text, "utf-8")
+        else:
+            assert language == "console", f"a block of {language or 'no language'} is not run"
+            commands = COMMAND.findall(text)
+            assert commands
+            for command, status in commands:
+                program, *arguments = shlex.split(command)
+                assert program == "convexrough", f"not run: {command}"
+                assert cli.main(arguments) == int(status or 0), command
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@each_page
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#\s]+)\)", page.read_text("utf-8")):
         if "://" not in target:
             assert (page.parent / target).exists(), target
 
 
+@each_page
+def test_pages_are_short(page: Path) -> None:
+    words = len(BLOCK.sub("", page.read_text("utf-8")).split())
+    assert words <= 900 or page.name in LONG, words
+
+
+def test_every_public_name_is_in_the_reference() -> None:
+    pages = "\n".join(page.read_text("utf-8") for page in (ROOT / "docs/reference").glob("*.md"))
+    for name in convexrough.__all__:
+        if name not in ("__version__", "solvers"):
+            assert f":: convexrough.{name}\n" in pages, name
+    for name in convexrough.solvers.__all__:
+        assert f":: convexrough.solvers.{name}\n" in pages, name
+
+
 def test_the_readme_shows_what_the_package_computes(capsys: pytest.CaptureFixture[str]) -> None:
-    text = (ROOT / "README.md").read_text("utf-8")
-    block = re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)[0]
-    exec(compile(block, "README.md", "exec"), {})
+    block = next(block for block in blocks(ROOT / "README.md") if block.language == "python")
+    exec(compile(block.text, "README.md", "exec"), {})
     printed = capsys.readouterr().out.split("\n")
     assert printed[0].split()[1] == "37"
     assert printed[1].startswith("global")
     assert printed[2].startswith("True")
     assert printed[3].startswith("6 ")
+
+
+def test_every_section_that_the_code_cites_is_there() -> None:
+    """Formulas cite `docs/theory/page.md, "Section"`; a renamed section is found here."""
+    cited = set()
+    for path in (ROOT / "convexrough").rglob("*.py"):
+        text = re.sub(r"\s+(#:? )?", " ", path.read_text("utf-8"))
+        cited |= set(re.findall(r'(docs/theory/[\w-]+\.md),? "([^"]+)"', text))
+    assert len(cited) > 15
+    for page, section in cited:
+        text = (ROOT / page).read_text("utf-8").replace("$", "")
+        assert re.search(rf"^(#+ |.*\*\*){re.escape(section)}", text, re.M), (page, section)
+
+
+def test_every_test_that_the_guarantees_name_is_there() -> None:
+    named = set(re.findall(r"`(test_\w+)`", (ROOT / "docs/guarantees.md").read_text("utf-8")))
+    tests = "\n".join(path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    assert len(named) > 40
+    assert named <= set(re.findall(r"^def (test_\w+)", tests, re.M))

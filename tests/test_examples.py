@@ -1,9 +1,11 @@
 """Every example runs, and what it computes agrees with its reference."""
 
 import importlib.util
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import pytest
 
 FOLDER = Path(__file__).parent.parent / "examples"
@@ -17,6 +19,17 @@ TOLERANCES = {
 }
 
 
+#: All `compare()` at their end; the scripts of the course also assert what they say on the way.
+SCRIPTS = [*sorted(FOLDER.glob("*.py")), *sorted(FOLDER.glob("course/*.py"))]
+
+
+@pytest.fixture(autouse=True)
+def _no_windows() -> Iterator[None]:
+    plt.switch_backend("agg")
+    yield
+    plt.close("all")
+
+
 def load(path: Path) -> Any:
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
@@ -27,7 +40,9 @@ def load(path: Path) -> Any:
 
 
 @pytest.mark.parametrize(
-    "path", [p for p in sorted(FOLDER.glob("*.py")) if p.stem != "boundary_elements"], ids=str
+    "path",
+    [path for path in SCRIPTS if path.stem != "boundary_elements"],
+    ids=lambda path: path.stem,
 )
 def test_example(path: Path) -> None:
     pairs = load(path).compare()

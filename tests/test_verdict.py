@@ -79,7 +79,7 @@ def test_a_dropped_asperity_of_the_paper(influence: Any, index: int) -> None:
     loads[index] = 0.0
     verdict = cr.verify(paper(), loads, approach=PAPER_APPROACH, influence=influence)
     assert verdict.wrongly_open.tolist() == verdict.suspects.tolist() == [index]
-    assert verdict.load_errors[index] == pytest.approx(contact.loads[index], rel=1e-6)
+    assert verdict.errors[index] == pytest.approx(contact.loads[index], rel=1e-6)
     assert verdict.solution is not None
     assert not verdict.holds
 
@@ -108,12 +108,12 @@ def test_what_is_right_holds() -> None:
         assert verdict.holds
         assert verdict.solution is None
         assert len(verdict.suspects) == 0
-    assert verdict.load_error < 1e-11
+    assert verdict.error < 1e-11
     loose = np.round(contact.loads / contact.loads.max(), 4) * contact.loads.max()
     assert not cr.verify(paper(), loose, approach=PAPER_APPROACH, within=1e-6).holds
     near = cr.verify(paper(), loose, approach=PAPER_APPROACH, within=1e-3)
     assert near.holds
-    assert near.load_error < 1e-3
+    assert near.error < 1e-3
 
 
 def test_totals_in_another_unit() -> None:
@@ -131,7 +131,7 @@ def test_totals_in_another_unit() -> None:
 def test_loads_in_another_unit_under_a_prescribed_approach() -> None:
     contact = cr.press(paper(), approach=PAPER_APPROACH)
     verdict = cr.verify(paper(), 1e3 * contact.loads, approach=PAPER_APPROACH)
-    assert not verdict.loads_hold
+    assert not verdict.near_enough
     assert not verdict.holds
 
 

@@ -112,10 +112,6 @@ class Counted:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._influence, name)
 
-    @property  # type: ignore[misc]
-    def __class__(self) -> Any:  # some ask by class whether it is a matrix
-        return type(self._influence)
-
     def __len__(self) -> int:
         return len(self._influence)
 

@@ -4,6 +4,7 @@ Newton's method on the normal map F(delta) = delta + A P(delta) - D (convexrough
 in which everything that decides the answer - the scene's data, k, D, the product A P and F itself -
 is computed in the longest floating-point numbers that numpy has: 64 bits of mantissa on x86. Only
 the corrections are solved for in the package's own precision, and each leaves a small part of F.
+Where long double is no longer than float64, as on many other machines, there is no reference.
 """
 
 from __future__ import annotations
@@ -39,6 +40,9 @@ MOST_STEPS = 8
 #: What the linear solver may leave of F in a step.
 MOST_LEFT = 1e-6
 
+#: What one unit in the last place must be at most: some thousand times better than float64.
+LEAST_PRECISION = 2e-19
+
 #: Entries computed at a time.
 BLOCK = 2**20
 
@@ -72,6 +76,11 @@ def refine(problem: NormalProblem, loads: Array) -> Reference:
     where Newton's method does not get near the precision of the numbers.
     """
     scene = problem.scene
+    if np.finfo(Long).eps > LEAST_PRECISION:
+        expected = "numbers longer than float64, which this machine has not"
+        raise InputError(
+            "reference", found=f"long double of {np.finfo(Long).eps:.1g}", expected=expected
+        )
     if problem.approach is None or scene.geometry != "summit":
         expected = 'approach control and the geometry "summit"'
         raise InputError("reference", found="another problem", expected=expected)

@@ -132,9 +132,10 @@ def solve(
             tell(step, state)
         accurate = state.residual <= stopping.accurate * state.scale
         size, noise = float(np.linalg.norm(state.defect)), law.noise(state)
-        if state.residual <= stopping.tolerance * state.scale or (accurate and size <= noise):
+        done = state.residual <= max(stopping.tolerance * state.scale, 0.0)
+        if done or (accurate and size <= noise):
             return state, step - 1
-        forcing = min(MOST_LEFT, (size / before) ** 2) if before < np.inf else MOST_LEFT
+        forcing = min(MOST_LEFT, (size / before) ** 2) if 0 < before < np.inf else MOST_LEFT
         enough = max(noise / size, stopping.tolerance * state.scale / state.residual)
         direction = law.direction(state, max(forcing, OVERSOLVED * enough))
         following = descend(law, state, direction)
@@ -142,9 +143,9 @@ def solve(
             return min(state, following, key=lambda each: each.residual), step
         state, before = following, size
     needed = max(stopping.tolerance, stopping.accurate)
+    part = state.residual / state.scale if state.scale != 0 else np.inf
     raise SolverError(
-        f"residual {state.residual / state.scale:.3g} of {law.unit} after {stopping.most} steps, "
-        f"{needed:.3g} needed",
+        f"residual {part:.3g} of {law.unit} after {stopping.most} steps, {needed:.3g} needed",
         solver=law.solver,
         advice=law.advice(state),
         iterate=state.forces,

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.influence.lattice_smoother import differences
 
-#: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.2 for the
+#: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.5 for the
 #: twiddle factors and the products with them, and sqrt(p) ((p - 1) / 2 + 4) for the sums of p terms
 #: (1 for p = 2). Radices 4 and 8 cost less than two and three passes of radix 2. "One pass" of
 #: docs/theory/operators.md, "On a lattice: Fourier transforms".
-PASS_ROUNDOFFS = {2: 6, 3: 13, 5: 18, 7: 23, 11: 35}
+PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
 #: Transforms of more numbers than this use every core.
 PARALLEL = 2**18

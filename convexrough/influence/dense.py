@@ -91,11 +91,12 @@ class DenseInfluence:
         return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        raised = self.matrix * self.matrix
+        inverse = self.matrix / self.scale  # 1 / r: powers of the scale may be too small
+        raised = inverse * inverse
         for _ in range(power - 2):
-            raised *= self.matrix
+            raised *= inverse
         total: Array = raised @ strengths
-        return total * ((1.0 + self._loss(power)) / self.scale**power)
+        return total * (1.0 + self._loss(power))
 
     def submatrix(self, which: Indices) -> Array:
         return np.asarray(self.matrix[which[:, None], which])
@@ -129,7 +130,7 @@ class DenseInfluence:
 
     def _loss(self, power: int) -> float:
         """Relative error of a sum of powers."""
-        return 1.01 * ((len(self) + 3) * ROUNDOFF + power * self.entry_error)
+        return 1.01 * ((len(self) + 6) * ROUNDOFF + power * self.entry_error)
 
 
 @dataclass(frozen=True, eq=False)

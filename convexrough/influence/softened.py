@@ -167,7 +167,8 @@ def lagrange(places: Array, order: int) -> Array:
 def weight_roundoffs(order: int) -> float:
     """Bound on the relative error of each of them, in roundoffs of float64.
 
-    p - 1 differences, p - 2 products, a quotient and its constant; and the rounding to float64.
+    p - 1 differences, p - 2 products, a quotient and its constant; and the rounding to float64. In
+    the long double of this machine, whatever that is: where it is float64, this is 1 + 2 p.
     """
     return 1.0 + 2.0 * order * float(np.finfo(np.longdouble).eps) / 2.0**-52
 

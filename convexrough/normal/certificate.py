@@ -13,10 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
-from convexrough.influence import Kind
+from convexrough.influence import Kind, couple
 from convexrough.normal.judgement import Judgement, Scope
 from convexrough.normal.problem import NormalProblem
+from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz
 
 WORDS = np.array(["undecided", "contact", "open"])
 
@@ -41,7 +43,8 @@ class Certificate:
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
     duality_gap : [force length] bound on the energy of these loads above that of the solution, by
         a dual point made from the loads alone; 0 to rounding at a solution, infinite where the
-        shells do not prove the energy convex up to there
+        shells do not prove the energy convex up to there. Under load control of the loads as they
+        are judged: scaled, and none on asperities that cannot touch
     """
 
     scope: Scope
@@ -87,6 +90,7 @@ def certify(
 
     Raises InputError for loads of the wrong length, negative or not finite.
     """
+    checks.instance("scene", scene, Scene)
     values = checks.array("loads", loads, length=len(scene), sign="not negative")
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
     return judge(problem, values)
@@ -95,11 +99,13 @@ def certify(
 def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
     """`certify` for a problem already assembled; loads (n,) [force] of the whole scene."""
     length, force = problem.units.length, problem.units.force
-    found = Judgement.of(problem, scene_loads[problem.candidates] / force)
+    given = scene_loads[problem.candidates]
+    found = Judgement.of(problem, given / force)
     # The screened asperities carry nothing: a load there is off by all of it.
     load_errors = scene_loads if found.scope != "none" else np.full(len(scene_loads), np.inf)
     load_errors = load_errors.copy()
-    load_errors[problem.candidates] = found.load_errors * force
+    lost = np.abs(given - given / force * force)  # too small for own units
+    load_errors[problem.candidates] = found.load_errors * force + lost
     words = np.where(found.indentation < -found.errors, np.int8(2), np.int8(0))
     words[problem.candidates[found.touches]] = 1
     return Certificate(
@@ -111,5 +117,28 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
         gap_errors=frozen(found.errors * length),
         approach=found.approach * length,
         approach_error=found.approach_error * length,
-        duality_gap=found.duality_gap * (force * length),
+        duality_gap=(found.duality_gap + _screened_energy(problem, scene_loads, found))
+        * (force * length),
     )
+
+
+def _screened_energy(problem: NormalProblem, scene_loads: Array, found: Judgement) -> float:
+    """Bound on what loads on screened asperities add to the energy, in own units.
+
+    Of loads s besides P:  sum (3/5) k s^(5/3) + (A P - D)'s + s'A s / 2,  where A P - D >= 0.
+    """
+    screened = scene_loads.copy()
+    screened[problem.candidates] = 0.0
+    which = np.flatnonzero(screened)
+    if len(which) == 0 or problem.load is not None:
+        return 0.0
+    scene, s = problem.scene, scene_loads[which] / problem.units.force
+    coefficients = hertz.local_coefficient(
+        scene.material.contact_modulus, scene.relative_radii[which]
+    )
+    coupling = couple(scene, which, problem.influence.scale, None)
+    moved = coupling.apply(s)
+    moved += coupling.rounding(s).of(moved)
+    local = 0.6 * hertz.indentation(s, coefficients * problem.units.local)
+    outside = found.errors[which] - found.indentation[which]
+    return float(s @ (local + outside + 0.5 * np.maximum(moved, 0.0))) * (1 + SAFETY)

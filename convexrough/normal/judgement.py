@@ -23,6 +23,7 @@ Headings in quotes below are of that page. Its letters, and the names here:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -94,7 +95,7 @@ class Judgement(NamedTuple):
         low = hertz.load(fit.indentation - error, problem.coefficients) * (1 - SAFETY)
         high = hertz.load(fit.indentation + error, problem.coefficients) * (1 + SAFETY)
         load_errors = np.minimum(errors, np.maximum(loads - low, high - loads))
-        load_errors += np.abs(loads - given) + 4 * ROUNDOFF * loads
+        load_errors += np.abs(loads - given) * (1 + SAFETY) + 4 * ROUNDOFF * loads
 
         everywhere = problem.to_scene(error)
         if screened.coupling is not None:
@@ -225,7 +226,7 @@ def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box
     nowhere = np.full(len(problem), np.inf)
     if (theta := problem.convexity_number(corner)) < 1:
         return _Box("global", problem, corner, h, theta, nowhere)
-    if (margin := _convex_margin(problem.influence, h)) > 0:
+    if (margin := convex_margin(problem.influence, h, MARGINS)) > 0:
         return _Box("global", problem, corner, h, 1.0 - margin, nowhere)
     theta = problem.convexity_number(loads)
     if theta > FIT_FROM:
@@ -242,8 +243,8 @@ def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box
     return None
 
 
-def _convex_margin(influence: Influence, stiffness: Array) -> float:
-    """A proved mu with  I + H^(-1/2) A H^(-1/2) >= mu I;  0 where none is found: "Which box", 2.
+def convex_margin(influence: Influence, stiffness: Array, margins: Sequence[float]) -> float:
+    """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved, else 0: "Which box", 2.
 
     Only where there is a matrix: a factorisation costs as the cube of its size.
     """
@@ -251,7 +252,7 @@ def _convex_margin(influence: Influence, stiffness: Array) -> float:
         return 0.0
     root = 1.0 / np.sqrt(stiffness)
     scaled = influence.matrix * root * root[:, None]
-    return proved_margin(scaled, MARGINS, influence.entry_error + 8 * ROUNDOFF)
+    return proved_margin(scaled, margins, influence.entry_error + 8 * ROUNDOFF)
 
 
 def _approach_error(

@@ -57,9 +57,10 @@ def approach_bound(
     height = float((c_active + np.cbrt(8.0 * cubes / (27.0 * load))).max()) * (1 + SAFETY)
     for _ in range(100):
         excess = cubes / (height - c_active) ** 3
-        step = (float(excess.sum()) - 27.0 * load / 8.0) / float(
-            3.0 * (excess / (height - c_active)).sum()
-        )
+        slope = float(3.0 * (excess / (height - c_active)).sum())
+        if not slope > 0:
+            break  # nothing is left of the sum in float64: the height is high enough
+        step = (float(excess.sum()) - 27.0 * load / 8.0) / slope
         height += max(step, 0.0)
         if step <= 1e-3 * (height - float(c_active.max())):
             break  # any height gives a bound; this one is close to the best

@@ -12,6 +12,7 @@ of that constraint (load control). Its first-order conditions are the contact la
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -205,8 +206,9 @@ class NormalProblem:
             min Phi >= -P'MP / 2 + sum min over 0 <= x <= box_i of [h_i(x) - (D - M P)_i x].
 
         Phi(P) less that is a sum of terms that are not negative. Under load control `approach` is
-        any estimate of the multiplier and `loads` must add up to the load. Infinite where the
-        shells do not prove the box convex. Rounding is counted, so it is never quite 0.
+        any estimate of the multiplier, and what the loads miss the total by is counted with it.
+        Infinite where the shells do not prove the box convex. Rounding is counted, so it is never
+        quite 0.
 
         displacement : A P, and a bound on its error beyond that of a few roundings
         """
@@ -227,6 +229,9 @@ class NormalProblem:
         moved = np.divide(error, curvature, out=np.full(len(self), np.inf), where=curvature > 0)
         distance = np.minimum(np.abs(loads - best) + moved, np.maximum(loads, box))
         rounding += float((error * distance).sum()) * (1 + SAFETY)
+        if self.load is not None:
+            missing = abs(math.fsum(loads) - self.load) + 2 * ROUNDOFF * self.load
+            rounding += abs(approach) * missing * (1 + SAFETY)
         return float(np.maximum(charge(loads) - charge(best), 0.0).sum()) + rounding
 
     def _loads_at_slope(self, slope: Array, box: Array) -> Array:

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from convexrough.checks import SIZED
+from convexrough.errors import InputError
+
 
 @dataclass(frozen=True)
 class Units:
@@ -25,6 +28,9 @@ class Units:
 
     @classmethod
     def of(cls, approach: float, coefficient: float) -> Units:
+        """For an approach [length] and a local coefficient k; InputError if there are none."""
+        if not 0 < approach < np.inf:
+            raise InputError("scene", found=f"indentations of {approach:g}", expected=SIZED)
         length = 2.0 ** np.round(np.log2(approach))
         force = 8.0 ** np.round(np.log2(length / coefficient) / 2.0)
         return cls(float(length), float(force))

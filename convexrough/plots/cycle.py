@@ -8,10 +8,12 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as MatplotlibFigure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from convexrough.arrays import Array
+from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     DASHED,
     DOUBLE,
@@ -24,9 +26,10 @@ from convexrough.plots.style import (
     no_contact_figure,
     round_ticks,
 )
-from convexrough.scene.rings import evenly_chosen, one_of_each_ring
-from convexrough.shearing.cycle import Cycle, Loop
-from convexrough.shearing.history import history
+from convexrough.scene.rings import one_of_each_ring
+from convexrough.shearing.cycle import Cycle
+from convexrough.shearing.cycle import loops as steady_loops
+from convexrough.shearing.loop import Loop
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
 
@@ -39,38 +42,59 @@ DASHES: list[Any] = ["-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7,
 def cycle_figures(
     cycles: Sequence[Cycle],
     *,
+    loops: Sequence[Loop] | None = None,
     asperities: Sequence[int] | None = None,
     length_unit: str = "",
     force_unit: str = "",
-) -> dict[str, Figure]:
+) -> Figures:
     """The figures of steady cycles of one contact.
 
+    loops      : of each cycle, where they are known; else they are computed
     asperities : whose loops to show; default: one at each distance from the axis, at most 6
 
-    "hysteresis" : the loops of at most 4 of the cycles, with the smooth sphere's; and of chosen
-        asperities in the cycle of the widest range
+    "hysteresis" : the loops of the cycles, with the smooth sphere's; of more than 4 cycles, those
+        of about the whole, 3/4, 1/2 and 1/4 of the widest range. And of chosen asperities in the
+        cycle of the widest range
     "loss" : where there are cycles of several ranges, energy against amplitude
     """
     if not cycles:
-        return {}
+        return Figures()
     contact = cycles[0].contact
     several = len(np.unique([each.maximum - each.minimum for each in cycles])) > 1
     if not contact.loads.any():
-        figures = {"hysteresis": no_contact_figure(("$X$", "$Q$"), ("$X_i$ + slip", "$Q_i$"))}
+        labels = ("$X$", "$Q$"), ("$X_i$ + slip", "$Q_i$")
+        figures = Figures({"hysteresis": no_contact_figure(*labels)})
         if several:
             figures["loss"] = no_contact_figure(("amplitude of $Q$", "$W$"))
         return figures
     scale = ShearScale.of(contact, length_unit, force_unit)
-    by_range = sorted(cycles, key=lambda each: each.maximum - each.minimum)
+    by_range = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
     distances = np.hypot(*contact.scene.contact_points.T)
-    every = one_of_each_ring(distances, contact.loads, MOST_ASPERITIES)
-    chosen = every if asperities is None else list(asperities)
-    names = [f"{r:.2f}" for r in distances[chosen] / scale.sphere.contact_radius]
-    shown = evenly_chosen(by_range, MOST_LOOPS)
-    figures = {"hysteresis": loops_figure(shown, chosen, names, "$r\\,/\\,a_H$", scale)}
+    if asperities is None:
+        known = np.arange(len(distances)) if loops is None else loops[0].asperities
+        asperities = one_of_each_ring(distances[known], contact.loads[known], MOST_ASPERITIES)
+        asperities = known[asperities].tolist()
+    names = [f"{r:.2f}" for r in distances[list(asperities)] / scale.sphere.contact_radius]
+    shown = _spread([cycles[i].force_amplitude for i in by_range])
+    some = [cycles[by_range[i]] for i in shown]
+    theirs = None if loops is None else [loops[by_range[i]] for i in shown]
+    figure = loops_figure(some, asperities, names, "$r\\,/\\,a_H$", scale, theirs, len(cycles))
+    figures = Figures({"hysteresis": figure})
     if several:
-        figures["loss"] = _loss_figure(by_range, scale)
+        figures["loss"] = _loss_figure([cycles[i] for i in by_range], scale)
     return figures
+
+
+def _spread(amplitudes: Sequence[float]) -> list[int]:
+    """All of few loops; of many those nearest to 1/4, 1/2, 3/4 and all of the widest.
+
+    amplitudes : in rising order
+    """
+    if len(amplitudes) <= MOST_LOOPS:
+        return list(range(len(amplitudes)))
+    parts = amplitudes[-1] * np.arange(1, MOST_LOOPS + 1) / MOST_LOOPS
+    away = np.abs(np.array(amplitudes)[:, None] - parts)
+    return sorted(set(np.argmin(away, axis=0).tolist()))
 
 
 def loops_figure(
@@ -79,15 +103,18 @@ def loops_figure(
     names: Sequence[str],
     meaning: str,
     scale: ShearScale,
+    loops: Sequence[Loop] | None = None,
+    count: int = 0,
 ) -> Figure:
     """Loops of the contact, the same sheared upright, and of single asperities in the last cycle.
 
     names, meaning : entries and title of the legend of the asperities
+    loops : of the cycles, with those of the asperities;  count : of cycles from which these are
     """
+    loops = steady_loops(cycles, POINTS, None, asperities) if loops is None else loops
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     whole, upright, single = figure.subplots(1, 3, width_ratios=[1, 1, 1.1])
-    for cycle in cycles:
-        loop = drawn_loop(cycle)
+    for cycle, loop in zip(cycles, loops, strict=True):
         forces = _around(cycle, POINTS)
         smooth = smooth_loop(scale.sphere, forces) / scale.displacement
         rough = loop.displacements / scale.displacement
@@ -97,14 +124,18 @@ def loops_figure(
             axes.plot(rough - elastic * up, up, **look)
             look = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": "smooth sphere"}
             axes.plot(smooth - elastic * smooth_up, smooth_up, **look)
+        _name(upright, rough[0] - 2.0 / 3.0 * up[0], up[0], _range(cycle, scale))
     label(whole, "$X\\,/\\,X_0$", "$Q\\,/\\,(fP)$")
     label(upright, r"$X\,/\,X_0 - \frac{2}{3}\,Q\,/\,(fP)$", "")
     upright.sharey(whole)
     upright.tick_params(labelleft=False)
-    whole.set_title("whole contact", fontsize=TICK, loc="left")
+    which = f": {len(cycles)} of {count} cycles" if count > len(cycles) else ""
+    whole.set_title(f"whole contact{which}", fontsize=TICK, loc="left")
+    upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
     upright.set_title("less the smooth elastic part", fontsize=TICK, loc="left")
-    _draw_asperity_loops(single, loop, asperities, names, cycles[-1], scale)
-    single.set_title(f"asperities, {_between(cycles[-1], scale)}", fontsize=TICK, loc="left")
+    _draw_asperity_loops(single, loops[-1], asperities, names, cycles[-1], scale)
+    title = f"asperities, $Q/(fP)$ = {_range(cycles[-1], scale)}"
+    single.set_title(title, fontsize=TICK, loc="left")
     single.legend(
         title=meaning,
         loc="center left",
@@ -123,27 +154,23 @@ def loops_figure(
     return figure
 
 
-def drawn_loop(cycle: Cycle) -> Loop:
-    """`cycle.loop` with its points close together at the ends, where X bends sharply.
-
-    Fewer points where many asperities touch: each takes time.
-    """
-    touching = np.count_nonzero(cycle.contact.loads)
-    path = _around(cycle, int(np.clip(40_000 // touching, 40, POINTS)))
-    first = [cycle.minimum] if abs(cycle.minimum) > abs(cycle.maximum) else []
-    past = history(cycle.contact, forces=np.concatenate((first, path)))
-    body = slice(len(first), None)
-    return Loop(
-        forces=past.applied[body],
-        displacements=past.displacements[body],
-        asperity_forces=past.forces[body],
-        asperity_displacements=past.asperity_displacements[body],
+def _name(axes: Axes, x: float, y: float, text: str) -> None:
+    """The range of a loop, to the right of its upper end."""
+    axes.annotate(
+        text,
+        (x, y),
+        xytext=(4, 2),
+        textcoords="offset points",
+        fontsize=7,
+        ha="left",
+        va="center",
+        path_effects=[withStroke(linewidth=2.0, foreground="white")],
     )
 
 
 def _around(cycle: Cycle, points: int) -> Array:
-    """Forces from the maximum to the minimum and back [force]."""
-    middle, half = (cycle.maximum + cycle.minimum) / 2, (cycle.maximum - cycle.minimum) / 2
+    """Forces from the maximum to the minimum and back [force], close together at the ends."""
+    middle, half = (cycle.maximum + cycle.minimum) / 2, cycle.force_amplitude
     down = middle + half * np.cos(np.linspace(0.0, np.pi, points // 2 + 1))
     down = np.clip(down, cycle.minimum, cycle.maximum)
     return np.append(down, down[-2::-1])
@@ -174,10 +201,12 @@ def _draw_asperity_loops(
 ) -> None:
     """Q_i / (f P_i) against (X_i + slip_i) / X0: an asperity that slides runs along +-1."""
     limits = scale.force * cycle.contact.loads / cycle.contact.load
+    kept = loop.asperities.tolist()
     for order, (i, name) in enumerate(zip(asperities, names, strict=True)):
+        at = kept.index(i)
         axes.plot(
-            loop.asperity_displacements[:, i] / scale.displacement,
-            loop.asperity_forces[:, i] / limits[i],
+            loop.asperity_displacements[:, at] / scale.displacement,
+            loop.asperity_forces[:, at] / limits[i],
             lw=1.1,
             ls=DASHES[order % len(DASHES)],
             color=ring_colour(order, len(asperities)),
@@ -193,7 +222,7 @@ def ring_colour(order: int, count: int) -> Any:
     return matplotlib.colormaps["viridis"](0.82 * order / max(1, count - 1))
 
 
-def _legend(figure: Figure, axes: Axes) -> None:
+def _legend(figure: MatplotlibFigure, axes: Axes) -> None:
     """Above all panels, the first two lines of one."""
     figure.legend(
         handles=axes.lines[:2],
@@ -205,12 +234,12 @@ def _legend(figure: Figure, axes: Axes) -> None:
     )
 
 
-def _between(cycle: Cycle, scale: ShearScale) -> str:
-    """The range of a cycle, in words."""
+def _range(cycle: Cycle, scale: ShearScale) -> str:
+    """The range of a cycle, in fractions of f P."""
     high, low = cycle.maximum / scale.force, cycle.minimum / scale.force
     if high == -low:
-        return f"$Q/(fP)$ = ±{high:.4g}"
-    return f"$Q/(fP)$ = {low:.4g} to {high:.4g}".replace("-", "\u2212")
+        return f"±{high:.4g}"
+    return f"{low:.4g} to {high:.4g}".replace("-", "\u2212")
 
 
 def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
@@ -218,7 +247,7 @@ def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     loss, ratio = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     some = [each for each in cycles if each.maximum > each.minimum]
-    amplitude = np.array([(each.maximum - each.minimum) / 2.0 for each in some]) / scale.force
+    amplitude = np.array([each.force_amplitude for each in some]) / scale.force
     rough = np.array([each.energy_normalised for each in some])
     smooth = np.array([each.smooth_normalised for each in some])
     marks: dict[str, Any] = {

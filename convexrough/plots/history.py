@@ -10,20 +10,25 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from convexrough.arrays import Array
-from convexrough.plots.style import DOUBLE, SMOOTH, TICK, ShearScale, label, no_contact_figure
+from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.style import (
+    DOUBLE,
+    SMOOTH,
+    TICK,
+    ShearScale,
+    label,
+    no_contact_figure,
+)
 from convexrough.shearing.history import History, history
 
 MOST_POINTS, MOST_NUMBERS, MOST_DOTS = 2000, 12, 60
 
 
-def history_figures(
-    past: History, *, length_unit: str = "", force_unit: str = ""
-) -> dict[str, Figure]:
+def history_figures(past: History, *, length_unit: str = "", force_unit: str = "") -> Figures:
     """The figure of a history.
 
     "history" : Q against X, its steps numbered where they are few and in darkening colours; and
@@ -31,7 +36,7 @@ def history_figures(
     """
     contact = past.contact
     if not contact.loads.any():
-        return {"history": no_contact_figure(("$X$", "$Q$"), ("step", "energy lost"))}
+        return Figures({"history": no_contact_figure(("$X$", "$Q$"), ("step", "energy lost"))})
     scale = ShearScale.of(contact, length_unit, force_unit)
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     path, cost = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
@@ -62,7 +67,7 @@ def history_figures(
     bar.ax.yaxis.set_major_locator(MaxNLocator(8, integer=True))
     bar.ax.tick_params(labelsize=TICK)
     bar.ax.set_title("step", fontsize=TICK)
-    return {"history": figure}
+    return Figures({"history": figure})
 
 
 def _darkening() -> Any:

@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 
 from convexrough import fields
 from convexrough.arrays import Array
 from convexrough.contact import Contact
+from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     COLOURS,
     CROWDED,
@@ -24,7 +24,9 @@ from convexrough.plots.style import (
     abscissae,
     census,
     draw_circle,
+    draw_density,
     draw_discs,
+    draw_mosaic,
     draw_open,
     frame_map,
     label,
@@ -37,10 +39,11 @@ from convexrough.plots.style import (
 )
 from convexrough.sphere import hertz
 
+#: Half the width of the strip whose peak pressures stand for a profile [a_H].
+STRIP = 0.1
 
-def press_figures(
-    contact: Contact, *, length_unit: str = "", force_unit: str = ""
-) -> dict[str, Figure]:
+
+def press_figures(contact: Contact, *, length_unit: str = "", force_unit: str = "") -> Figures:
     """The figures of a pressed contact, by the stem of the file each belongs in.
 
     "pressure" : map of the contact discs, and the profile along y = 0 with that of the smooth
@@ -52,7 +55,7 @@ def press_figures(
     """
     scale = Scale.of(contact, length_unit, force_unit)
     loads = _loads_figure(contact, scale) if contact.loads.any() else _no_loads(scale)
-    return {"pressure": pressure_figure(contact, scale), "loads": loads}
+    return Figures({"pressure": pressure_figure(contact, scale), "loads": loads})
 
 
 def pressure_figure(contact: Contact, scale: Scale) -> Figure:
@@ -73,7 +76,7 @@ def pressure_figure(contact: Contact, scale: Scale) -> Figure:
         draw_open(chart, points[~touching & (np.abs(points).max(axis=1) < edge)])
         _draw_peaks(chart, points[touching], radii, peaks[touching], colours)
     else:
-        _draw_mosaic(chart, points, peaks, colours, edge)
+        draw_mosaic(chart, points, colours.to_rgba(peaks), touching, edge, 500)
     draw_circle(chart, 1.0)
     frame_map(chart, edge)
     chart.set_anchor("E")
@@ -107,43 +110,31 @@ def _draw_peaks(
         draw_discs(axes, centres, inner, word, facecolors=shades, linewidths=0)
 
 
-def _draw_mosaic(
-    axes: Axes, points: Array, peaks: Array, colours: ScalarMappable, edge: float
-) -> None:
-    """Each place in the colour of the nearest asperity's peak pressure; white where that is open.
-
-    points : (n, 2) [a_H];  peaks : (n,) [p0], 0 where open
-    """
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
-
-    pixels = 500
-    x = edge * ((np.arange(pixels) + 0.5) / pixels * 2.0 - 1.0)
-    places = np.stack(np.meshgrid(x, x), axis=-1)
-    cell = 2.0 * edge / np.sqrt(np.count_nonzero(peaks))  # no asperity so near: outside them all
-    _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
-    shown = np.append(peaks, 0.0)[nearest]
-    image = colours.to_rgba(np.ma.masked_equal(shown, 0.0))
-    whole = (-edge, edge, -edge, edge)
-    axes.imshow(image, origin="lower", extent=whole, interpolation="nearest")
-
-
 def _draw_profile(axes: Axes, contact: Contact, scale: Scale, edge: float) -> None:
-    """Pressure along y = 0, of the asperities and of the smooth sphere, for |x| < edge [a_H]."""
-    x = abscissae(contact.scene.contact_points, contact.contact_radii, edge * scale.length)
-    rough = fields.pressure(contact, np.column_stack((x, np.zeros_like(x)))) / scale.pressure
-    fine = len(x) > 100 * len(towards_rim())  # so many discs that lines would leave no white
-    axes.fill_between(
-        x / scale.length,
-        rough,
-        facecolor=(ROUGH, 0.5 if fine else 0.2),
-        edgecolor="none" if fine else ROUGH,
-        lw=float(np.clip(3000 / len(x), 0.4, 0.9)),
-        rasterized=fine,
-        label="asperities, $y=0$",
-    )
+    """Pressure along y = 0, of the asperities and of the smooth sphere, for |x| < edge [a_H].
+
+    Of many asperities the peak pressures about y = 0, as density and median.
+    """
+    points, touching = contact.scene.contact_points / scale.length, contact.loads > 0
+    if np.count_nonzero(touching) < CROWDED:
+        x = abscissae(contact.scene.contact_points, contact.contact_radii, edge * scale.length)
+        rough = fields.pressure(contact, np.column_stack((x, np.zeros_like(x)))) / scale.pressure
+        axes.fill_between(
+            x / scale.length,
+            rough,
+            facecolor=(ROUGH, 0.2),
+            edgecolor=ROUGH,
+            lw=float(np.clip(3000 / len(x), 0.4, 0.9)),
+            label="asperities, $y=0$",
+        )
+    else:
+        near = touching & (np.abs(points[:, 1]) < STRIP)
+        peaks = fields.peak_pressures(contact)[near] / scale.pressure
+        word = f"peaks, $|y|<{STRIP:g}\\,a_H$"
+        draw_density(axes, points[near, 0], peaks, float(peaks.max()), ROUGH, word)
     s = towards_rim()
     axes.plot(s, hertz.pressure(s, 1.0, 1.0), "--", lw=1.3, color=SMOOTH, label="smooth sphere")
-    legend_above(axes)
+    legend_above(axes, ncols=3 if np.count_nonzero(touching) < CROWDED else 2)
 
 
 def _loads_figure(contact: Contact, scale: Scale) -> Figure:
@@ -159,8 +150,12 @@ def _loads_figure(contact: Contact, scale: Scale) -> Figure:
     _draw_smooth_share(axes, contact, scale)
     n = int(touching.sum())
     size = float(np.clip(40.0 / np.sqrt(n), 1.2, 4.0))
+    many = n >= CROWDED
+    if many:
+        top = float(np.quantile(share[touching], 0.9999))
+        draw_density(axes, distance[touching], share[touching], top, ROUGH, "touching")
     for word, chosen, marker, colour in (
-        ("touching", touching & ~unsure, "o", ROUGH),
+        ("touching", touching & ~unsure & (not many), "o", ROUGH),
         ("undecided", unsure, "x", UNSURE),
     ):
         if chosen.any():
@@ -173,14 +168,14 @@ def _loads_figure(contact: Contact, scale: Scale) -> Figure:
                 color=colour,
                 label=word,
                 clip_on=False,
-                rasterized=n >= CROWDED,
+                rasterized=many,
                 zorder=3,
             )
     axes.set_xlim(0.0, 1.05 * max(1.0, float(distance[touching | unsure].max())))
-    axes.set_ylim(0.0, 1.06 * axes.dataLim.ymax)
+    axes.set_ylim(0.0, 1.06 * (axes.dataLim.ymax or 1.0))
     axes.yaxis.get_offset_text().set_fontsize(TICK)
     label(axes, scale.length_label("r"), "asperity load  [% of total]")
-    legend_above(axes, markerscale=4.0 / size)
+    legend_above(axes, markerscale=1.0 if many else 4.0 / size, ncols=2 if many else 3)
     return figure
 
 
@@ -191,7 +186,7 @@ def _draw_smooth_share(axes: Axes, contact: Contact, scale: Scale) -> None:
     left out where fewer than seven of these have a whole cell.
     """
     points = contact.scene.contact_points
-    sample = np.argsort(np.hypot(*points.T))[:20_000]  # of very many, those nearest to the axis
+    sample = np.argsort(np.hypot(*points.T))[:5000]  # of very many, those nearest to the axis
     areas = fields.cell_areas(points[sample])
     whole = np.isfinite(areas) & (contact.loads[sample] > 0)
     if whole.sum() < 7:

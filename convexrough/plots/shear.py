@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 
+from convexrough.arrays import Array
 from convexrough.contact import Contact
+from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
+    CROWDED,
     DASHED,
     DENSE,
     DOUBLE,
@@ -26,6 +29,7 @@ from convexrough.plots.style import (
     doubt,
     draw_circle,
     draw_discs,
+    draw_mosaic,
     draw_open,
     frame_map,
     literal,
@@ -46,17 +50,18 @@ MOST_PANELS = 12
 
 def shear_figures(
     states: Sequence[ShearState], *, length_unit: str = "", force_unit: str = ""
-) -> dict[str, Figure]:
+) -> Figures:
     """The map of each friction state of one contact, at most 12 of them, evenly chosen.
 
     "stick_slip" : contact discs with their stick discs inside, sliding asperities, open ones; and
         the smooth sphere's contact and stick discs under the same forces
     """
     if not states:
-        return {}
+        return Figures()
     if not states[0].contact.loads.any():
         unit = f"  [{literal(length_unit)}]" if length_unit else ""
-        return {"stick_slip": no_contact_figure((f"$x${unit}", f"$y${unit}"), width=SINGLE)}
+        labels = (f"$x${unit}", f"$y${unit}")
+        return Figures({"stick_slip": no_contact_figure(labels, width=SINGLE)})
     contact = states[0].contact
     scale = Scale.of(contact, length_unit, force_unit)
     friction = ShearScale.of(contact, length_unit, force_unit)
@@ -90,7 +95,7 @@ def shear_figures(
         handletextpad=0.5,
         columnspacing=1.4,
     )
-    return {"stick_slip": figure}
+    return Figures({"stick_slip": figure})
 
 
 def draw_state(axes: Axes, state: ShearState, scale: Scale, stick_radius: float) -> None:
@@ -99,13 +104,38 @@ def draw_state(axes: Axes, state: ShearState, scale: Scale, stick_radius: float)
     stick_radius : of the smooth sphere, for comparison [length]
     """
     contact = state.contact
-    points, radii = contact.scene.contact_points / scale.length, contact.contact_radii
+    points = contact.scene.contact_points / scale.length
     touching = contact.loads > 0
     edge = map_edge(contact, scale)
     draw_circle(axes, 1.0)
     if 0 < stick_radius < scale.length:
         draw_circle(axes, stick_radius / scale.length, DOTTED)
-    draw_open(axes, points[~touching & (np.abs(points).max(axis=1) < edge)])
+    if int(touching.sum()) >= CROWDED:
+        draw_mosaic(axes, points, _mean_shades(state), touching, edge, 320)
+    else:
+        draw_open(axes, points[~touching & (np.abs(points).max(axis=1) < edge)])
+        _draw_words(axes, state, points, scale)
+    doubtful = _doubtful(state)
+    if doubtful.any():
+        size = float(np.clip(60.0 / np.sqrt(doubtful.sum()), 1.0, 4.0))
+        axes.plot(*points[doubtful].T, "x", ms=size, mew=0.8, color=SMOOTH, label="_undecided")
+    frame_map(axes, edge)
+
+
+def _mean_shades(state: ShearState) -> Array:
+    """(n, 4) the mean colour of each contact disc: its stick disc's and its annulus' by area."""
+    radii = state.contact.contact_radii
+    inside = np.divide(state.stick_radii, radii, out=np.zeros(len(radii)), where=radii > 0)
+    part = inside[:, None] ** 2
+    shades = part * to_rgba(STICK) + (1.0 - part) * to_rgba(SLIP)
+    shades[state.status == "sliding"] = to_rgba(SLIDING)
+    shades[state.status == "undecided"] = to_rgba(UNKNOWN)
+    return np.asarray(shades)
+
+
+def _draw_words(axes: Axes, state: ShearState, points: Array, scale: Scale) -> None:
+    """Every contact disc in true size, its stick disc inside."""
+    touching, radii = state.contact.loads > 0, state.contact.contact_radii
     many = int(touching.sum()) >= DENSE
     rim: dict[str, Any] = {"edgecolors": SMOOTH, "linewidths": 0.0 if many else 0.4}
     sure = touching & (state.status != "undecided")
@@ -122,11 +152,6 @@ def draw_state(axes: Axes, state: ShearState, scale: Scale, stick_radius: float)
                 "linewidths": 0.4 * (word == "undecided" or not many),
             }
             draw_discs(axes, points[chosen], across[chosen] / scale.length, word, **look)
-    doubtful = _doubtful(state)
-    if doubtful.any():
-        size = float(np.clip(60.0 / np.sqrt(doubtful.sum()), 1.0, 4.0))
-        axes.plot(*points[doubtful].T, "x", ms=size, mew=0.8, color=SMOOTH, label="_undecided")
-    frame_map(axes, edge)
 
 
 def legend_handles(contact: Contact, states: Sequence[ShearState]) -> list[Artist]:
@@ -144,7 +169,7 @@ def legend_handles(contact: Contact, states: Sequence[ShearState]) -> list[Artis
     ]
     if any(_doubtful(state).any() for state in states):
         handles.append(Line2D([], [], ls="", marker="x", ms=4, color=SMOOTH, label="undecided"))
-    if (contact.loads == 0).any():
+    if (contact.loads == 0).any() and np.count_nonzero(contact.loads) < CROWDED:
         handles.append(Line2D([], [], ls="", marker="o", ms=2, mew=0, color=FAINT, label="open"))
     line: dict[str, Any] = {"lw": 0.9, "color": SMOOTH}
     handles.append(Line2D([], [], ls=DASHED, label="smooth sphere: contact", **line))

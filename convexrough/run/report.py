@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from convexrough.run.columns import aligned
+from convexrough.run.plausibility import doubts, geometry_matters
 from convexrough.run.summary import NORMAL, Summary
 
 _SCOPES = {
@@ -34,7 +35,7 @@ def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
         *((f"  {word}", f"{normal[word]:>{width}}") for word in NORMAL),
         ("approach", _quantity(f"{normal['approach']:.10g}", length_unit)),
         ("load", _quantity(f"{normal['load']:.10g}", force_unit)),
-        ("certificate", _SCOPES[proof["scope"]]),
+        ("certificate", _SCOPES[proof["scope"]] + _of_what(normal)),
         ("convexity number", f"{proof['convexity_number']:.4g}  (convex below 1)"),
         ("load error", f"{_quantity(_bound(proof['load_error']), force_unit)}{relative}"),
         ("gap error", _quantity(_bound(proof["gap_error"]), length_unit)),
@@ -45,6 +46,7 @@ def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
         lines += [
             ("model error", f"{normal['model_error']:.2g}  (point forces for pressures)"),
             ("crowding", f"{normal['crowding']:.3g}  (contact discs overlap above 1)"),
+            *((("geometry", said),) if (said := geometry_matters(normal)) else ()),
             ("solver", f"{normal['solver']}, {steps}"),
             ("influence", _INFLUENCES[normal["influence"]]),
         ]
@@ -61,11 +63,15 @@ def _describe_shear(summary: Summary, length_unit: str, force_unit: str) -> list
         heading = ["Q/(fP)", "force", "displacement", "slide", "partial", "undecided"]
         lines += _numbers(heading, [[row[key] for key in keys] for row in rows])
     if rows := summary.get("cycle"):
-        keys = ["maximum", "minimum", "energy", "energy_normalised", "smooth_normalised"]
-        keys += ["balance_defect", "sliding"]
-        lines += ["", _titled("steady cycles", f"energy {work}")]
-        heading = ["max/(fP)", "min/(fP)", "energy", "W/W0", "smooth", "defect", "slide"]
-        lines += _numbers(heading, [[row[key] for key in keys] for row in rows])
+        keys = ["maximum", "minimum", "force_amplitude", "displacement_amplitude"]
+        keys += ["secant_stiffness", "energy", "loss_factor"]
+        keys += ["energy_normalised", "smooth_normalised", "sliding"]
+        stiffness = f"{force_unit}/{length_unit}" if force_unit and length_unit else ""
+        lines += ["", _titled("steady cycles", f"Qa {force_unit}", f"Xa {length_unit}",
+                              f"Qa/Xa {stiffness}", f"loss W {work}")]  # fmt: skip
+        heading = ["max/(fP)", "min/(fP)", "Qa", "Xa", "Qa/Xa", "W", "W/(pi Qa Xa)", "W/W0"]
+        heading += ["smooth", "slide"]
+        lines += _numbers(heading, [[row[key] for key in keys] for row in rows], digits=6)
     if past := summary.get("history"):
         steps = list(zip(past["fraction"], past["displacement"], past["energy"], strict=True))
         lines += ["", _titled("history", f"displacement {length_unit}", f"energy {work}")]
@@ -81,8 +87,8 @@ def _titled(name: str, *quantities: str) -> str:
     return f"{name}  ({', '.join(named)})" if named else name
 
 
-def _numbers(heading: Sequence[str], rows: Sequence[Sequence[float]]) -> list[str]:
-    cells = [[f"{x:d}" if isinstance(x, int) else f"{x:.7g}" for x in row] for row in rows]
+def _numbers(heading: Sequence[str], rows: Sequence[Sequence[float]], digits: int = 7) -> list[str]:
+    cells = [[f"{x:d}" if isinstance(x, int) else f"{x:.{digits}g}" for x in row] for row in rows]
     return aligned([heading, *cells])
 
 
@@ -128,7 +134,7 @@ def _wording(row: Summary) -> str:
     return f"{said}, {undecided} undecided" if undecided else said
 
 
-def warnings(summary: Summary) -> list[str]:
+def warnings(summary: Summary, *, length_unit: str = "", force_unit: str = "") -> list[str]:
     """What a user must not overlook, of either summary."""
     normal = summary["normal"]
     found = []
@@ -140,9 +146,17 @@ def warnings(summary: Summary) -> list[str]:
         doubtful = sum(1 for row in summary.get(stage, ()) if row["undecided"])
         if doubtful:
             found.append(f"not certified: {doubtful} of the rows in {stage} have undecided words")
-    if normal.get("crowding", 0.0) > 1:
-        found.append("contact discs overlap (crowding above 1): the asperity model does not hold")
+    if "crowding" in normal:
+        found += doubts(
+            normal, f"{force_unit}/{length_unit}²" if force_unit and length_unit else ""
+        )
     return found
+
+
+def _of_what(normal: Summary) -> str:
+    """That a proof of the asperity model says nothing where that does not hold."""
+    crowding = normal.get("crowding", 0.0)
+    return f" (of a model that does not hold: crowding {crowding:.3g})" if crowding > 1 else ""
 
 
 def comparison_warnings(summary: Summary) -> list[str]:

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
+import platform
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from convexrough.contact import Contact
 from convexrough.errors import FileError
-from convexrough.run.scene_file import UnitNames
-from convexrough.run.stages import Cycled, Findings, Sheared
-from convexrough.run.summary import SHEAR, Summary, counts, to_json
-from convexrough.run.tables import ASPERITY_COLUMNS
-from convexrough.scene.rings import one_of_each_ring
+from convexrough.progress import Announce
+from convexrough.run.scene_file import SceneFile, UnitNames, digest
+from convexrough.run.stage_tables import stage_tables
+from convexrough.run.stages import Findings
+from convexrough.run.summary import Summary, to_json
+from convexrough.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,26 +29,42 @@ if TYPE_CHECKING:
 #: Tables with more rows are written as .npz.
 MOST_CSV_ROWS = 100_000
 
-#: Asperities whose loops are written, at most.
-MOST_LOOPS = 12
+#: What was written, by name with its SHA-256, and from what.
+MANIFEST = "files.json"
+
+#: Packages whose versions results may depend on.
+NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
 
-def claim_folder(folder: Path, *, force: bool) -> None:
+def claim_folder(folder: Path, *, force: bool) -> list[Path]:
     """Make the folder and prove that it can be written to, before anything is computed.
 
-    force : accept a folder that holds something; files of the same names will be replaced
+    force : accept a folder that holds something. What an earlier run wrote there, and nobody has
+        changed since, is removed; other files stay, unless new ones of the same names replace them
 
-    Raises FileError.
+    Returns what stays of the earlier run, as it was changed. Raises FileError.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        occupied = any(folder.iterdir())
+        if any(folder.iterdir()) and not force:
+            raise FileError(
+                f"{folder}: not empty; --force replaces its results, --out takes another"
+            )
         with tempfile.TemporaryFile(dir=folder):
             pass
+        changed = []
+        for name, known in _manifest(folder).get("files", {}).items():
+            path = folder / Path(name).name  # inside the folder, whatever the manifest says
+            if path.is_file() and not path.is_symlink():
+                if digest(path) == known:
+                    path.unlink()
+                else:
+                    changed.append(path)
+        if _manifest(folder):
+            (folder / MANIFEST).unlink()
     except OSError as error:
         raise FileError(f"{folder}: cannot hold results: {error.strerror or error}") from error
-    if occupied and not force:
-        raise FileError(f"{folder}: not empty; --force replaces its results, --out takes another")
+    return changed
 
 
 def write_results(
@@ -56,28 +74,30 @@ def write_results(
     *,
     figures: bool,
     units: UnitNames | None = None,
+    source: SceneFile | None = None,
+    announce: Announce | None = None,
 ) -> list[Path]:
     """Write summary.json, a table per stage (.csv, or .npz if long) and the figures.
 
+    source   : the scene file, for a copy of it, and of what else says where the results are from
+    announce : told the name of each file
+
     Returns the paths. Raises FileError; files already written stay.
     """
-    written = [_write_columns(folder / "asperities.csv", _asperity_columns(found.contact))]
-    if found.shear:
-        written.append(_write_columns(folder / "shear.csv", _shear_columns(found.shear)))
-    if found.cycles:
-        written.append(_write_columns(folder / "cycle.csv", _cycle_columns(found.cycles)))
-        written.append(_write_columns(folder / "loop.csv", _loop_columns(found)))
-    if found.history is not None:
-        past = found.history.history
-        columns = {
-            "fraction": np.array(found.history.fractions),
-            "force": past.applied,
-            "displacement": past.displacements,
-            "energy": past.energy,
-        }
-        written.append(_write_columns(folder / "history.csv", columns))
+    tell: Announce = announce or (lambda news: None)
+    written = []
+    _note(folder, {} if source is None else _origin(source))
+    if source is not None:
+        path = folder / "scene.toml"
+        with beside(path) as temporary:
+            temporary.write_text(source.text, encoding="utf-8")
+        written.append(path)
+    for name, columns in stage_tables(found):
+        tell(name)
+        written.append(_write_columns(folder / f"{name}.csv", columns))
     if figures:
-        written += write_figures(folder, _draw(found, units or UnitNames()))
+        tell("figures")
+        written += write_figures(folder, _draw(found, units or UnitNames()), tell)
     # Last, so that a summary says that the rest is there.
     path = folder / "summary.json"
     with beside(path) as temporary:
@@ -85,20 +105,54 @@ def write_results(
     return [path, *written]
 
 
+def _origin(source: SceneFile) -> Summary:
+    """Where results are from: files read with their hashes, seed, and versions."""
+    packages = {name: metadata.version(name) for name in NUMERICAL}
+    return {
+        "scene": str(source.path),
+        "inputs": dict(source.inputs),
+        "seed": source.seed,
+        "versions": {"python": platform.python_version(), **packages},
+    }
+
+
+def _manifest(folder: Path) -> Summary:
+    """What the earlier run says that it wrote; nothing where that cannot be read."""
+    try:
+        found = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) and isinstance(found.get("files"), dict) else {}
+
+
+def _note(folder: Path, entries: Mapping[str, Any]) -> None:
+    """Add to what the manifest of a folder of results says; the first time, begin one."""
+    said = _manifest(folder) or {"schema": 1, "version": __version__, "files": {}}
+    with _replacing(folder / MANIFEST) as temporary:
+        temporary.write_text(to_json(said | dict(entries)) + "\n", encoding="utf-8")
+
+
 def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> list[Path]:
     """Write each table, name -> columns, as NAME.csv; return the paths."""
+    _note(folder, {})
     return [_write_columns(folder / f"{name}.csv", table) for name, table in tables.items()]
 
 
-def write_figures(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
+def write_figures(
+    folder: Path, figures: Mapping[str, Figure], announce: Announce | None = None
+) -> list[Path]:
     """Write each figure as PNG and SVG; return the paths."""
+    _note(folder, {})
     written = []
     for stem, figure in figures.items():
+        if announce is not None:
+            announce(stem)
         for kind in ("png", "svg"):
             path = folder / f"{stem}.{kind}"
             with beside(path) as temporary:
                 figure.savefig(temporary, format=kind, dpi=200)
             written.append(path)
+            figure.set_layout_engine("none")  # laid out once: the second file takes half the time
     return written
 
 
@@ -110,7 +164,11 @@ def _draw(found: Findings, units: UnitNames) -> dict[str, Figure]:
     if found.shear:
         figures |= plots.shear_figures([row.state for row in found.shear], **names)
     if found.cycles:
-        figures |= plots.cycle_figures([row.cycle for row in found.cycles], **names)
+        figures |= plots.cycle_figures(
+            [row.cycle for row in found.cycles],
+            loops=[row.loop for row in found.cycles],
+            **names,
+        )
     if found.history is not None:
         figures |= plots.history_figures(found.history.history, **names)
     return figures
@@ -118,7 +176,19 @@ def _draw(found: Findings, units: UnitNames) -> dict[str, Figure]:
 
 @contextmanager
 def beside(path: Path) -> Iterator[Path]:
-    """A name beside `path` to write to, which takes its place if all goes well, or vanishes."""
+    """A name beside `path` to write to, which takes its place if all goes well, or vanishes.
+
+    The manifest says so, where the folder has one.
+    """
+    with _replacing(path) as temporary:
+        yield temporary
+    files = _manifest(path.parent).get("files")
+    if files is not None:
+        _note(path.parent, {"files": {**files, path.name: digest(path)}})
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         yield temporary
@@ -127,84 +197,6 @@ def beside(path: Path) -> Iterator[Path]:
         raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def _asperity_columns(contact: Contact) -> dict[str, NDArray[Any]]:
-    asperities = contact.scene.asperities
-    x, y = asperities.positions.T
-    values = (
-        x,
-        y,
-        asperities.heights,
-        asperities.tip_radii,
-        contact.loads,
-        contact.contact_radii,
-        contact.gaps,
-        contact.status,
-        contact.certificate.load_errors,
-    )
-    return dict(zip(ASPERITY_COLUMNS, values, strict=True))
-
-
-def _shear_columns(rows: tuple[Sheared, ...]) -> dict[str, NDArray[Any]]:
-    """One row for each fraction and asperity."""
-    states = [row.state for row in rows]
-    count = len(states[0].forces)
-    x, y = states[0].contact.scene.asperities.positions.T
-    fields = {
-        "force": "forces",
-        "stick_radius": "stick_radii",
-        "slip": "slips",
-        "displacement": "displacements",
-        "status": "status",
-    }
-    return {
-        "fraction": np.repeat([row.fraction for row in rows], count),
-        "x": np.tile(x, len(rows)),
-        "y": np.tile(y, len(rows)),
-        **{
-            name: np.concatenate([getattr(state, field) for state in states])
-            for name, field in fields.items()
-        },
-    }
-
-
-def _cycle_columns(rows: tuple[Cycled, ...]) -> dict[str, NDArray[Any]]:
-    """One row per cycle; energies are those of both bodies, per steady cycle."""
-    cycles = [row.cycle for row in rows]
-    names = ("energy", "energy_normalised", "smooth_normalised", "balance_defect")
-    return {
-        "maximum": np.array([row.maximum for row in rows]),
-        "minimum": np.array([row.minimum for row in rows]),
-        **{name: np.array([getattr(cycle, name) for cycle in cycles]) for name in names},
-        "partial_slip_energy": np.array([each.partial_slip_energies.sum() for each in cycles]),
-        "sliding_energy": np.array([each.sliding_energies.sum() for each in cycles]),
-        "sliding": np.array([counts(each.status, SHEAR)["sliding"] for each in cycles]),
-    }
-
-
-def _loop_columns(found: Findings) -> dict[str, NDArray[Any]]:
-    """Force-displacement points of each cycle: macroscopic ("total"), and of some asperities."""
-    contact = found.contact
-    distances = contact.scene.asperities.distances
-    chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)
-    parts: dict[str, list[NDArray[Any]]] = {
-        name: [] for name in ("maximum", "minimum", "curve", "force", "displacement")
-    }
-    for maximum, minimum, cycle in found.cycles:
-        loop = cycle.loop(200)
-        curves = [("total", loop.forces, loop.displacements)]
-        curves += [
-            (str(i), loop.asperity_forces[:, i], loop.asperity_displacements[:, i]) for i in chosen
-        ]
-        for name, forces, displacements in curves:
-            points = len(forces)
-            parts["maximum"].append(np.full(points, maximum))
-            parts["minimum"].append(np.full(points, minimum))
-            parts["curve"].append(np.full(points, name))
-            parts["force"].append(forces)
-            parts["displacement"].append(displacements)
-    return {name: np.concatenate(part) for name, part in parts.items()}
 
 
 def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 from convexrough.errors import FileError, InputError, SceneFileError
 from convexrough.influence import Kind
@@ -16,14 +17,15 @@ from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
 from convexrough.run.stages import Stages
 from convexrough.run.tables import read_summits, read_text
+from convexrough.run.toml_slips import explained
 from convexrough.scene.asperities import Asperities, largest_tip_radius
 from convexrough.scene.material import Material
 from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import Scene, reach
-from convexrough.solvers import Solver
+from convexrough.solvers import Solver, named
 
 if TYPE_CHECKING:
-    from convexrough.run.schema import Document, Lattice
+    from convexrough.run.schema import Cycle, Document, Lattice
 
 
 class UnitNames(NamedTuple):
@@ -41,9 +43,14 @@ class SceneFile(Stages):
     highest_approach : [length] upper bound on the approach under the load, where the scene was
         made to reach as far as that; else None
     influence : how to couple the asperities; None for the cheapest exact way
+    text   : the file itself;  seed : of its random heights and radii, None where there are none
+    inputs : the SHA-256 of each file it was read from, by its path
     """
 
     path: Path
+    text: str
+    seed: int | None
+    inputs: Mapping[str, str]
     scene: Scene
     approach: float | None
     load: float | None
@@ -69,16 +76,23 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
     Raises FileError where a file cannot be read or is no TOML, SceneFileError with every mistake in
     the tables, and InputError for mistakes that show only in building the scene.
     """
-    from convexrough.run.schema import SOLVERS, validate
+    from convexrough.run.schema import validate
 
     path = Path(path)
-    tables, mistakes = validate(_parse(path))
+    text = read_text(path)
+    tables, mistakes = validate(_parse(path, text))
     if tables is None:
         raise SceneFileError(str(path), mistakes)
     shear, cycle, history, units = tables.shear, tables.cycle, tables.history, tables.units
     scene, highest = _scene(path, tables)
+    layout, sources = tables.asperities, [path]
+    if layout.pattern == "file":
+        sources.append(path.parent / layout.path)
     return SceneFile(
         path=path,
+        text=text,
+        seed=None if layout.pattern == "file" else layout.seed,
+        inputs={str(each): digest(each) for each in sources},
         scene=scene,
         approach=tables.normal.approach,
         load=tables.normal.load,
@@ -86,17 +100,39 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
         shear=tuple(shear.fractions) if shear else None,
         cycle=(tuple(cycle.maximum), tuple(cycle.lowest)) if cycle else None,
         history=tuple(history.fractions) if history else None,
-        solver=SOLVERS[tables.solver.name](),
+        loop_points=cycle.loop_points if cycle else None,
+        loop_asperities=_whose_loops(path, cycle, len(scene)) if cycle else None,
+        solver=named(tables.solver.name),
         influence=cast("Kind | None", tables.solver.influence),
         units=UnitNames(units.length, units.force),
     )
 
 
-def _parse(path: Path) -> dict[str, object]:
+def digest(path: Path) -> str:
+    """The SHA-256 of a file."""
     try:
-        contents = tomllib.loads(read_text(path))
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _whose_loops(path: Path, table: Cycle, count: int) -> tuple[int, ...] | Literal["all"] | None:
+    """`Stages.loop_asperities` of a file with so many asperities."""
+    asked = table.loop_asperities
+    if asked is None or asked == "all":
+        return asked
+    for place, index in enumerate(asked):
+        if index >= count:
+            what, expected = f"[cycle] loop_asperities[{place}]", f"an index from 0 to {count - 1}"
+            raise InputError(what, found=index, expected=expected, where=str(path))
+    return tuple(asked)
+
+
+def _parse(path: Path, text: str) -> dict[str, object]:
+    try:
+        contents = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError: also a number of 5000 digits
-        raise FileError(f"{path}: not a TOML file: {error}") from error
+        raise FileError(explained(path, text, error)) from error
     if not contents:
         raise FileError(f"{path}: empty; `convexrough new` writes a scene to start from")
     return contents
@@ -108,10 +144,10 @@ def _scene(path: Path, tables: Document) -> tuple[Scene, float | None]:
     ratio = material.poisson_ratio
     with _blamed_on(path, "material"):
         if material.contact_modulus is not None:
-            stuff = Material(material.contact_modulus, ratio)
+            stuff = Material(material.contact_modulus, ratio, material.hardness)
         else:
             assert material.youngs_modulus is not None  # exactly one of the two
-            stuff = Material.from_youngs(material.youngs_modulus, ratio)
+            stuff = Material.from_youngs(material.youngs_modulus, ratio, material.hardness)
 
     def press_on(asperities: Asperities) -> Scene:
         return Scene(

@@ -21,17 +21,9 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from convexrough import solvers
 from convexrough.checks import SIZED, is_sized, nearest
 from convexrough.influence import KINDS
-
-#: What `[solver] name` may say.
-SOLVERS: dict[str, Callable[[], solvers.Solver]] = {
-    "newton": solvers.Newton,
-    "conic": solvers.Conic,
-    "conic_cvxpy": solvers.ConicCVXPY,
-    "bristles": solvers.BristleQP,
-}
+from convexrough.solvers import SOLVERS
 
 
 def _expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
@@ -66,6 +58,10 @@ TipRadius = Annotated[
     Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
 ]
 Seed = Annotated[int, _expected("a whole number that is not negative", lambda value: value >= 0)]
+Points = Annotated[int, _expected("a whole number, at least 4", lambda value: value >= 4)]
+Chosen = Annotated[
+    Literal["all"] | list[Seed], _expected('"all" or a list of indices of asperities, from 0')
+]
 Text = Annotated[str, _expected("text in quotes", bool)]
 Pattern = Annotated[Literal["hexagonal", "square"], _expected('"hexagonal", "square" or "file"')]
 Geometry = Annotated[Literal["summit", "closest"], _expected('"summit" or "closest"')]
@@ -108,6 +104,7 @@ class Material(Table):
     contact_modulus: Positive | None = None
     youngs_modulus: Positive | None = None
     poisson_ratio: Ratio
+    hardness: Positive | None = None
 
 
 class Lattice(Table):
@@ -146,6 +143,8 @@ class Shear(Table):
 class Cycle(Table):
     maximum: Fractions
     minimum: Fractions | None = None
+    loop_points: Points | None = None
+    loop_asperities: Chosen | None = None
 
     @property
     def lowest(self) -> list[float]:

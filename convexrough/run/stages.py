@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.progress import Announce
-from convexrough.shearing.cycle import Cycle, cycles
+from convexrough.scene.rings import one_of_each_ring
+from convexrough.shearing.cycle import Cycle, cycles, loops
 from convexrough.shearing.history import History, history
+from convexrough.shearing.loop import Loop
 from convexrough.shearing.state import ShearState, shear
 
 Fractions = tuple[float, ...]
+
+#: Asperities whose loops are kept, at most, unless they are named.
+MOST_LOOPS = 12
+
+#: Points of a loop, at most and at least, and touching asperities times points that are affordable:
+#: each takes a friction state of all of them.
+MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, 600_000
 
 
 @dataclass(frozen=True)
@@ -24,11 +34,16 @@ class Stages:
     shear   : shear forces, as fractions of f P
     cycle   : maxima and minima of steady cycles, as fractions of f P
     history : shear forces one after the other, as fractions of f P
+    loop_points : of each loop, about; None for what is affordable
+    loop_asperities : whose loops to keep: indices or "all"; None for one at each distance from the
+        axis, of at most 12 distances
     """
 
     shear: Fractions | None = None
     cycle: tuple[Fractions, Fractions] | None = None
     history: Fractions | None = None
+    loop_points: int | None = None
+    loop_asperities: tuple[int, ...] | Literal["all"] | None = None
 
 
 class Sheared(NamedTuple):
@@ -39,11 +54,12 @@ class Sheared(NamedTuple):
 
 
 class Cycled(NamedTuple):
-    """The steady cycle between two shear forces."""
+    """The steady cycle between two shear forces, and its loop."""
 
     maximum: float
     minimum: float
     cycle: Cycle
+    loop: Loop
 
 
 class Followed(NamedTuple):
@@ -73,6 +89,7 @@ def compute(contact: Contact, stages: Stages, announce: Announce | None = None) 
     limit = checks.friction(contact.scene.friction) * contact.load
     maxima, minima = stages.cycle or ((), ())
     steady = cycles(contact, limit * np.array(maxima), limit * np.array(minima), announce=announce)
+    drawn = loops(steady, _points(contact, stages), announce, _chosen(contact, stages))
     followed = None
     if stages.history is not None:
         past = history(contact, forces=limit * np.array(stages.history), announce=announce)
@@ -83,6 +100,20 @@ def compute(contact: Contact, stages: Stages, announce: Announce | None = None) 
             Sheared(part, shear(contact, force=part * limit, announce=announce))
             for part in stages.shear or ()
         ),
-        cycles=tuple(map(Cycled, maxima, minima, steady)),
+        cycles=tuple(map(Cycled, maxima, minima, steady, drawn)),
         history=followed,
     )
+
+
+def _points(contact: Contact, stages: Stages) -> int:
+    if stages.loop_points is not None:
+        return stages.loop_points
+    touching = max(1, int((contact.loads > 0).sum()))
+    return int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
+
+
+def _chosen(contact: Contact, stages: Stages) -> ArrayLike | None:
+    """Indices of the asperities whose loops to keep, None for all."""
+    if stages.loop_asperities is None:
+        return one_of_each_ring(contact.scene.asperities.distances, contact.loads, MOST_LOOPS)
+    return None if stages.loop_asperities == "all" else stages.loop_asperities

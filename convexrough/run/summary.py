@@ -14,6 +14,7 @@ from convexrough.arrays import Array
 from convexrough.compare import Comparison, Entry
 from convexrough.contact import Contact
 from convexrough.normal.certificate import Certificate
+from convexrough.run.plausibility import limits_of
 from convexrough.run.stages import Findings
 from convexrough.version import __version__
 
@@ -56,9 +57,14 @@ def summarise(found: Findings) -> Summary:
                 "energy_normalised": cycle.energy_normalised,
                 "smooth_normalised": cycle.smooth_normalised,
                 "balance_defect": cycle.balance_defect,
+                "force_amplitude": cycle.force_amplitude,
+                "displacement_amplitude": cycle.displacement_amplitude,
+                "displacement_error": cycle.displacement_error,
+                "secant_stiffness": cycle.secant_stiffness,
+                "loss_factor": cycle.loss_factor,
                 **counts(cycle.status, SHEAR),
             }
-            for maximum, minimum, cycle in found.cycles
+            for maximum, minimum, cycle, _ in found.cycles
         ]
     if found.history is not None:
         fractions, history = found.history
@@ -102,6 +108,7 @@ def _contact_summary(contact: Contact) -> Summary:
         "seconds": contact.seconds,
         "model_error": contact.model_error,
         "crowding": contact.crowding,
+        **limits_of(contact),
     }
     return _headed(normal=normal)
 

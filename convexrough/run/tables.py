@@ -1,32 +1,26 @@
-"""Tables of numbers from CSV (or .npz) files, with the row and column of every mistake."""
+"""Tables of numbers from text, .npy, .npz and Parquet files, with every mistake and its line."""
 
 from __future__ import annotations
 
-import csv
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices, frozen
-from convexrough.errors import FileError, InputError
+from convexrough.arrays import Array
+from convexrough.errors import FileError, InputError, TableError
+from convexrough.run.array_table import read_arrays
+from convexrough.run.text_table import bare, read_text_table, unit
 from convexrough.scene.asperities import Asperities
-from convexrough.scene.neighbours import nearest_distances
-from convexrough.scene.scene import Scene
 
 #: Columns that are read, and the check that each cell must pass.
 CHECKS: dict[str, Callable[[str, Any], float]] = {
-    "x": checks.finite,
-    "y": checks.finite,
-    "height": checks.finite,
     "tip_radius": checks.positive,
-    "load": checks.non_negative,
 }
 
 #: Columns of asperities.csv, in this order.
@@ -42,8 +36,17 @@ ASPERITY_COLUMNS = (
     "load_error",
 )
 
-#: Positions in a loads file may be off by this, relative to the smallest spacing.
-POSITION_TOLERANCE = 1e-6
+#: Files that are not text.
+ARRAYS = (".npy", ".npz", ".parquet")
+
+#: Mistakes of one file that are shown; the rest are counted.
+MOST_MISTAKES = 10
+
+#: Characters of a line that are shown.
+MOST_SHOWN = 60
+
+#: A column that is not read must not be named almost like one that is wanted and is missing.
+LOOKS_LIKE = 0.75
 
 
 def read_text(path: Path) -> str:
@@ -53,41 +56,79 @@ def read_text(path: Path) -> str:
 
 
 class Table(NamedTuple):
-    """Columns of numbers from a file, and what each row is called in messages."""
+    """Columns of a file by what they are read as, and how it was read.
 
-    columns: dict[str, Array]
+    columns : numbers, or text where it was asked for
+    rows    : what each row is called in messages;  lines : its text, "" where there is none
+    units   : of columns whose header names one;  style : how text was read, "" where it was none
+    """
+
+    columns: dict[str, NDArray[Any]]
     rows: list[str]
+    lines: list[str]
+    units: dict[str, str]
+    style: str
+
+    def mistake(self, row: int, what: str) -> str:
+        """A mistake in a row, with its line."""
+        return _shown(f"{self.rows[row]}{what}", self.lines[row])
+
+
+class _Source(NamedTuple):
+    """Cells of a file, by column; no header: named by number, from 1."""
+
+    header: list[str] | None
+    columns: list[Sequence[Any]]
+    rows: list[str]
+    lines: list[str]
+    style: str
+    number: Callable[[Any], float | None]
+    mistakes: list[str]
 
 
 def read_table(
-    path: Path, *, required: Sequence[str], optional: Sequence[str], ignored: Sequence[str] = ()
+    path: Path,
+    *,
+    required: Sequence[str],
+    optional: Sequence[str] = (),
+    text: Sequence[str] = (),
+    columns: Mapping[str, str] | None = None,
+    unnamed: Sequence[Sequence[str]] = (),
 ) -> Table:
-    """Columns of numbers from a CSV file with a header, or from an .npz file.
+    """Columns of a file with a header; others in it are not looked at.
 
-    ignored : columns that may be there and are not looked at
+    required, optional, text : what is read, the last as text, and only where it is there
+    columns : the header, or the number from 1, of what is called otherwise in the file
+    unnamed : what is meant where there is no header, and as many columns
 
-    Raises FileError where it cannot be read, and InputError for a column that is missing, unknown
-    or there twice, and for the first row with a missing, spare or wrong cell.
+    Raises FileError where it cannot be read, and TableError with all that is wrong in it.
     """
-    cells, rows = _npz_cells(path) if path.suffix == ".npz" else _csv_cells(path)
-    try:
-        for name in cells:
-            if name not in (*required, *optional, *ignored):
-                expected = f"a known column; {checks.nearest(name, (*required, *optional))}"
-                raise InputError("columns", found=repr(name), expected=expected)
-        for name in required:
-            if name not in cells:
-                raise InputError("columns", found=", ".join(cells), expected=f"a column {name!r}")
-        if not rows:
-            raise InputError("rows", found="none below the header", expected="at least one")
-        columns = {
-            name: _numbers(name, values, rows)
-            for name, values in cells.items()
-            if name not in ignored or name in (*required, *optional)
-        }
-    except InputError as error:
-        raise error.within(str(path)) from error
-    return Table(columns, rows)
+    wanted = (*required, *optional, *text)
+    with _reading(path):
+        source = _source(path, [*wanted, *(each.lower() for each in (columns or {}).values())])
+    if unnamed and source.header is None and len(source.rows) == 1 and len(source.columns) > 3:
+        source = _upright(source)
+    places, mistakes = _places(source, wanted, dict(columns or {}), unnamed)
+    missing = [name for name in required if name not in places]
+    mistakes += [f"columns: found {_named(source)}, expected a column {each!r}" for each in missing]
+    mistakes += _lookalikes(source, places, [*missing, *optional])
+    if not source.rows and not mistakes:
+        mistakes = ["rows: found none below the header, expected at least one"]
+    if missing or not source.rows:
+        raise TableError(str(path), _few([*mistakes, *source.mistakes]))
+    read: dict[str, NDArray[Any]] = {}
+    for name, place in places.items():
+        cells = source.columns[place]
+        if name in text:
+            read[name] = np.array([str(cell) for cell in cells])
+        else:
+            read[name] = _numbers(name, cells, source, mistakes)
+    if mistakes := [*mistakes, *source.mistakes]:
+        raise TableError(str(path), _few(mistakes))
+    names = source.header or [""] * len(source.columns)
+    units = {name: unit(names[place]) for name, place in places.items()}
+    units = {name: each for name, each in units.items() if each}
+    return Table(read, source.rows, source.lines, units, source.style)
 
 
 def read_summits(path: Path, *, tip_radius: ArrayLike | None) -> Asperities:
@@ -95,7 +136,8 @@ def read_summits(path: Path, *, tip_radius: ArrayLike | None) -> Asperities:
 
     tip_radius : of all, or of each, where the file has no such column; else None
     """
-    columns, rows = read_table(path, required=("x", "y"), optional=("height", "tip_radius"))
+    table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"))
+    columns = table.columns
     given = columns.get("tip_radius")
     if (given is None) == (tip_radius is None):
         found = "neither" if given is None else "both"
@@ -107,104 +149,134 @@ def read_summits(path: Path, *, tip_radius: ArrayLike | None) -> Asperities:
     try:
         return Asperities(positions, radii, columns.get("height", 0.0))
     except InputError as error:
-        raise error.within(f"{path} ({rows[0]} holds asperity 0)") from error
+        raise error.within(f"{path} ({table.rows[0]} holds asperity 0)") from error
 
 
-def read_loads(path: Path, scene: Scene) -> Array:
-    """(n,) [force] loads from a file, in the order of the scene's asperities.
-
-    Rows with columns x and y are matched by position; others are in the scene's order.
-    """
-    optional = ("x", "y")
-    columns, rows = read_table(
-        path, required=("load",), optional=optional, ignored=ASPERITY_COLUMNS
+def _source(path: Path, known: Sequence[str]) -> _Source:
+    """Everything in a file, by its kind."""
+    if path.suffix.lower() in ARRAYS:
+        arrays = read_arrays(path, known)
+        count = len(next(iter(arrays.values()), []))
+        return _Source(
+            header=None if "1" in arrays else list(arrays),
+            columns=list(arrays.values()),
+            rows=[f"entry {i}" for i in range(count)],
+            lines=[""] * count,
+            style="",
+            number=_as_number,
+            mistakes=[],
+        )
+    table = read_text_table(path, known)
+    width = len(table.header) if table.header else max(len(row.cells) for row in table.rows)
+    mistakes = []
+    for row in table.rows:
+        if row.wrong or len(row.cells) != width:
+            expected = f"{width}, as in {'the header' if table.header else 'most rows'}"
+            what = row.wrong or f"found {len(row.cells)} cells, expected {expected}"
+            mistakes.append(_shown(f"row {row.number}: {what}", row.text))
+    whole = [row for row in table.rows if len(row.cells) == width]
+    return _Source(
+        header=table.header,
+        columns=[[row.cells[i] for row in whole] for i in range(width)],
+        rows=[f"row {row.number}" for row in whole],
+        lines=[row.text for row in whole],
+        style=str(table.style) if width > 1 or table.style.decimal == "," else "",
+        number=table.style.number,
+        mistakes=mistakes,
     )
-    loads, n = columns["load"], len(scene)
-    if len(loads) != n:
-        raise InputError(
-            "rows",
-            found=len(loads),
-            expected=f"{n}, one per asperity of the scene",
-            where=str(path),
-        )
-    given = [name for name in optional if name in columns]
-    if not given:
-        return loads
-    if len(given) == 1:
-        raise InputError("columns", found=f"only {given[0]}", expected="x and y", where=str(path))
-    try:
-        owners = _match(scene, np.column_stack((columns["x"], columns["y"])), rows)
-    except InputError as error:
-        raise error.within(str(path)) from error
-    ordered = np.empty(n)
-    ordered[owners] = loads
-    return frozen(ordered)
 
 
-def _match(scene: Scene, points: Array, rows: list[str]) -> Indices:
-    """The asperity at each point; every asperity exactly once, as there are as many points."""
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when rows have positions
-
-    positions = scene.asperities.positions
-    spacing = float(scene.asperities.tip_radii[0])
-    if len(positions) > 1:
-        spacing = float(nearest_distances(positions).min())
-    distances, owners = map(np.asarray, cKDTree(positions).query(points))
-    if (worst := float(distances.max())) > POSITION_TOLERANCE * spacing:
-        i = int(np.argmax(distances))
-        raise InputError(
-            rows[i],
-            found=f"position {points[i].tolist()}, {worst:g} from the nearest asperity",
-            expected="a position of the scene",
-        )
-    _, first = np.unique(owners, return_index=True)
-    if len(first) < len(owners):
-        i = int(np.setdiff1d(np.arange(len(owners)), first)[0])
-        j = int(np.flatnonzero(owners == owners[i])[0])
-        raise InputError(
-            rows[i], found=f"the same position as in {rows[j]}", expected="each asperity once"
-        )
-    return owners
+def _upright(source: _Source) -> _Source:
+    """A single line of numbers as a single column."""
+    cells = [column[0] for column in source.columns]
+    rows = [f"{source.rows[0]}, cell {i + 1}" for i in range(len(cells))]
+    return source._replace(columns=[cells], rows=rows, lines=[str(cell) for cell in cells])
 
 
-def _csv_cells(path: Path) -> tuple[dict[str, list[Any]], list[str]]:
-    """Cells of each column, as text, and the name of each row: its line in the file."""
-    reader = csv.reader(StringIO(read_text(path)), strict=True)
-    try:
-        lines = [(reader.line_num, line) for line in reader]
-    except csv.Error as error:
-        raise FileError(f"{path}: row {reader.line_num}: not a CSV file: {error}") from error
-    while lines and not lines[-1][1]:
-        lines.pop()  # empty lines at the end
-    if not lines:
-        raise FileError(f"{path}: empty")
-    header = [name.strip() for name in lines[0][1]]
-    if len(set(header)) < len(header):
-        twice = next(name for name in header if header.count(name) > 1)
-        raise InputError("columns", found=f"{twice!r} twice", expected="once", where=str(path))
-    for number, line in lines[1:]:
-        if len(line) != len(header):
-            found, expected = f"{len(line)} cells", f"{len(header)}, as in the header"
-            raise InputError(f"row {number}", found=found, expected=expected, where=str(path))
-    cells = {name: [line[i] for _, line in lines[1:]] for i, name in enumerate(header)}
-    return cells, [f"row {number}" for number, _ in lines[1:]]
+def _places(
+    source: _Source,
+    wanted: Sequence[str],
+    columns: Mapping[str, str],
+    unnamed: Sequence[Sequence[str]],
+) -> tuple[dict[str, int], list[str]]:
+    """The column of each name that is there, and what is wrong with the names."""
+    names = source.header
+    if names is None:
+        nameless = [""] * len(source.columns)
+        names = next((list(each) for each in unnamed if len(each) == len(nameless)), nameless)
+        names = nameless if columns else names
+    bared = [bare(name) for name in names]
+    places: dict[str, int] = {}
+    mistakes: list[str] = []
+    for name in wanted:
+        called = columns.get(name, name)
+        for known in (names, bared, [each.lower() for each in bared]):
+            if count := known.count(called):
+                places[name] = known.index(called)
+                if count > 1:
+                    mistakes.append(f"columns: found {called!r} twice, expected once")
+                break
+        else:
+            if name not in columns:
+                continue
+            if called.isdecimal() and 1 <= int(called[:9]) <= len(names):
+                places[name] = int(called) - 1
+            else:
+                mistakes.append(f"columns: found {_named(source)}, expected a column {called!r}")
+    return places, mistakes
 
 
-def _npz_cells(path: Path) -> tuple[dict[str, list[Any]], list[str]]:
-    """The same from arrays; rows count from 0."""
-    with _reading(path), path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-        cells = {name: np.atleast_1d(file[name]).tolist() for name in file.files}
-    lengths = {len(values) for values in cells.values()}
-    if len(lengths) != 1:
-        found = f"lengths {sorted(lengths)}"
-        raise InputError("arrays", found=found, expected="one length", where=str(path))
-    return cells, [f"entry {i}" for i in range(lengths.pop())]
+def _lookalikes(source: _Source, places: Mapping[str, int], wanted: Sequence[str]) -> list[str]:
+    """Columns that are not read, and look like one that is wanted and is not there."""
+    from difflib import SequenceMatcher  # only when a column is not there
+
+    mistakes = []
+    for i, name in enumerate(source.header or []):
+        for each in (each for each in wanted if each not in places and i not in places.values()):
+            if SequenceMatcher(None, bare(name).lower(), each).ratio() > LOOKS_LIKE:
+                expected = f'a known column; did you mean "{each}"?'
+                mistakes.append(f"columns: found {bare(name)!r}, expected {expected}")
+    return mistakes
 
 
-def _numbers(name: str, cells: list[Any], rows: list[str]) -> Array:
-    check = CHECKS[name]
-    pairs = zip(rows, cells, strict=True)
-    return frozen(np.array([check(f"{row}, column {name}", cell) for row, cell in pairs]))
+def _named(source: _Source) -> str:
+    if source.header is None:
+        return f"no header and {len(source.columns)} columns"
+    return _cut(", ".join(source.header))
+
+
+def _numbers(name: str, cells: Sequence[Any], source: _Source, mistakes: list[str]) -> Array:
+    """The cells of a column; what is wrong with them goes to the mistakes."""
+    check, numbers = CHECKS.get(name, checks.finite), np.zeros(len(cells))
+    for i, cell in enumerate(cells):
+        number = source.number(cell)
+        place = f"{source.rows[i]}, column {name}"
+        try:
+            if number is None:
+                raise InputError(place, found=_cut(repr(cell)), expected="a finite number")
+            numbers[i] = check(place, number)
+        except InputError as error:
+            mistakes.append(_shown(str(error), source.lines[i]))
+    return numbers
+
+
+def _as_number(cell: Any) -> float | None:
+    return float(cell) if isinstance(cell, (int, float)) and not isinstance(cell, bool) else None
+
+
+def _shown(mistake: str, line: str) -> str:
+    return f"{mistake}: {_cut(line)}" if line else mistake
+
+
+def _cut(text: str) -> str:
+    text = "".join(each if each.isprintable() else " " for each in text[: MOST_SHOWN + 1])
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+
+
+def _few(mistakes: list[str]) -> list[str]:
+    if (more := len(mistakes) - MOST_MISTAKES) > 0:
+        return [*mistakes[:MOST_MISTAKES], f"and {more:,} more mistakes"]
+    return mistakes
 
 
 @contextmanager
@@ -212,9 +284,13 @@ def _reading(path: Path) -> Iterator[None]:
     """Everything that keeps a file from being read, as a FileError."""
     try:
         yield
+    except (InputError, FileError):
+        raise
     except UnicodeDecodeError as error:
         raise FileError(f"{path}: not UTF-8 text, at byte {error.start}") from error
+    except UnicodeError as error:
+        raise FileError(f"{path}: not text: {error}") from error
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise FileError(f"{path}: not an .npz file: {error}") from error
+    except (ValueError, TypeError, EOFError, MemoryError, zipfile.BadZipFile) as error:
+        raise FileError(f"{path}: not an {path.suffix} file: {error}") from error

@@ -45,9 +45,11 @@ class Asperities:
         points = _points(positions)
         object.__setattr__(self, "positions", points)
         n = len(points)
-        radii = checks.array("tip_radii", tip_radii, length=n, sign="positive")
+        least = checks.SMALLEST
+        radii = checks.array("tip_radii", tip_radii, length=n, sign="positive", smallest=least)
         object.__setattr__(self, "tip_radii", radii)
-        object.__setattr__(self, "heights", checks.array("heights", heights, length=n))
+        tall = checks.array("heights", heights, length=n, smallest=least)
+        object.__setattr__(self, "heights", tall)
         if n <= MANY or self.lattice is None:
             refuse_coincident(points)
 
@@ -147,6 +149,8 @@ def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
 
 def _points(positions: ArrayLike) -> Array:
     try:
+        if np.asarray(positions).dtype.kind in "USV":  # text stands for no number
+            raise TypeError("no numbers")
         points = np.array(positions, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError("positions", found=repr(positions)[:60], expected="numbers") from error

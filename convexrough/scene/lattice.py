@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
+from convexrough.checks import SMALLEST
 
 Sites = NDArray[np.int64]
 
@@ -17,6 +18,9 @@ BLUR = 32 * 2.0**-53
 
 #: ... and of the shortest distance between sites by this part: the bounds on products count it.
 CLOSEST = 1e-7
+
+#: Sites closer to each other than this part of the largest coordinate are not counted in integers.
+FINEST = 1e-12
 
 #: A lattice is of use where its sites are at most so many times the points: a heuristic, for speed.
 SPARSEST = 50
@@ -42,10 +46,13 @@ class Lattice:
 
     @classmethod
     def through(cls, points: Array) -> Lattice | None:
-        """The lattice that these points (n, 2) lie on to rounding, each on a site of its own."""
+        """The lattice that these points (n, 2) lie on to rounding, each on a site of its own.
+
+        None also where sites are too near to each other for float64 to hold their interaction.
+        """
         anchor = points[np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1))]
-        basis = _shortest(points - anchor)
-        if basis is None:
+        basis, reach = _shortest(points - anchor), float(np.abs(points).max())
+        if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):
             return None
         sites = _nearest_sites(points - anchor, basis)
         # Fit origin and basis to all points; around the middle, where they do not disturb another.
@@ -58,7 +65,6 @@ class Lattice:
                 fitted += np.linalg.solve(away.T @ away, away.T @ missing)
         except np.linalg.LinAlgError:
             return None
-        reach = float(np.abs(points).max())
         off = float(np.abs(points - anchor - away @ fitted).max()) + 12 * 2.0**-53 * reach
         origin = anchor + fitted[0] - middle @ fitted[1:]
         found = cls(origin, fitted[1:], off + 4 * 2.0**-53 * reach)
@@ -86,7 +92,8 @@ def _shortest(points: Array) -> Array | None:
     squares = (points**2).sum(axis=1)
     few = min(len(points), 64)
     nearby = points[np.argpartition(squares, few - 1)[:few]]
-    points = (nearby[:, None] - nearby).reshape(-1, 2)
+    unit = 2.0 ** np.floor(np.log2(max(float(np.abs(nearby).max()), 1e-300)))  # squares of squares
+    points = (nearby[:, None] - nearby).reshape(-1, 2) / unit
     squares = (points**2).sum(axis=1)
     near = np.argsort(squares)
     near = near[squares[near] > 0]
@@ -101,7 +108,7 @@ def _shortest(points: Array) -> Array | None:
     while True:
         b = b - np.rint((a @ b) / (a @ a)) * a
         if b @ b >= (a @ a) * (1 - 1e-9):
-            return np.array([a, b])
+            return np.asarray(np.array([a, b]) * unit)
         a, b = b, a
 
 

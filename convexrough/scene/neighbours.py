@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from convexrough.arrays import Array
+from convexrough.checks import SIZED, SMALLEST
 from convexrough.errors import InputError
 
 #: Asperities looked at together: between two batches fewer pairs come to be worth a look. A
@@ -47,19 +48,19 @@ def crowding(points: Array, radii: Array) -> float:
 
 
 def refuse_coincident(points: Array) -> None:
-    """Two asperities at one place have no finite interaction."""
+    """Two asperities at one place have no finite interaction; of two too near, none in float64."""
     if len(points) < 2:
         return
     distances = nearest_distances(points)
     blur = 16 * np.finfo(float).eps * np.abs(points).max()  # well beyond the points' rounding
-    if (worst := float(distances.min())) <= blur:
+    if (worst := float(distances.min())) <= blur or worst < SMALLEST:
         first = int(np.argmin(distances))
         others = np.hypot(*(points[first + 1 :] - points[first]).T)
         second = first + 1 + int(np.argmin(others))
         raise InputError(
             "positions",
             found=f"asperities {first} and {second} (from 0) at a distance of {worst:g}",
-            expected="distinct positions",
+            expected="distinct positions" if worst <= blur else f"a distance of {SIZED}",
         )
 
 

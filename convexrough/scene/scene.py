@@ -36,15 +36,13 @@ class Scene:
     geometry: Geometry = "summit"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.asperities, Asperities):
-            raise InputError("asperities", found=repr(self.asperities)[:60], expected="Asperities")
-        if not isinstance(self.material, Material):
-            raise InputError("material", found=repr(self.material)[:60], expected="a Material")
+        checks.instance("asperities", self.asperities, Asperities)
+        checks.instance("material", self.material, Material)
         radius = checks.positive("sphere_radius", self.sphere_radius)
         object.__setattr__(self, "sphere_radius", radius)
         if self.friction is not None:
             object.__setattr__(self, "friction", checks.positive("friction", self.friction))
-        if self.geometry not in ("summit", "closest"):
+        if not isinstance(self.geometry, str) or self.geometry not in ("summit", "closest"):
             raise InputError(
                 "geometry", found=repr(self.geometry), expected='"summit" or "closest"'
             )

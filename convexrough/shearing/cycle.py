@@ -7,7 +7,7 @@ the loop. Only the range of the force matters.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -22,31 +22,12 @@ from convexrough.errors import InputError
 from convexrough.progress import Announce
 from convexrough.shearing.certificate import friction_words
 from convexrough.shearing.first_loading import FirstLoading
-from convexrough.shearing.history import history
 from convexrough.shearing.judgement import Bounds
+from convexrough.shearing.loop import Loop, loops_between
 from convexrough.shearing.normal_map import States
+from convexrough.shearing.state import forces_at
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
-
-
-@dataclass(frozen=True, eq=False)
-class Loop:
-    """Points of a closed loop, from the maximum to the minimum and back.
-
-    forces : (m,) Q [force];  displacements : (m,) X [length], both bodies
-    asperity_forces : (m, n) Q_i [force]
-    asperity_displacements : (m, n) X_i + slip_i [length]
-    """
-
-    forces: Array
-    displacements: Array
-    asperity_forces: Array
-    asperity_displacements: Array
-
-    @property
-    def area(self) -> float:
-        """[force length] of the polygon through the points: the loss, from inside."""
-        return float(np.trapezoid(self.forces, self.displacements))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +41,8 @@ class Cycle:
     balance_defect         : relative difference to the energy from the trapezoid error
     energy_normalised      : energy / W0, W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H)
     smooth_normalised      : the same for the smooth sphere, e((maximum - minimum) / (2 f P))
+    displacement_amplitude : X_a, half the range of X [length]
+    displacement_error     : proved bound on |X_a - solution| [length], infinite without proof
     sliding, partial       : proved to slide in each half of the cycle; proved never to
     """
 
@@ -72,6 +55,8 @@ class Cycle:
     balance_defect: float
     energy_normalised: float
     smooth_normalised: float
+    displacement_amplitude: float
+    displacement_error: float
     sliding: NDArray[np.bool_]
     partial: NDArray[np.bool_]
 
@@ -85,57 +70,98 @@ class Cycle:
         """(n,) [force length] lost at each asperity."""
         return frozen(self.partial_slip_energies + self.sliding_energies)
 
-    def loop(self, points: int = 200, announce: Announce | None = None) -> Loop:
+    @property
+    def force_amplitude(self) -> float:
+        """Q_a [force], half the range of Q."""
+        return (self.maximum - self.minimum) / 2.0
+
+    @property
+    def secant_stiffness(self) -> float:
+        """Q_a / X_a [force / length]; nan where nothing moves."""
+        moved = self.displacement_amplitude
+        return self.force_amplitude / moved if moved > 0 else np.nan
+
+    @property
+    def loss_factor(self) -> float:
+        """W / (2 pi U), U = Q_a X_a / 2 (Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34, 954).
+
+        nan where nothing moves.
+        """
+        stored = self.force_amplitude * self.displacement_amplitude / 2.0
+        return self.energy / (2.0 * np.pi * stored) if stored > 0 else np.nan
+
+    def loop(
+        self,
+        points: int = 200,
+        announce: Announce | None = None,
+        asperities: ArrayLike | None = None,
+    ) -> Loop:
         """The loop through about `points` points, as many down as up, denser at the ends.
 
-        announce : told in a line how far long work has come
+        announce   : told in a line how far long work has come
+        asperities : indices of those whose own loops to keep, default all
         """
-        if not isinstance(points, int) or points < 4:
-            raise InputError("points", found=points, expected="a whole number, at least 4")
-        middle, amplitude = (self.maximum + self.minimum) / 2, (self.maximum - self.minimum) / 2
-        down = middle + amplitude * np.cos(np.linspace(0.0, np.pi, points // 2 + 1))
-        down[0], down[-1] = self.maximum, self.minimum
-        there_and_back = [self.maximum, self.minimum]
-        if abs(self.minimum) > abs(self.maximum):
-            there_and_back.insert(0, self.minimum)
-        path = np.concatenate((there_and_back[:-1], down[1:], down[-2::-1]))
-        past = history(self.contact, forces=path, announce=announce)
-        body = slice(len(there_and_back) - 2, None)
-        return Loop(
-            forces=frozen(path[body]),
-            displacements=past.displacements[body],
-            asperity_forces=past.forces[body],
-            asperity_displacements=past.asperity_displacements[body],
-        )
+        return loops([self], points, announce, asperities)[0]
+
+
+def loops(
+    cycles: Sequence[Cycle],
+    points: int = 200,
+    announce: Announce | None = None,
+    asperities: ArrayLike | None = None,
+) -> list[Loop]:
+    """The loops of several cycles of one contact, which share their states.
+
+    points : of the loop of the widest range, about; narrower ones have fewer
+    asperities : as in `Cycle.loop`
+    """
+    if not cycles:
+        return []
+    ranges = [(each.maximum, each.minimum) for each in cycles]
+    return loops_between(cycles[0].contact, ranges, points, announce, asperities)
 
 
 def cycle(
     contact: Contact,
     *,
-    maximum: float,
+    maximum: float | None = None,
     minimum: float | None = None,
+    displacement: float | None = None,
     announce: Announce | None = None,
 ) -> Cycle:
     """The steady cycle between two shear forces [force]; `minimum` defaults to -maximum.
 
-    announce : told in a line how far long work has come
+    displacement : amplitude of X [length] of a symmetric cycle, instead of its forces
+    announce     : told in a line how far long work has come
 
     Raises InputError where the scene has no friction, the minimum exceeds the maximum, or either
-    exceeds f P in size.
+    exceeds f P in size, or the displacement that of gross sliding.
     """
+    upper = None if maximum is None else [maximum]
     lower = None if minimum is None else [minimum]
-    return cycles(contact, [maximum], lower, announce=announce)[0]
+    moved = None if displacement is None else [displacement]
+    return cycles(contact, upper, lower, displacement=moved, announce=announce)[0]
 
 
 def cycles(
     contact: Contact,
-    maximum: ArrayLike,
+    maximum: ArrayLike | None = None,
     minimum: ArrayLike | None = None,
     *,
+    displacement: ArrayLike | None = None,
     announce: Announce | None = None,
 ) -> list[Cycle]:
     """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives."""
+    checks.instance("contact", contact, Contact)
     limit = checks.friction(contact.scene.friction) * contact.load
+    checks.exactly_one("maximum", maximum, "displacement", displacement)
+    if displacement is not None:
+        if minimum is not None:
+            expected = "none beside a displacement, whose cycles are symmetric"
+            raise InputError("minimum", found=minimum, expected=expected)
+        amplitudes = checks.array("displacement", displacement, sign="not negative")
+        maximum = forces_at(contact, amplitudes)
+    assert maximum is not None  # exactly_one
     upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
     lower = -upper
     if minimum is not None:
@@ -165,6 +191,8 @@ def cycles(
             balance_defect=each.defect,
             energy_normalised=each.energy / whole,
             smooth_normalised=float(mindlin.loss(each.total / problem.limit)),
+            displacement_amplitude=each.rise * problem.travel_unit,
+            displacement_error=each.rise_error * problem.travel_unit,
             sliding=each.sliding,
             partial=each.partial,
         )
@@ -176,6 +204,8 @@ class _Loss(NamedTuple):
     """What a cycle of one amplitude costs, and which asperities slide; as in Cycle."""
 
     total: float  # T
+    rise: float
+    rise_error: float
     energy: float
     partial_slip: Array
     sliding_slip: Array
@@ -194,6 +224,8 @@ def _losses(loading: FirstLoading, states: States, bounds: Bounds) -> Iterator[_
     for i, total in enumerate(states.totals):
         yield _Loss(
             float(total),
+            float(states.rises[i]),
+            float(bounds.rises[i]),
             float(energies[i]),
             frozen(slip[i]),
             frozen(slide[i]),
@@ -205,4 +237,4 @@ def _losses(loading: FirstLoading, states: States, bounds: Bounds) -> Iterator[_
 
 def _empty(contact: Contact, maximum: float, minimum: float) -> Cycle:
     zero, no = frozen(np.zeros(len(contact.scene))), frozen(np.zeros(len(contact.scene), bool))
-    return Cycle(contact, maximum, minimum, 0.0, zero, zero, 0.0, 0.0, 0.0, no, no)
+    return Cycle(contact, maximum, minimum, 0.0, zero, zero, 0.0, 0.0, 0.0, 0.0, 0.0, no, no)

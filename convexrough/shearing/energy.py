@@ -103,7 +103,7 @@ class TangentialEnergy:
         return float(self.loads.sum())
 
     def at_limit(self, totals: Array) -> NDArray[np.bool_]:
-        """Where T is sum P to rounding: every asperity slides, the last one just."""
+        """Where T is sum P to rounding, and the last asperity just slides, or just does not."""
         roundoffs = 4 + np.log2(len(self))  # of adding n loads up
         return np.asarray(self.limit - totals <= roundoffs * np.finfo(float).eps * self.limit)
 

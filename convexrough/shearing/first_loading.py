@@ -3,7 +3,7 @@
 By Masing's rule every state at constant normal load is a sum of these. The energy they cost is
 counted in w(T) = T rise(T) / 2 - Psi(T), with Psi the energy of the increments: the error of the
 trapezoid rule on the curve of rise against T. A cycle of amplitude T costs 8 c_t f^2 w(T)
-(docs/theory/shear.md, "Cycles and energy").
+(docs/theory/shear.md, "Energy").
 """
 
 from __future__ import annotations

@@ -45,6 +45,7 @@ def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = 
 
     announce : told in a line how far long work has come
     """
+    checks.instance("contact", contact, Contact)
     limit = checks.friction(contact.scene.friction) * contact.load
     applied = checks.bearable("forces", checks.array("forces", forces), limit)
     if contact.load == 0.0 or len(applied) == 0:

@@ -32,6 +32,14 @@ from convexrough.shearing.problem import TangentialProblem
 #: Where P* is within a tenth of P, |ceiling* - ceiling| <= LOCAL h |P* - P|: 1.1 / 0.9^(1/3).
 LOCAL = 1.15
 
+#: Roundoffs of a share u / P that are counted apart: near full slip each changes the own deflection
+#: by (2/3) (1 - t)^(-1/3), up to 1e5, roundoffs of its own.
+SHARE_ROUNDOFFS = 4
+
+#: Roundoffs, for each asperity, of sum P and of T, which is moved to sum P where it is that to
+#: rounding (`TangentialEnergy.at_limit`): 2 (n - 1) and 2 (4 + log2 n), and a few of Q / f.
+LIMIT_ROUNDOFFS = 12
+
 #: Numbers of an array that are judged at once.
 BLOCK = 2**20
 
@@ -82,8 +90,6 @@ def _judge(problem: TangentialProblem, states: States) -> Bounds:
             field[others] = values
     bounds.slips[:, ~known.sure] = np.inf
     bounds.slips[bounds.partial & (states.slips == 0)] = 0.0
-    # At Q = f P itself there is nothing to prove: |Q_i| <= f P_i leaves one state.
-    bounds.sliding[:] |= problem.at_limit(states.totals)[:, None] & known.sure
     return bounds
 
 
@@ -192,7 +198,9 @@ def _residual(given: _Given, image: _Image) -> _Residual:
     sums = np.abs(own) + given.magnitude + given.states.rises[:, None]
     uncertainty = SUM_ROUNDOFFS * ROUNDOFF * sums
     uncertainty += given.rounding + known.stray_effect + known.loose_effect
-    change = own_change(problem, size, np.abs(own), image.shifts)
+    change = own_change(
+        problem, size, np.abs(own), image.shifts + SHARE_ROUNDOFFS * ROUNDOFF * size
+    )
     beyond = available * np.sign(u) - problem.ceilings
     sticks = np.abs(available - own) + uncertainty + change
     values = np.where(size < problem.loads, sticks, np.maximum(uncertainty - beyond, 0.0))
@@ -242,7 +250,8 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: Array) -
     )
     uncertainty += (distance + image.carried_norm)[:, None] * known.reach * (1 + SAFETY)
     sticks = known.sure & (distances < 0.5 * (P - size))
-    change = own_change(problem, size, np.abs(own), distances)
+    moved = distances + SHARE_ROUNDOFFS * ROUNDOFF * size
+    change = own_change(problem, size, np.abs(own), moved)
     available = given.available
     at_each = np.where(sticks, np.abs(available - own) + uncertainty + change, np.inf)
     rise_errors = at_each.min(axis=1)
@@ -260,28 +269,35 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: Array) -
 def _by_exhaustion(given: _Given) -> Bounds:
     """docs/theory/shear.md, "Close to gross sliding": each u_i is within sum P - T of P_i.
 
-    The last asperity to slide then fixes the rise: with c = Delta - A u - ceiling, no c* is less
-    than -`shortfall`, and the least c* is not positive.
+    With c = Delta - A u - ceiling: no c* of a loaded asperity is less than -`shortfall`, which
+    bounds the rise from below and tells who slides; the least c* is not positive, which bounds it
+    from above. Nothing is claimed of T beyond its rounding: not even that it is below sum P*.
     """
     problem, known, states = given.problem, given.known, given.states
-    if known.stray > 0 or not known.sure.all():
-        return Bounds.unproved(*states.increments.shape)
-    P, ceilings = problem.loads, problem.ceilings
-    unused = (P.sum() - states.totals + known.errors.sum())[:, None]
-    unused += 2 * len(P) * ROUNDOFF * P.sum()
-    errors = unused + known.errors + (P - states.increments)
+    P, u, ceilings, sure = problem.loads, states.increments, problem.ceilings, known.sure
+    complete = known.stray == 0 and bool(sure.all())
+    doubt = known.errors.sum() + known.stray + LIMIT_ROUNDOFFS * len(P) * ROUNDOFF * P.sum()
+    unused = (P.sum() - states.totals)[:, None]
+    most = unused + doubt
+    errors = known.errors + np.minimum(most + (P - u), P + np.abs(u))
     uncertainty = couple_above(problem, errors) + given.rounding + given.remainder[:, None]
     sums = given.magnitude + ceilings + states.rises[:, None]
     uncertainty += SUM_ROUNDOFFS * ROUNDOFF * sums
-    uncertainty += ceilings * known.relative
-    shortfall = ceilings * np.minimum(1.5 * unused / P, 1.0) ** (2 / 3)
+    uncertainty += ceilings * known.relative + known.stray_effect
+    lacking = 1.5 * most / P
+    shortfall = ceilings * np.maximum(lacking, lacking ** (2 / 3))
     beyond = given.available - ceilings  # c
-    every, last = np.arange(len(beyond)), np.argmin(beyond, axis=1)
-    rise_errors = (np.abs(beyond) + shortfall + uncertainty)[every, last] + uncertainty.max(axis=1)
-    slip_errors = uncertainty + rise_errors[:, None]
-    sliding = beyond > slip_errors
+    above = np.where(sure, beyond + shortfall + uncertainty, np.inf).min(axis=1)  # Delta - Delta*
+    below = (uncertainty.max(axis=1) - beyond.min(axis=1)) if complete else np.inf
+    sliding = sure & (beyond - uncertainty > above[:, None])
+    rise_errors = np.maximum(above, below)
     # Where all but one are sure to slide, and not all can, that one does not.
-    short = P.sum() * (1 - 2 * len(P) * ROUNDOFF) - known.errors.sum() - states.totals > 0
-    alone = short & (sliding.sum(axis=1) == len(P) - 1)
-    proved = np.ones(len(beyond), dtype=bool)
-    return Bounds(proved, errors, slip_errors, rise_errors, sliding, ~sliding & alone[:, None])
+    alone = complete & (unused[:, 0] > doubt) & (sliding.sum(axis=1) == len(P) - 1)
+    return Bounds(
+        proved=complete | sliding.any(axis=1),
+        increments=errors,
+        slips=uncertainty + rise_errors[:, None],
+        rises=rise_errors,
+        sliding=sliding,
+        partial=~sliding & alone[:, None],
+    )

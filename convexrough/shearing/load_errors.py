@@ -21,10 +21,13 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence import couple
 from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.influence.shells import fitted_shells
-from convexrough.normal.judgement import FIT_FROM, SUM_ROUNDOFFS
+from convexrough.normal.judgement import FIT_FROM, SUM_ROUNDOFFS, convex_margin
 from convexrough.normal.problem import FITTED
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.problem import TangentialProblem
+
+#: Margins of convexity that Cholesky's factorisation is tried with, the best first.
+MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 
 
 class LoadErrors(NamedTuple):
@@ -105,13 +108,16 @@ def _above(product: Array, coupling: Coupling, values: Array) -> Array:
 
 
 def _convexity_number(problem: TangentialProblem, stiffness: Array) -> float:
-    """theta: H + A >= (1 - theta) H, by the better of two kinds of shells."""
+    """theta: H + A >= (1 - theta) H, by the better of two kinds of shells, or else by Cholesky."""
     theta = float((problem.shells / stiffness).max())
     if theta > FIT_FROM:
         radii = (np.pi / 2.0) * problem.influence.scale / stiffness
         fitted = fitted_shells(problem.influence, radii, FITTED)
         theta = min(theta, float((fitted / stiffness).max()))
-    return theta * (1 + SAFETY)
+    theta *= 1 + SAFETY
+    if theta < 1:
+        return theta
+    return min(theta, 1.0 - convex_margin(problem.influence, stiffness, MARGINS))
 
 
 def _strays(problem: TangentialProblem) -> Indices:

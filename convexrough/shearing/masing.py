@@ -6,7 +6,7 @@ On a branch from a turning point Q1 to Q, with T = |Q - Q1| / (2 f),
 
 A branch that reaches the previous turning point closes its loop; both points are forgotten and the
 older branch goes on; first loading ends the stack. A branch costs half of a cycle of its amplitude,
-first loading a quarter (docs/theory/shear.md, "Any history").
+first loading a quarter (docs/theory/shear.md, "Histories").
 """
 
 from __future__ import annotations

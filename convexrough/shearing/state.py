@@ -22,7 +22,7 @@ from convexrough.progress import Announce
 from convexrough.shearing.certificate import ShearCertificate
 from convexrough.shearing.judgement import judge_states
 from convexrough.shearing.many_states import by_matrices
-from convexrough.shearing.normal_map import States
+from convexrough.shearing.normal_map import States, gross_sliding
 from convexrough.shearing.problem import TangentialProblem
 
 #: Of more loaded asperities than this, coupled by an operator, the onset of some only is found.
@@ -55,15 +55,29 @@ class ShearState:
         return self.certificate.status
 
 
-def shear(contact: Contact, *, force: float, announce: Announce | None = None) -> ShearState:
-    """Apply a shear force Q [force] to a pressed contact, first loading, at constant normal load.
+def shear(
+    contact: Contact,
+    *,
+    force: float | None = None,
+    displacement: float | None = None,
+    announce: Announce | None = None,
+) -> ShearState:
+    """Shear a pressed contact, first loading, at constant normal load.
 
+    force [force] Q or displacement [length] X of the deep points : exactly one. The displacement
+        grows with the force, which is solved for; the certificate is that of the state found.
     announce : told in a line how far long work has come
 
-    Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding), and
-    SolverError where Newton's method stops without an answer.
+    Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding) or X its
+    displacement there, and SolverError where Newton's method stops without an answer.
     """
+    checks.instance("contact", contact, Contact)
     friction = checks.friction(contact.scene.friction)
+    checks.exactly_one("force", force, "displacement", displacement)
+    if displacement is not None:
+        moved = checks.finite("displacement", displacement)
+        force = float(np.copysign(forces_at(contact, np.array([abs(moved)]))[0], moved))
+    assert force is not None  # exactly_one
     given = checks.bearable("force", force, friction * contact.load)
     if given.ndim:
         raise InputError("force", found=f"shape {given.shape}", expected="one number")
@@ -93,6 +107,41 @@ def shear(contact: Contact, *, force: float, announce: Announce | None = None) -
     )
 
 
+def forces_at(contact: Contact, displacements: Array) -> Array:
+    """(m,) [force] Q >= 0 that give the deep points displacements X >= 0 [length], first loading.
+
+    X grows with Q, so that each is a root in a bracket; its states start from those found before.
+    """
+    from scipy.optimize.elementwise import find_root  # 0.1 s to import: only when asked
+
+    farthest = 0.0
+    if contact.load > 0.0:
+        problem = TangentialProblem.of(contact)
+        farthest = gross_sliding(problem)[2] * problem.travel_unit
+    if not (displacements <= farthest * (1 + 1e-14)).all():
+        raise InputError(
+            "displacement",
+            found=f"{displacements.max():.17g}: gross sliding",
+            expected=f"at most X = {farthest:.17g}, where the last asperity slides",
+        )
+    if farthest == 0.0:
+        return np.zeros(len(displacements))
+    near: States | None = None
+
+    def beyond(totals: Array, rise: Array) -> Array:
+        nonlocal near
+        near = problem.solve(problem.limited(totals), known=near)
+        return near.rises - rise
+
+    found = find_root(
+        beyond,
+        (np.zeros(len(displacements)), np.full(len(displacements), problem.limit)),
+        args=(np.minimum(displacements, farthest) / problem.travel_unit,),
+        tolerances={"xrtol": 1e-15, "xatol": 0.0, "frtol": 0.0, "fatol": 0.0},
+    )
+    return np.asarray(found.x * problem.force_unit)
+
+
 def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
@@ -104,8 +153,9 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     """
     from scipy.optimize.elementwise import find_root  # 0.1 s to import: only when asked
 
+    checks.instance("contact", contact, Contact)
     checks.friction(contact.scene.friction)
-    asked = _asperities(contact, which)
+    asked = indices("which", which, len(contact.scene))
     onsets = np.full(len(asked), np.nan)
     loaded = np.flatnonzero(contact.loads[asked])
     if len(loaded) == 0:
@@ -137,16 +187,15 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     return frozen(onsets)
 
 
-def _asperities(contact: Contact, which: ArrayLike | None) -> Indices:
-    """Indices of asperities of the scene, checked."""
-    n = len(contact.scene)
+def indices(what: str, which: ArrayLike | None, n: int) -> Indices:
+    """Indices of asperities of a scene of n, checked; default all."""
     if which is None:
         return np.arange(n)
     asked = np.atleast_1d(np.asarray(which))
     whole = asked.ndim == 1 and (np.issubdtype(asked.dtype, np.integer) or asked.size == 0)
     if not whole or (asked < 0).any() or (asked >= n).any():
         expected = f"whole numbers from 0 to {n - 1}: indices of asperities of the scene"
-        raise InputError("which", found=repr(which)[:60], expected=expected)
+        raise InputError(what, found=repr(which)[:60], expected=expected)
     return asked.astype(np.intp)
 
 

@@ -3,6 +3,9 @@
 Those written elsewhere (Clarabel, CVXPY, OSQP) are imported when first used.
 """
 
+from collections.abc import Callable
+
+from convexrough.errors import InputError
 from convexrough.solvers.bristles import BristleQP
 from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.conic import Conic
@@ -11,6 +14,7 @@ from convexrough.solvers.newton import Newton
 from convexrough.solvers.solution import Solution, Solver
 
 __all__ = [
+    "SOLVERS",
     "BristleQP",
     "Conic",
     "ConicCVXPY",
@@ -19,4 +23,27 @@ __all__ = [
     "Solution",
     "Solver",
     "TooDenseError",
+    "named",
 ]
+
+#: By the name that a scene file, and `press`, know them by.
+SOLVERS: dict[str, Callable[[], Solver]] = {
+    "newton": Newton,
+    "conic": Conic,
+    "conic_cvxpy": ConicCVXPY,
+    "bristles": BristleQP,
+}
+
+
+def named(solver: Solver | str | None) -> Solver:
+    """The solver itself, the one of that name, or Newton's method for None."""
+    if solver is None:
+        return Newton()
+    if isinstance(solver, str) and solver in SOLVERS:
+        return SOLVERS[solver]()
+    if isinstance(solver, (str, type)) or not callable(getattr(solver, "solve", None)):
+        found = f"the class {solver.__name__}" if isinstance(solver, type) else repr(solver)[:60]
+        names = ", ".join(f'"{name}"' for name in SOLVERS)
+        expected = f"one of {names}, or settings such as solvers.Newton()"
+        raise InputError("solver", found=found, expected=expected)
+    return solver

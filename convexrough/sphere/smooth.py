@@ -26,6 +26,7 @@ from convexrough.sphere import hertz, mindlin, surface_shear
 
 def smooth(scene: Scene, *, load: float) -> SmoothSphere:
     """The sphere of the scene, without asperities, under a normal load P [force]."""
+    checks.instance("scene", scene, Scene)
     return SmoothSphere(scene, checks.positive("load", load))
 
 

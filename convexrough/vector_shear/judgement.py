@@ -8,8 +8,8 @@ or (n, 2). In the letters of that page, forces over f and displacements over c_t
     shifts tau                            own |u(Q)|, slips s
     residual e, distance || d ||_H        reach_ij |C_ij v| <= reach_ij |v|
 
-Nothing is proved where no asperity is sure to stick, close to gross sliding, and all words there
-are "undecided"; except at |Q| = f P itself, where |Q_i| <= f P_i leaves one state.
+Where no asperity is sure to stick, close to gross sliding and at |Q| = f P itself, forces are known
+because |Q_i| <= f P_i leaves them little room: "Close to gross sliding" of that page.
 """
 
 from __future__ import annotations
@@ -22,12 +22,14 @@ from convexrough.arrays import Array
 from convexrough.convex.definite import proved_margin
 from convexrough.normal.judgement import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.judgement import Bounds, own_change
-from convexrough.shearing.load_errors import LoadErrors
+from convexrough.shearing.judgement import (
+    LIMIT_ROUNDOFFS,
+    SHARE_ROUNDOFFS,
+    Bounds,
+    own_change,
+)
+from convexrough.shearing.load_errors import MARGINS, LoadErrors
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
-
-#: Margins of convexity tried, the best first.
-MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 
 
 def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) -> Bounds:
@@ -35,25 +37,29 @@ def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) ->
 
     gross : |Q| = f P
     """
-    unproved = Bounds.unproved(1, len(problem))
     if problem.scalar.certificate.scope == "none":
-        return unproved
+        return Bounds.unproved(1, len(problem))
     known = LoadErrors.of(problem.scalar)
-    if gross:
-        # Every force is f P_i along the total, whatever the displacements.
-        errors = known.errors + 8 * ROUNDOFF * problem.scalar.loads
-        proved, sliding = np.array([True]), known.sure[None]
-        return unproved._replace(proved=proved, increments=errors[None], sliding=sliding)
-    # An asperity may touch that the problem leaves out; or the energy may not be convex.
+    bounds = None if gross else _by_convexity(problem, known, state)
+    return bounds or _by_exhaustion(problem, known, state)
+
+
+def _by_convexity(problem: VectorProblem, known: LoadErrors, state: VectorState) -> Bounds | None:
+    """The steps of docs/theory/friction.md, "Words that are proofs"; None where they end.
+
+    An asperity may touch that the problem leaves out, or the energy may not be convex, or no
+    asperity is sure to stick.
+    """
     if known.stray > 0 or (margin := _margin(problem, known)) == 0.0:
-        return unproved
+        return None
     given = _mapped(problem, known, state)
     image = _image(given)
     if image is None:
-        return unproved
+        return None
     residual = _residual(given, image)
     distance = _distance(given, residual, margin)
-    return _words(given, image, residual, distance)
+    bounds = _words(given, image, residual, distance)
+    return bounds if bounds.proved[0] else None
 
 
 class _Given(NamedTuple):
@@ -141,9 +147,14 @@ def _residual(given: _Given, image: _Image) -> _Residual:
     sums = own + reach @ sizes + float(np.hypot(*state.rise))
     uncertainty = (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * sums
     uncertainty += reach @ (image.carried + image.shifts) + own * known.relative
-    change = own_change(problem.scalar, sizes, own, image.shifts)
+    change = own_change(problem.scalar, sizes, own, image.shifts + _blur(sizes))
     values = np.where(known.sure, mapped + uncertainty + change, 0.0)
     return _Residual(mapped, uncertainty, values)
+
+
+def _blur(sizes: Array) -> Array:
+    """What rounding of a share |q| / P can be read as: near full slip the law is steep."""
+    return SHARE_ROUNDOFFS * ROUNDOFF * sizes
 
 
 def _distance(given: _Given, residual: _Residual, margin: float) -> float:
@@ -164,7 +175,7 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
     coupled = distance * np.sqrt(reach**2 @ (1.0 / h)) * (1 + SAFETY)
     uncertainty = residual.uncertainty + coupled
     sticks = known.sure & (distances < 0.5 * (problem.scalar.loads - sizes))
-    change = own_change(problem.scalar, sizes, own, distances)
+    change = own_change(problem.scalar, sizes, own, distances + _blur(sizes))
     at_each = residual.mapped + uncertainty + change
     rise_error = float(at_each.min(where=sticks, initial=np.inf))
     slip_errors = uncertainty + rise_error + ceilings * known.relative
@@ -186,6 +197,45 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
         sliding=sliding[None],
         partial=partial[None],
     )
+
+
+def _by_exhaustion(problem: VectorProblem, known: LoadErrors, state: VectorState) -> Bounds:
+    """docs/theory/friction.md, "Close to gross sliding": sum (P_i - q_i.t) is at most `unused`.
+
+    So each q is within (2 P unused)^(1/2) of P t, all together in the same sense; then X.t is no
+    less than what it is at any asperity, and a sliding force that is turned costs friction.
+    """
+    P, ceilings, sure, n = problem.scalar.loads, problem.scalar.ceilings, known.sure, len(problem)
+    total = float(np.hypot(*state.total))
+    unproved = Bounds.unproved(1, n)
+    if total == 0.0:
+        return unproved
+    t = state.total / total
+    most = P + known.errors  # P* at most
+    unused = most.sum() + known.stray + LIMIT_ROUNDOFFS * n * ROUNDOFF * P.sum() - total
+    turned = np.minimum(np.sqrt(2.0 * most * unused), 2.0 * most)
+    errors = known.errors + turned + 16 * ROUNDOFF * P
+    errors = errors + np.hypot(*(state.increments - P[:, None] * t).T)
+
+    # B q by what is known of q: `coupled` at P t, within `blur`.
+    reach = problem.scalar.influence.matrix * (1.0 + problem.bias)
+    coupled, across = problem.couple(P[:, None] * t), np.array([-t[1], t[0]])
+    blur = reach @ known.errors + np.sqrt(2.0 * unused * (reach**2 @ most))
+    blur += (1.0 + problem.bias) * known.stray_effect
+    blur += (problem.product_error + 16 * ROUNDOFF) * (reach @ P)
+    lacking = 1.5 * unused / P
+    least = ceilings * (1.0 - lacking - lacking ** (2 / 3) - known.relative) + coupled @ t - blur
+    least_rise = least.max(where=sure & (lacking < 1), initial=-np.inf)  # of X.t
+    highest = ceilings * (1.0 + known.relative) + blur  # of | X - coupled | where it sticks
+    pushed = least_rise - coupled @ t > highest
+    # Were it to stick, displacements would be small, and forces turned by what differs across t.
+    weights, side = np.where(sure, P - known.errors, 0.0), coupled @ across
+    mean = float(weights @ side) / (float(weights.sum()) or 1.0)
+    spread = np.sqrt(weights @ (side - mean) ** 2) - np.sqrt(weights @ blur**2)
+    longest = highest + float(np.hypot(*np.ptp(coupled, axis=0))) + float(blur.max())
+    sliding = sure & (pushed | (spread * (1 - SAFETY) > np.sqrt(2.0 * unused) * longest))
+    proved = np.array([bool(sliding.any()) or (known.stray == 0 and bool(sure.all()))])
+    return unproved._replace(proved=proved, increments=errors[None], sliding=sliding[None])
 
 
 def _margin(problem: VectorProblem, known: LoadErrors) -> float:

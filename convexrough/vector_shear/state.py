@@ -86,6 +86,7 @@ def shear_vector(
     SolverError where the solver stops without an answer, is missing, or finds asperities so dense
     that the program is not convex.
     """
+    checks.instance("contact", contact, Contact)
     solver = FrictionNewton() if solver is None else solver
     scene = contact.scene
     friction = checks.friction(scene.friction)
@@ -128,15 +129,21 @@ def shear_vector(
 
 
 def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> VectorState:
-    """The solver's answer; the last forces of an error in the scene's units and order."""
+    """The solver's answer, if it is one; the last forces of an error in scene units and order."""
     try:
-        return solver.solve(problem, total)
+        state = solver.solve(problem, total)
     except SolverError as error:
         if error.iterate is not None and error.iterate.ndim == 2:
             scalar = problem.scalar
             forces = error.iterate * scalar.force_unit
             error.iterate = among_zeros(forces, scalar.touching, len(scalar.scene))
         raise
+    found = (state.increments, state.slips, state.rise)
+    shapes = ((len(problem), 2), (len(problem), 2), (2,))
+    for what, values, shape in zip(("forces", "slips", "displacement"), found, shapes, strict=True):
+        if np.shape(values) != shape or not np.isfinite(values).all():
+            raise SolverError(f"no {what} were found: not finite numbers", solver=solver.name)
+    return state._replace(total=total)
 
 
 def _vector(force: ArrayLike) -> Array:

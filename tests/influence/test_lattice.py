@@ -13,7 +13,7 @@ from scenes import paper, rough, steel
 
 import convexrough as cr
 from convexrough.convex.newton_step import correct
-from convexrough.influence.convolution import Box, _pass_roundoffs, neighbours
+from convexrough.influence.convolution import PASS_ROUNDOFFS, Box, _pass_roundoffs, neighbours
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
@@ -504,3 +504,10 @@ def test_the_spacing_is_that_of_the_shortest_vector() -> None:
     assert lattice is not None
     separations = LatticeInfluence.assemble(points, lattice, 1.0).separations()
     assert (separations <= nearest_distances(points)).all()
+
+
+def test_a_pass_is_allowed_what_the_theory_says() -> None:
+    """4.5 for twiddle factors and their products, and the sums: docs/theory/operators.md."""
+    for radix, allowed in PASS_ROUNDOFFS.items():
+        sums = np.sqrt(radix) * ((radix - 1) / 2 + 4 if radix > 2 else 1)
+        assert 4.5 + sums <= allowed < 5.5 + sums

@@ -1,11 +1,13 @@
 """The certificate under attack: whatever it is given, no word and no bound may be wrong."""
 
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import multiprecision
 import numpy as np
 import pytest
+from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -26,7 +28,7 @@ from scenes import (
 import convexrough as cr
 from convexrough.influence.coupling import Influence, Kind, Rounding
 from convexrough.normal.certificate import judge
-from convexrough.normal.judgement import _convex_margin, _find_box
+from convexrough.normal.judgement import MARGINS, _find_box, convex_margin
 from convexrough.normal.problem import NormalProblem
 
 Array = NDArray[np.float64]
@@ -144,7 +146,10 @@ def test_attacks_on_random_scenes(
         assert_honest(certificate, wrong, exact)
         if kind == "none":
             assert certificate.holds
-    if wrong.any() and contact.load > 0:
+    if contact.load == 0:
+        return
+    candidates = NormalProblem.assemble(scene, load=contact.load).candidates
+    if wrong[candidates].any():  # else there is nothing to scale to the load: an InputError
         certificate = cr.certify(scene, wrong, load=contact.load, influence=operator)
         if certificate.scope != "none":
             exact = solve_exactly(scene, load=contact.load, start=contact.loads)
@@ -285,7 +290,7 @@ def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     problem = NormalProblem.assemble(scene, approach=1e-4)
     h = problem.stiffness(problem.bounds(problem.ceiling) * size)
     hessian = problem.influence.matrix / np.sqrt(h) / np.sqrt(h)[:, None] + np.eye(12)
-    margin = _convex_margin(problem.influence, h)
+    margin = convex_margin(problem.influence, h, MARGINS)
     smallest = np.linalg.eigvalsh(hessian)[0]
     assert margin <= max(smallest, 0.0)
     assert margin > 0 or smallest < 1.1e-3
@@ -427,3 +432,93 @@ def test_judge_is_certify() -> None:
         problem = NormalProblem.assemble(scene, approach=approach, influence=kind)
         judged = cr.certify(scene, loads, approach=approach, influence=kind)
         assert judge(problem, loads).load_error == judged.load_error
+
+
+def exact_energy(scene: cr.Scene, loads: Array, approach: Any) -> Any:
+    """Phi(P) of float64 loads, as a ball of arb."""
+    balls = [arb(float(load)) for load in loads]
+    E, R = arb(scene.material.contact_modulus), arb(scene.sphere_radius)
+    a, energy = scene.asperities, arb(0)
+    for i in np.flatnonzero(loads):
+        P = balls[i]
+        k = (9 / (16 * E * E) * (1 / R + 1 / arb(float(a.tip_radii[i])))).root(3)
+        x, y = (arb(float(c)) for c in a.positions[i])
+        D = approach + arb(float(a.heights[i])) - (x * x + y * y) / (2 * R)
+        energy += 3 * k * P.root(3) ** 5 / 5 - D * P
+        for j, other in enumerate(balls[:i]):
+            dx, dy = (arb(float(c)) for c in a.positions[i] - a.positions[j])
+            energy += P * other / (arb.pi() * E * (dx * dx + dy * dy).sqrt())
+    return energy
+
+
+@pytest.mark.parametrize("size", [1e-18, 1e-13, 1e-9])
+def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> None:
+    scene = rough()
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    farthest = np.argmax(scene.asperities.distances)
+    wrong = contact.loads.copy()
+    wrong[farthest] += size * contact.load
+    problem = NormalProblem.assemble(scene, approach=PAPER_APPROACH)
+    assert farthest not in problem.candidates
+    with ctx.workdps(60):
+        energies = [exact_energy(scene, P, PAPER_APPROACH) for P in (wrong, contact.loads)]
+        excess = float(energies[0] - energies[1])
+    assert excess > 0
+    gap = judge(problem, wrong).duality_gap
+    assert gap >= excess
+    assert gap <= 1.01 * excess + judge(problem, contact.loads).duality_gap
+
+
+@pytest.mark.parametrize("lift", [0.0, 1.0])
+def test_the_duality_gap_counts_what_loads_miss_the_total_by(lift: float) -> None:
+    """Heights far above the approach: the multiplier is large, and so is a roundoff of the sum."""
+    flat = paper()
+    heights = lift + flat.asperities.heights
+    scene = replace(flat, asperities=replace_heights(flat.asperities, heights))
+    load = cr.press(flat, approach=PAPER_APPROACH).load
+    problem = NormalProblem.assemble(scene, load=load)
+    assert problem.load is not None
+    contact = cr.press(scene, load=load)
+    loads = contact.loads[problem.candidates] / problem.units.force
+    loads[0] += np.spacing(loads[0])
+    displacement = problem.influence.apply(loads)
+    approach = contact.approach / problem.units.length
+    box = np.full(len(loads), 1.5 * loads.max())
+    missing = sum(map(Fraction, loads.tolist())) - Fraction(problem.load)
+    gap = problem.duality_gap(loads, displacement, approach, box)
+    assert gap >= abs(Fraction(approach) * missing)
+
+
+def replace_heights(asperities: cr.Asperities, heights: Array) -> cr.Asperities:
+    return cr.Asperities(asperities.positions, asperities.tip_radii, heights)
+
+
+def assert_loads_within(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
+    """As `assert_honest`, without the rounding of a difference."""
+    with ctx.workprec(4096):
+        for load, true, bound in zip(loads, exact.loads, certificate.load_errors, strict=True):
+            assert abs(arb(float(load)) - true) <= arb(float(bound))
+
+
+@pytest.mark.parametrize("factor", [3.0, 1e10, 1e25])
+def test_loads_far_too_large_under_load_control(factor: float) -> None:
+    """Scaled to the total they are right; as they are, they are off by all but a little."""
+    scene = paper()
+    load = cr.press(scene, approach=PAPER_APPROACH).load
+    given = factor * cr.press(scene, load=load).loads
+    assert_loads_within(cr.certify(scene, given, load=load), given, reference(scene, load=load))
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
+    flat = paper()
+    scene = cr.Scene(1.0, flat.asperities, cr.Material(1e12, 0.3))
+    load = cr.press(scene, approach=PAPER_APPROACH).load
+    prescribed = {"approach": PAPER_APPROACH} if control == "approach" else {"load": load}
+    exact, given = reference(scene, **prescribed), cr.press(scene, **prescribed).loads.copy()
+    problem = NormalProblem.assemble(scene, **prescribed)
+    assert problem.units.force > 8
+    open_ones = np.setdiff1d(problem.candidates, np.flatnonzero(given))
+    assert len(open_ones)
+    given[open_ones] = 5e-324
+    assert_loads_within(cr.certify(scene, given, **prescribed), given, exact)

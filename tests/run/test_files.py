@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import HEXAGONAL, scene_text, write_loads
+from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
 from convexrough.run import results
-from convexrough.run.results import beside, claim_folder, write_results
+from convexrough.run.claims import read_loads
+from convexrough.run.results import MANIFEST, beside, claim_folder, write_results
 from convexrough.run.scene_file import UnitNames, read_scene
 from convexrough.run.stages import Findings
 from convexrough.run.summary import Summary, summarise, to_json
-from convexrough.run.tables import ASPERITY_COLUMNS, read_loads, read_summits, read_table
+from convexrough.run.tables import ASPERITY_COLUMNS, read_table
 
 
 def read(tmp_path: Path, *parts: str, **tables: str) -> Any:
@@ -280,116 +281,6 @@ def test_seeds(tmp_path: Path) -> None:
     assert not np.isclose(heights[0], heights[2], rtol=1e-6).any()
 
 
-# CSV in
-
-
-def test_summits(tmp_path: Path) -> None:
-    folder = tmp_path / "data"
-    folder.mkdir()
-    lines = "y, x ,tip_radius,height\r\n0.5,0.25,0.1,1e-3\r\n-1,2,0.2,-1e-3\r\n\r\n"
-    (folder / "summits.csv").write_bytes(b"\xef\xbb\xbf" + lines.encode())
-    # The path is relative to the scene file, wherever the command runs.
-    file = read(tmp_path, 'pattern = "file"\npath = "data/summits.csv"')
-    asperities = file.scene.asperities
-    assert asperities.positions.tolist() == [[0.25, 0.5], [2.0, -1.0]]
-    assert asperities.tip_radii.tolist() == [0.1, 0.2]
-    assert asperities.heights.tolist() == [1e-3, -1e-3]
-
-
-def test_summits_without_optional_columns(tmp_path: Path) -> None:
-    path = tmp_path / "summits.csv"
-    path.write_text("x,y\n0,1\n0,2")
-    asperities = read_summits(path, tip_radius=[0.5, 0.6])
-    assert asperities.tip_radii.tolist() == [0.5, 0.6]
-    assert asperities.heights.tolist() == [0.0, 0.0]
-
-
-@pytest.mark.parametrize(
-    ("content", "expected"),
-    [
-        ("", "empty"),
-        ("x,y\n", "rows: found none below the header"),
-        ("x,y,heigth\n0,0,0\n", "found 'heigth', expected a known column; did you mean \"height\""),
-        ("x;y\n0;0\n", "found 'x;y', expected a known column; valid: x, y, height, tip_radius"),
-        ("x,X\n0,0\n", "found 'X', expected a known column"),
-        ("x,height\n0,0\n", "columns: found x, height, expected a column 'y'"),
-        ("x,y,x\n0,0,0\n", "columns: found 'x' twice, expected once"),
-        ("x,y\n0,0\n1,abc\n", "row 3, column y: found 'abc', expected a finite number"),
-        ("x,y\n0,0\n1,\n", "row 3, column y: found '', expected a finite number"),
-        ("x,y\n0,nan\n", "row 2, column y: found nan, expected a finite number"),
-        ("x,y\n-inf,0\n", "row 2, column x: found -inf, expected a finite number"),
-        ("x,y\n0,0\n1,2,3\n", "row 3: found 3 cells, expected 2"),
-        ("x,y\n0,0\n1", "row 3: found 1 cells, expected 2"),
-        ("x,y\n0,0\n\n1,1\n", "row 3: found 0 cells, expected 2"),
-        ('x,y\n0,"1\n', "not a CSV file"),
-        ("x,y,tip_radius\n0,0,1\n", "tip radii: found both"),
-        ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
-    ],
-)
-def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
-    path = tmp_path / "summits.csv"
-    path.write_text(content)
-    with pytest.raises(cr.ConvexroughError) as caught:
-        read_summits(path, tip_radius=1.0)
-    assert str(caught.value).startswith(str(path))
-    assert expected in str(caught.value)
-
-
-def test_summits_need_a_tip_radius(tmp_path: Path) -> None:
-    path = tmp_path / "summits.csv"
-    path.write_text("x,y\n0,0\n")
-    with pytest.raises(cr.InputError, match="tip radii: found neither"):
-        read_summits(path, tip_radius=None)
-
-
-def test_loads_are_matched_by_position(tmp_path: Path, contact: cr.Contact) -> None:
-    order = np.random.default_rng(3).permutation(len(contact.loads))
-    path = write_loads(tmp_path / "loads.csv", contact.scene, contact.loads, order)
-    assert np.array_equal(read_loads(path, contact.scene), contact.loads)
-
-
-def test_loads_without_positions_are_in_order(tmp_path: Path, contact: cr.Contact) -> None:
-    path = tmp_path / "loads.csv"
-    path.write_text("\n".join(["load", *map(repr, contact.loads.tolist())]))
-    assert np.array_equal(read_loads(path, contact.scene), contact.loads)
-
-
-def test_loads_at_a_slightly_different_place(tmp_path: Path, contact: cr.Contact) -> None:
-    path, scene = tmp_path / "loads.csv", contact.scene
-    for offset, fine in ((0.9e-6, True), (1.1e-6, False)):
-        moved = cr.Asperities(scene.asperities.positions + np.array([offset * 0.0025, 0]), 0.02)
-        other = cr.Scene(1.0, moved, scene.material)
-        write_loads(path, other, contact.loads, range(len(moved)))
-        if fine:
-            assert np.array_equal(read_loads(path, scene), contact.loads)
-        else:
-            with pytest.raises(cr.InputError, match=r"row \d+: found position .* 2.75e-09 from"):
-                read_loads(path, scene)
-
-
-@pytest.mark.parametrize(
-    ("content", "expected"),
-    [
-        ("load\n1\n", "rows: found 1, expected 2, one per asperity"),
-        ("load\n1\n2\n3\n", "rows: found 3, expected 2, one per asperity"),
-        ("load\n1\n-2\n", "row 3, column load: found -2.0, expected a number that is not negative"),
-        ("load\n1\nnan\n", "row 3, column load: found nan"),
-        ("loads\n1\n2\n", "found 'loads', expected a known column; did you mean \"load\"?"),
-        ("x,y\n0,0\n1,0\n", "columns: found x, y, expected a column 'load'"),
-        ("x,load\n0,1\n1,1\n", "columns: found only x, expected x and y"),
-        ("x,y,load\n0,0,1\n0,0,1\n", "row 3: found the same position as in row 2"),
-        ("x,y,load\n0,0,1\n0,2,1\n", "row 3: found position [0.0, 2.0], 2 from the nearest"),
-    ],
-)
-def test_wrong_loads(tmp_path: Path, content: str, expected: str) -> None:
-    path = tmp_path / "loads.csv"
-    path.write_text(content)
-    scene = cr.Scene(1.0, cr.Asperities([[0, 0], [1, 0]], 0.1), cr.Material(1.0, 0.3))
-    with pytest.raises(cr.InputError) as caught:
-        read_loads(path, scene)
-    assert str(caught.value).startswith(f"{path}: {expected}") or expected in str(caught.value)
-
-
 # Results
 
 
@@ -399,7 +290,7 @@ def written(folder: Path, contact: cr.Contact, *, figures: bool = False) -> list
         folder, found, summarise(found), figures=figures, units=UnitNames("m", "N")
     )
     assert all(path.stat().st_size > 0 for path in paths)
-    assert {path.name for path in paths} == {path.name for path in folder.iterdir()}
+    assert {path.name for path in paths} == {path.name for path in folder.iterdir()} - {MANIFEST}
     return [path.name for path in paths]
 
 
@@ -407,13 +298,13 @@ def test_results_read_back_the_same(tmp_path: Path, contact: cr.Contact) -> None
     assert written(tmp_path, contact) == ["summary.json", "asperities.csv"]
     path = tmp_path / "asperities.csv"
     assert path.read_text().splitlines()[0] == ",".join(ASPERITY_COLUMNS)
-    columns = read_table(path, required=("load",), optional=("x", "y", "height", "tip_radius"),
-                         ignored=ASPERITY_COLUMNS).columns  # fmt: skip
+    wanted = ("x", "y", "height", "tip_radius", "load")
+    columns = read_table(path, required=wanted).columns
     asperities = contact.scene.asperities
     assert np.array_equal(np.column_stack((columns["x"], columns["y"])), asperities.positions)
     assert np.array_equal(columns["height"], asperities.heights)
     assert np.array_equal(columns["tip_radius"], asperities.tip_radii)
-    assert np.array_equal(read_loads(path, contact.scene), contact.loads)
+    assert np.array_equal(read_loads(path, contact.scene).values, contact.loads)
     normal = json.loads((tmp_path / "summary.json").read_text())["normal"]
     assert normal["contact"] == int((contact.status == "contact").sum())
     assert normal["certificate"]["load_error"] == contact.certificate.load_error
@@ -428,7 +319,7 @@ def test_many_asperities_go_to_npz(
     with np.load(path) as arrays:
         assert tuple(arrays) == ASPERITY_COLUMNS
         assert arrays["status"].tolist() == contact.status.tolist()
-    assert np.array_equal(read_loads(path, contact.scene), contact.loads)
+    assert np.array_equal(read_loads(path, contact.scene).values, contact.loads)
 
 
 @pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x03\x04 and then nothing"])
@@ -479,7 +370,7 @@ def test_a_failure_while_drawing_leaves_no_half_figure_and_no_summary(
     monkeypatch.setattr(Figure, "savefig", fail)
     with pytest.raises(cr.FileError, match=r"pressure\.png: cannot be written"):
         written(tmp_path, contact, figures=True)
-    assert [each.name for each in tmp_path.iterdir()] == ["asperities.csv"]
+    assert {each.name for each in tmp_path.iterdir()} == {"asperities.csv", MANIFEST}
 
 
 def test_a_folder_is_claimed_before_computing(tmp_path: Path) -> None:
@@ -500,3 +391,9 @@ def test_a_folder_is_claimed_before_computing(tmp_path: Path) -> None:
 def test_json_has_no_infinities() -> None:
     summary: Summary = {"a": {"b": [1.0, float("inf")]}, "c": float("nan"), "d": -float("inf")}
     assert json.loads(to_json(summary)) == {"a": {"b": [1.0, None]}, "c": None, "d": None}
+
+
+def test_writing_says_how_far_it_is(tmp_path: Path, contact: cr.Contact) -> None:
+    found, told = Findings(contact), list[str]()
+    write_results(tmp_path, found, summarise(found), figures=True, announce=told.append)
+    assert told == ["asperities", "figures", "pressure", "loads"]

@@ -46,8 +46,8 @@ def test_the_same_states_by_matrices_and_by_transforms(fraction: float) -> None:
         cr.shear(contact, force=fraction * FRICTION * contact.load)
         for contact in (refined("dense"), refined("lattice"))
     )
-    assert one.certificate.holds
-    assert other.certificate.holds
+    for state in (one, other):  # at f P the last one slides if f P of the true loads is no more
+        assert (state.status == "undecided").sum() == (fraction == 1.0)
     assert (one.status == other.status).all()
     assert one.displacement == pytest.approx(other.displacement, rel=1e-12)
     errors = one.certificate.force_errors + other.certificate.force_errors

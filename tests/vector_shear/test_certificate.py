@@ -132,6 +132,46 @@ def test_doubt_about_the_loads_is_counted(fraction: float, digits: int) -> None:
         assert known.force_errors.max() < 10.0 ** (4 - digits) * lengths(truth.forces).max()
 
 
+@pytest.mark.parametrize("size", [1e-12, 1e-9, 1e-6])
+@pytest.mark.parametrize("nu", [0.3, 0.5])
+def test_forces_at_the_limit_turn_by_the_root_of_what_is_missing(nu: float, size: float) -> None:
+    """f P of loads that are a little too small is not yet the limit of the true ones."""
+    contact = pressed("paper", nu=nu)
+    loads = contact.loads * (1 - size)
+    doubtful = replace(
+        contact,
+        loads=loads,
+        load=float(loads.sum()),
+        contact_radii=hertz.contact_radius(loads, 1.0, contact.scene.relative_radii),
+        certificate=replace(contact.certificate, load_errors=1.001 * size * contact.loads),
+    )
+    force = FRICTION * doubtful.load
+    state, truth = shear_vector(doubtful, force=force), shear_vector(contact, force=force)
+    assert (state.forces[:, 1] == 0).all()
+    off = lengths(state.forces - truth.forces)
+    assert (off <= state.certificate.force_errors).all()
+    loaded = contact.loads > 0
+    assert off.max() > 100 * size * truth.forces.max()
+    assert state.certificate.force_errors.max() < 1e3 * off.max()
+    sliding = lengths(truth.slips) > 0
+    assert (state.status[~sliding & loaded] == "undecided").all()
+    if size <= 1e-9:
+        assert (state.status[loaded] == "sliding").all()
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3])
+def test_a_row_along_the_force_at_the_limit(nu: float) -> None:
+    """Nothing turns: the last to slide may stick, as in the scalar problem."""
+    points = [[-3e-3, 0], [0, 0], [3e-3, 0]]
+    scene = cr.Scene(1.0, cr.Asperities(points, 0.01), cr.Material(1.0, nu), FRICTION)
+    contact = cr.press(scene, approach=1e-4)
+    state = shear_vector(contact, force=FRICTION * contact.load)
+    assert state.status.tolist() == ["sliding", "undecided", "sliding"]
+    alone = cr.Scene(1.0, cr.Asperities([[0, 0]], 0.01), cr.Material(1.0, nu), FRICTION)
+    contact = cr.press(alone, approach=1e-4)
+    assert shear_vector(contact, force=FRICTION * contact.load).status == ["undecided"]
+
+
 def test_an_uncertified_contact_gets_no_word() -> None:
     contact = replace(
         pressed("paper"), certificate=replace(pressed("paper").certificate, scope="none")

@@ -154,6 +154,7 @@ def test_scattered_contacts_by_both_solvers() -> None:
         conic = shear_vector(contact, force=Q, solver=FrictionConic())
         assert lengths(newton.forces - conic.forces).max() < 1e-6 * lengths(newton.forces).max()
         assert lengths(newton.slips - conic.slips).max() < 1e-6 * np.hypot(*newton.displacement)
-        assert newton.duality_gap <= 1e-3 * conic.duality_gap + 1e-14 * np.hypot(*Q) * np.hypot(
+        # The rounding of B q, some 10 n roundoffs, is part of both.
+        assert newton.duality_gap <= 1e-3 * conic.duality_gap + 5e-14 * np.hypot(*Q) * np.hypot(
             *newton.displacement
         )

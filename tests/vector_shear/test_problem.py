@@ -1,5 +1,8 @@
 """The program of vector friction: its kernel and shift, its residual and its duality gap."""
 
+from dataclasses import replace
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from friction_scenes import FRICTION, cerruti, pressed, with_friction
@@ -9,7 +12,7 @@ from scenes import random_scenes
 
 import convexrough as cr
 from convexrough import FrictionNewton
-from convexrough.vector_shear.problem import VectorProblem, VectorState
+from convexrough.vector_shear.problem import Shift, VectorProblem, VectorState
 
 
 @settings(max_examples=60, deadline=None)
@@ -93,3 +96,44 @@ def test_the_duality_gap_bounds_what_forces_cost_too_much(
         moved = other._replace(rise=scale * best.rise)
         excess = problem.energy(other.increments, problem.couple(other.increments)) - least
         assert problem.duality_gap(moved) >= excess * (1 - 1e-9) - 1e-11 * least
+
+
+@settings(max_examples=40, deadline=None)
+@given(random_scenes(crowding=0.9), st.floats(1e-3, 0.99), st.floats(0, 0.5), st.floats(0, 6.3))
+def test_the_duality_gap_counts_its_rounding(
+    drawn: tuple[cr.Scene, float], fraction: float, nu: float, angle: float
+) -> None:
+    """The least energy is convex in the total, with the slope X: forces that add up to a little
+    more cost X times that at least. The sum is exact here.
+    """
+    scene, approach = drawn
+    contact = cr.press(with_friction(scene, nu=nu), approach=approach)
+    if contact.load == 0 or contact.certificate.scope == "none":
+        return
+    problem = VectorProblem.of(contact)
+    limit = problem.scalar.loads.sum()
+    total = fraction * limit * np.array([np.cos(angle), np.sin(angle)])
+    best = FrictionNewton().solve(problem, total)
+    for sign in (-1, 1):
+        q = best.increments.copy()
+        q[0] += sign * np.spacing(q[0])
+        state = best._replace(increments=q)
+        excess = sum(
+            Fraction(x) * (sum(map(Fraction, column)) - Fraction(part))
+            for x, column, part in zip(
+                best.rise.tolist(), q.T.tolist(), total.tolist(), strict=True
+            )
+        )
+        assert problem.duality_gap(state) >= excess
+
+
+def test_the_duality_gap_is_proved_on_both_sides_of_its_shift() -> None:
+    """It is infinite where a share of 1 is all that makes the kernel semidefinite."""
+    contact = pressed("paper", nu=0.3)
+    problem = VectorProblem.of(contact)
+    best = FrictionNewton().solve(problem, np.array([0.3 * problem.scalar.loads.sum(), 0.0]))
+    gap = problem.duality_gap(best)
+    full = replace(problem)
+    full.__dict__["shift"] = Shift(problem.stiffness, np.ones(len(problem)))
+    assert 0 < gap < 1e-13 * float(best.rise @ best.total)
+    assert full.duality_gap(best) == np.inf

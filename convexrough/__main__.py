@@ -1,0 +1,47 @@
+"""`python -m convexrough`, and what the command `convexrough` starts.
+
+Everything is imported inside, so that an interrupt is one line whenever it comes.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+INTERRUPTED = 130
+
+
+def main() -> int:
+    """Run the command line and return its exit status."""
+    try:
+        sys.unraisablehook = _unraisable
+        from convexrough.cli import main as run
+
+        status = run()
+        import signal
+
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is only to end
+        return status
+    except KeyboardInterrupt:
+        _say_interrupted()
+        return INTERRUPTED
+
+
+def _unraisable(unraised: Any) -> None:
+    """An interrupt that came where none can be raised, as inside a callback of a library."""
+    if issubclass(unraised.exc_type, KeyboardInterrupt):
+        _say_interrupted()
+        os._exit(INTERRUPTED)
+    sys.__unraisablehook__(unraised)
+
+
+def _say_interrupted() -> None:
+    os.write(2, b"convexrough: interrupted\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

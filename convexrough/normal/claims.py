@@ -1,0 +1,131 @@
+"""A claim held against what is proved: what verdicts on loads and on shear forces share."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices, frozen
+
+#: How far a sum may be off the prescribed total, relatively, unless `within` says so.
+TOTAL_WITHIN = 1e-6
+
+#: A suspect is off by at least this part of what the worst one is off by.
+SUSPICIOUS = 1e-3
+
+
+class Claim(ABC):
+    """Forces that somebody claims, one per asperity, and words that they imply.
+
+    within : the forces must be proved this near, in parts of the largest; None: near enough for
+        every word to follow from the forces alone
+    total_prescribed : [force] None where it is not prescribed
+    """
+
+    within: float | None
+    total_prescribed: float | None
+
+    @property
+    @abstractmethod
+    def values(self) -> Array:
+        """(n,) [force] as given."""
+
+    @property
+    @abstractmethod
+    def errors(self) -> Array:
+        """(n,) [force] proved bounds on |force - solution|; infinite where nothing is proved."""
+
+    @property
+    @abstractmethod
+    def status(self) -> NDArray[np.str_]:
+        """(n,) the proved words; "undecided" without one."""
+
+    @property
+    @abstractmethod
+    def wrong(self) -> dict[str, Indices]:
+        """Who is claimed to be what they are proved not to be, by what is wrong about them."""
+
+    @property
+    @abstractmethod
+    def decided_alone(self) -> bool:
+        """Every word follows from the given forces alone."""
+
+    @abstractmethod
+    def nearby(self) -> tuple[Array, Array] | None:
+        """(n,) [force] a solution nearby, and its bounds; None where none was needed or found."""
+
+    @property
+    def holds(self) -> bool:
+        """All that is claimed is proved right, every force is near enough, the total agrees."""
+        wrong = len(self.wrongly_claimed) + len(self.undecided)
+        return not wrong and self.near_enough and self.total_holds
+
+    @property
+    def wrongly_claimed(self) -> Indices:
+        """(m,) of every kind."""
+        return np.concatenate(list(self.wrong.values()))
+
+    @cached_property
+    def undecided(self) -> Indices:
+        """(m,) without a proved word."""
+        return frozen(np.flatnonzero(self.status == "undecided"))
+
+    @property
+    def largest(self) -> float:
+        """[force] the size of the largest given force."""
+        return float(np.abs(self.values).max())
+
+    @property
+    def error(self) -> float:
+        """The largest of `errors`, in parts of the largest force."""
+        return float(self.errors.max()) / self.largest if self.largest > 0 else np.inf
+
+    @cached_property
+    def off(self) -> Indices:
+        """(m,) not proved to be `within`, furthest first; none where that is None."""
+        order = np.argsort(-self.errors, kind="stable")
+        limit = np.inf if self.within is None else self.within * self.largest
+        return frozen(order[~(self.errors[order] <= limit)])
+
+    @property
+    def near_enough(self) -> bool:
+        """Every force is proved near enough."""
+        return self.decided_alone if self.within is None else not len(self.off)
+
+    @property
+    def total_given(self) -> float:
+        """[force] the sum of the forces."""
+        return float(self.values.sum())
+
+    @property
+    def total_holds(self) -> bool:
+        """The forces add up to a prescribed total, within `within` of it or else 1e-6."""
+        if self.total_prescribed is None:
+            return True
+        missing = abs(self.total_given - self.total_prescribed)
+        return missing <= (self.within or TOTAL_WITHIN) * abs(self.total_prescribed)
+
+    @cached_property
+    def suspects(self) -> Indices:
+        """(m,) wrongly claimed, or whose forces are far from the solution; likeliest first.
+
+        A single force that is missing, spurious or wrong is the first; two that were exchanged are
+        the first two. Forces that do not add up to the solution's total are also tried in the unit
+        in which they do.
+        """
+        wrong, nearby = self.wrongly_claimed, self.nearby()
+        if nearby is None or (self.near_enough and not len(wrong)):
+            return frozen(wrong[np.argsort(-self.errors[wrong], kind="stable")])
+        true, bounds = nearby
+        scales = [1.0]
+        if (total := self.total_given) * (wanted := float(true.sum())) > 0:
+            scales.append(wanted / total)
+        apart = min((np.abs(scale * self.values - true) for scale in scales), key=np.sum)
+        least = np.maximum(np.where(np.isfinite(bounds), bounds, 0.0), SUSPICIOUS * apart.max())
+        order = np.argsort(-apart, kind="stable")
+        stand_out = apart > least
+        stand_out[wrong] = True
+        return frozen(order[stand_out[order]])

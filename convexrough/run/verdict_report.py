@@ -1,0 +1,221 @@
+"""What `verify` says of a claim: for people, for programs, and in files."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Indices
+from convexrough.normal.claims import Claim
+from convexrough.run.claims import NOISE, power_of_ten, rounded_up
+from convexrough.run.columns import aligned
+from convexrough.run.results import beside, write_figures, write_tables
+from convexrough.run.scene_file import UnitNames
+from convexrough.run.summary import Summary, certificate_summary, to_json
+from convexrough.run.verification import Verified
+from convexrough.scene.scene import Scene
+from convexrough.shearing.verdict import ShearVerdict
+
+#: Asperities that a list on the terminal names before it says how many more there are.
+MOST_LISTED = 10
+
+#: How a force is called that is 10 to this power too large.
+PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
+
+
+def verdict_summary(found: Verified) -> Summary:
+    """What `--json` prints, in the scene's units."""
+    verdict, sheared = found.verdict, found.sheared
+    summary = certificate_summary(verdict.certificate, verdict.loads)
+    summary["verdict"] = _claim_summary(verdict)
+    if sheared is not None:
+        summary["shear_verdict"] = _claim_summary(sheared)
+    columns = asperity_columns(found)
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    summary["asperities"] = [dict(zip(columns, row, strict=True)) for row in rows]
+    return summary
+
+
+def _claim_summary(claim: Claim) -> Summary:
+    names = ("wrongly_open", "wrongly_loaded")
+    if isinstance(claim, ShearVerdict):
+        names = ("wrongly_sliding", "wrongly_sticking")
+    return {
+        "holds": claim.holds,
+        **{name: getattr(claim, name).tolist() for name in names},
+        "undecided": claim.undecided.tolist(),
+        "off": claim.off.tolist(),
+        "suspects": claim.suspects.tolist(),
+        "error": claim.error,
+        "total_given": claim.total_given,
+        "total_prescribed": claim.total_prescribed,
+        "within": claim.within,
+    }
+
+
+def asperity_columns(found: Verified) -> dict[str, NDArray[Any]]:
+    """One row per asperity: what is claimed of it and what is proved."""
+    verdict, sheared = found.verdict, found.sheared
+    x, y = verdict.scene.asperities.positions.T
+    claimed = np.where(verdict.claimed, "contact", "open")
+    columns = {"index": np.arange(len(x)), "x": x, "y": y, **_columns(verdict, "load", claimed)}
+    if sheared is not None:
+        claimed = np.where(sheared.claimed, "sliding", "sticking")
+        for name, values in _columns(sheared, "force", claimed).items():
+            columns[name if name.startswith("force") else f"shear_{name}"] = values
+    return columns
+
+
+def _columns(claim: Claim, name: str, claimed: NDArray[np.str_]) -> dict[str, NDArray[Any]]:
+    rank = np.zeros(len(claimed), dtype=np.intp)
+    rank[claim.suspects] = np.arange(len(claim.suspects)) + 1
+    columns = {name: claim.values, "claimed": claimed, "status": claim.status}
+    columns |= {f"{name}_error": claim.errors, "suspect": rank}
+    if (nearby := claim.nearby()) is not None:
+        columns["solution"] = nearby[0]
+    return columns
+
+
+def describe_verdict(found: Verified, units: UnitNames) -> list[str]:
+    """Aligned lines: of each claim the wrong set, undecided, off, and the total, in this order."""
+    lines = list(found.notes)
+    for name, claim in found.claims:
+        lines += ["", *_describe(claim, found.verdict.scene, name, units)]
+    return lines
+
+
+def _describe(claim: Claim, scene: Scene, name: str, units: UnitNames) -> list[str]:
+    table = _Listing(claim, scene, name, units)
+    kind = "shear forces" if isinstance(claim, ShearVerdict) else "loads"
+    lines = [_line(kind, f"the claim {'holds' if claim.holds else 'does not hold'}")]
+    lines.append(_line("wrong set", str(len(claim.wrongly_claimed) or "none")))
+    for what, who in claim.wrong.items():
+        if len(who):
+            lines += [f"  {what}: {len(who):,}", *table.of(_worst_first(claim, who))]
+    lines.append(_line("undecided", str(len(claim.undecided) or "none")))
+    lines += table.of(claim.undecided)
+    lines += [_line(f"{name}s off", _off(claim)), *table.of(claim.off)]
+    lines.append(_line("total off", _total(claim, units.force)))
+    if len(claim.suspects):
+        lines += [_line("suspects", "likeliest first"), *table.of(claim.suspects)]
+    return lines
+
+
+def hints(verified: Verified, units: UnitNames) -> list[str]:
+    """What a wrong verdict may come from."""
+    found, verdict, unit = [], verified.verdict, verified.unit
+    if unit and units.force and unit != units.force:
+        found.append(f"the file has {unit}, the scene {units.force}; nothing is converted")
+    wrong = verdict.wrongly_loaded
+    small = verdict.loads[wrong]
+    if len(small) and 0 < (noise := float(small.max())) <= NOISE * verdict.largest:
+        part = f"{noise:.2g}, {noise / verdict.largest:.1g} of the largest"
+        advice = f"--floor {rounded_up(noise)} counts them as open"
+        found.append(
+            f"{len(small):,} of the loads, on asperities proved open, are at most {part}: {advice}"
+        )
+    expected = verdict.total_prescribed
+    if expected is None and verdict.solution is not None:
+        expected = verdict.solution.load
+    if expected and (power := power_of_ten(verdict.total_given / expected)):
+        named = units.force or "N"
+        example = f", as {PREFIXES[power]}{named} for {named}" if power in PREFIXES else ""
+        found.append(f"the loads are 10^{power} times what they should be: another unit{example}?")
+    return found
+
+
+def reason(found: Verified) -> str:
+    """One line: what keeps the claims from holding; "" where they do."""
+    parts = []
+    for kind, claim in found.claims:
+        if claim.holds:
+            continue
+        counts = {"wrongly claimed": len(claim.wrongly_claimed), "undecided": len(claim.undecided)}
+        counts[f"{kind}s off"] = len(claim.off)
+        parts += [f"{count:,} {what}" for what, count in counts.items() if count]
+        if not claim.near_enough and claim.within is None:
+            parts.append(f"{kind}s too far off to prove every word")
+        if not claim.total_holds:
+            parts.append(f"total of the {kind}s off")
+    return ", ".join(parts)
+
+
+def write_verdict(folder: Path, summary: Summary, found: Verified, units: UnitNames) -> list[Path]:
+    """Write verdict.csv, a figure, and verdict.json; return the paths."""
+    from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
+
+    written = write_tables(folder, {"verdict": asperity_columns(found)})
+    figures = verdict_figures(found.verdict, found.sheared, length_unit=units.length)
+    written += write_figures(folder, figures)
+    path = folder / "verdict.json"
+    with beside(path) as temporary:
+        temporary.write_text(to_json(summary) + "\n", encoding="utf-8")
+    return [path, *written]
+
+
+class _Listing:
+    """Tables of some asperities, cut with a count."""
+
+    def __init__(self, claim: Claim, scene: Scene, name: str, units: UnitNames) -> None:
+        self.claim, self.points = claim, scene.asperities.positions
+        x, y, force = (
+            f"{each} [{unit}]" if unit else each
+            for each, unit in (("x", units.length), ("y", units.length), (name, units.force))
+        )
+        self.heading = ["index", x, y, force, "solution", "bound", "word"]
+
+    def of(self, which: Indices) -> list[str]:
+        if len(which) == 0:
+            return []
+        claim, nearby = self.claim, self.claim.nearby()
+        rows = [
+            [
+                str(i),
+                f"{self.points[i, 0]:.6g}",
+                f"{self.points[i, 1]:.6g}",
+                f"{claim.values[i]:.6g}",
+                "-" if nearby is None else f"{nearby[0][i]:.6g}",
+                _bound(float(claim.errors[i])),
+                str(claim.status[i]),
+            ]
+            for i in which[:MOST_LISTED]
+        ]
+        lines = [f"    {line}" for line in aligned([self.heading, *rows])]
+        if (more := len(which) - MOST_LISTED) > 0:
+            lines.append(f"    and {more:,} more: --json and --out have all")
+        return lines
+
+
+def _worst_first(claim: Claim, who: Indices) -> Indices:
+    return who[np.argsort(-claim.errors[who], kind="stable")]
+
+
+def _off(claim: Claim) -> str:
+    largest = f"bound {_bound(claim.error)} of the largest"
+    if claim.within is None:
+        return largest if claim.near_enough else f"{largest}: not every word follows from them"
+    return f"{len(claim.off) or 'none'}  ({largest}, {claim.within:g} allowed)"
+
+
+def _total(claim: Claim, unit: str) -> str:
+    given = f"{claim.total_given:.10g} {unit}".rstrip()
+    if claim.total_prescribed is None:
+        return f"none prescribed  ({given})"
+    if claim.total_holds:
+        return f"none  ({given})"
+    expected = f"{claim.total_prescribed:.10g} {unit}".rstrip()
+    ratio = claim.total_given / claim.total_prescribed if claim.total_prescribed else math.inf
+    return f"given {given}, prescribed {expected}, ratio {ratio:.7g}"
+
+
+def _bound(value: float) -> str:
+    """Two digits, never below the value."""
+    return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
+
+
+def _line(name: str, text: str) -> str:
+    return f"{name:<18}{text}"

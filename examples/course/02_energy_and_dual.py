@@ -1,0 +1,180 @@
+r"""
+2. The energy, its dual, and the word "optimal"
+===============================================
+
+**Claim.** From any loads at all, right or wrong, two numbers can be computed: an energy, which is
+too high, and a dual bound, which is too low. Their difference, the *duality gap*, says how wrong
+the loads can be. A solver's word does not.
+
+Seven Hertzian tips stand on short elastic stems. Tip :math:`i` gives way by :math:`k P_i^{2/3}`,
+and stems and substrate by :math:`(M P)_i` with a symmetric matrix :math:`M` that is positive
+definite. (A stem is the diagonal of :math:`M`. Asperities without stems are the matter of
+:doc:`03_why_cvxpy_refuses`.) The loads minimise
+
+.. math:: \Phi(P) = \sum_i \tfrac 3 5 k P_i^{5/3} + \tfrac 1 2 P^\top M P - D^\top P,
+          \qquad P \ge 0,
+
+which is convex, so a modelling language will take it as it is.
+"""
+
+# %%
+# The naive form
+# --------------
+#
+# Write it down in the units of the drawing: the sphere's radius and the modulus are 1. Then
+# approaches are about :math:`10^{-5}` and loads about :math:`10^{-9}`.
+
+import cvxpy as cp
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+spacing, tip = 0.0025, 0.02
+angles = np.arange(6) * np.pi / 3
+points = np.vstack([[0, 0], spacing * np.column_stack([np.cos(angles), np.sin(angles)])])
+distances = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+np.fill_diagonal(distances, spacing / 2)  # the stems
+M = 1 / (np.pi * distances)
+k = np.full(7, (9 / (16 * tip)) ** (1 / 3))
+D = 1.5e-5 - (points**2).sum(axis=1) / 2
+
+
+def solve(k: Array, M: Array, D: Array) -> tuple[str, Array]:
+    """Status and loads, from Clarabel through CVXPY."""
+    P = cp.Variable(7)
+    energy = 0.6 * k @ cp.power(P, 5 / 3) + cp.quad_form(P, cp.psd_wrap(M)) / 2 - D @ P
+    problem = cp.Problem(cp.Minimize(energy), [P >= 0])
+    problem.solve(solver=cp.CLARABEL)
+    return str(problem.status), np.array(P.value)
+
+
+status, naive = solve(k, M, D)
+print(status, naive)
+
+# %%
+# "Optimal", it says. Ask the loads themselves: what they make the tips give way by should be what
+# is prescribed.
+
+print("prescribed:      ", D[:2])
+print("what these cause:", (k * np.maximum(naive, 0) ** (2 / 3) + M @ naive)[:2])
+assert status == "optimal"
+assert abs((k * np.maximum(naive, 0) ** (2 / 3) + M @ naive)[0] / D[0] - 1) > 1
+
+# %%
+# The solver stops when its residuals are below :math:`10^{-8}`. So are all approaches and loads
+# here, nearly: to it, everything was zero from the start. It did keep its promise. The promise was
+# about other numbers than ours.
+#
+# The repair: a bound from the loads alone
+# ----------------------------------------
+#
+# For any trial loads :math:`p`, a square is not negative: :math:`(x - p)^\top M (x - p) \ge 0`, so
+# :math:`\tfrac 1 2 x^\top M x \ge p^\top M x - \tfrac 1 2 p^\top M p`. Put that into the energy.
+# What is left falls apart into one-tip problems, and each has a closed form: :math:`\tfrac 3 5 k
+# x^{5/3} - \lambda x` is least at :math:`x = (\lambda / k)^{3/2}`, with the value :math:`-\tfrac 2
+# 5 \lambda^{5/2} k^{-3/2}`, or 0 if :math:`\lambda < 0`. So
+#
+# .. math:: \min \Phi \; \ge \; - \tfrac 1 2 p^\top M p
+#           - \tfrac 2 5 \sum_i k^{-3/2} \max(D - M p, 0)_i^{5/2} \quad \text{for every } p.
+
+
+def energy_of(p: Array) -> float:
+    return float(0.6 * k @ p ** (5 / 3) + p @ M @ p / 2 - D @ p)
+
+
+def dual_bound(p: Array) -> float:
+    room = np.maximum(D - M @ p, 0.0)
+    return float(-p @ M @ p / 2 - 0.4 * (k**-1.5) @ room**2.5)
+
+
+naive = np.maximum(naive, 0.0)
+print(f"naive loads: energy {energy_of(naive):.3e}, dual bound {dual_bound(naive):.3e}")
+assert energy_of(naive) > 0 > dual_bound(naive)
+
+# %%
+# No loads at all have energy 0: the solver's "optimum" is worse than not touching. Scaled to its
+# own size, so that approaches and loads are about 1, the same program is solved well, and the gap
+# says so.
+
+length = D[0]
+force = (length / k[0]) ** 1.5
+status, scaled = solve(k * force ** (2 / 3) / length, M * force / length, D / length)
+loads = np.maximum(scaled, 0.0) * force
+gap = energy_of(loads) - dual_bound(loads)
+print(f"scaled: {status}, gap over energy {gap / abs(energy_of(loads)):.1e}")
+assert 0 <= gap < 1e-6 * abs(energy_of(loads))
+
+# %%
+# From a gap to loads
+# -------------------
+#
+# The energy curves upwards at least as much as :math:`\tfrac 1 2 x^\top M x`. So loads whose energy
+# is within the gap of the least are within :math:`\sqrt{2\, \text{gap} / \mu}` of the right ones,
+# :math:`\mu` the smallest eigenvalue of :math:`M`. Mind the root: eight digits of energy are four
+# digits of load. The picture walks from the naive loads to the good ones.
+
+mu = float(np.linalg.eigvalsh(M)[0])
+rest = np.logspace(0, -5, 60)  # how much of the naive loads is left
+trials = [loads + part * (naive - loads) for part in rest]
+above, below = [energy_of(p) for p in trials], [dual_bound(p) for p in trials]
+unit = abs(energy_of(loads))
+
+figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+left.semilogx(rest, np.array(above) / unit, "k-", label="energy $\\Phi(p)$")
+left.semilogx(rest, np.array(below) / unit, "k--", label="dual bound from the same loads")
+left.axhline(-1, color="0.6", lw=0.8)
+left.set(xlabel="part of the way back to the naive loads [1]", ylabel="energy / $|\\Phi^*|$ [1]")
+left.set_yscale("symlog")
+left.legend(fontsize=8)
+gaps = np.maximum(np.array(above) - np.array(below), 1e-16 * unit)
+error = np.array([np.linalg.norm(p - loads) for p in trials])
+right.loglog(gaps / unit, error / loads.max(), "ko", ms=3, label="true error")
+right.loglog(gaps / unit, np.sqrt(2 * gaps / mu) / loads.max(), "k-", label="proved from the gap")
+right.set(xlabel="duality gap / $|\\Phi^*|$ [1]", ylabel="error of the loads / largest load [1]")
+right.legend(fontsize=8)
+
+# %%
+# An independent check
+# --------------------
+#
+# Solve the contact law itself by Newton's method, in the indentations :math:`\delta` of the tips:
+# :math:`\delta + M P(\delta) = D` with :math:`P = (\max(\delta, 0) / k)^{3/2}`. No energy occurs in
+# it. The bound must hold, and the two energies must enclose the least one.
+
+delta = D.copy()
+for _ in range(50):
+    P = (np.maximum(delta, 0) / k) ** 1.5
+    slope = 1.5 * np.sqrt(np.maximum(delta, 0) / k) / k
+    delta -= np.linalg.solve(np.eye(7) + M * slope, delta + M @ P - D)
+reference = (np.maximum(delta, 0) / k) ** 1.5
+true_error = float(np.linalg.norm(loads - reference))
+print(f"true error {true_error:.1e}, proved {np.sqrt(2 * gap / mu):.1e}, of {loads.max():.1e}")
+assert true_error <= np.sqrt(2 * gap / mu) + 1e-14 * loads.max()
+assert dual_bound(loads) <= energy_of(reference) * (1 - 1e-12)
+assert energy_of(reference) <= energy_of(loads) * (1 - 1e-12)
+
+# %%
+# Exercise
+# --------
+#
+# Put :math:`p = 0` into the dual bound. What does it say, in words? By how much is it off here?
+#
+# *Answer.* :math:`\min \Phi \ge -\tfrac 2 5 \sum k^{-3/2} D_i^{5/2}`, the energy of seven tips that
+# do not feel each other: neighbours and stems only make it harder to give way. It overestimates the
+# energy gained by a factor of 1.67.
+
+alone = dual_bound(np.zeros(7))
+print("the bound from no loads, over the least energy:", alone / energy_of(reference))
+assert alone < energy_of(reference) < 0
+assert abs(alone / energy_of(reference) - 1.67) < 0.005
+
+
+def compare() -> list[tuple[str, float, float]]:
+    """(quantity, computed, reference): what the page says."""
+    least = energy_of(reference)
+    return [
+        ("energy of the solver's loads over the least", energy_of(loads) / least, 1.0),
+        ("dual bound at the right loads over the least", dual_bound(reference) / least, 1.0),
+    ]

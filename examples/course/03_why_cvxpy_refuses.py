@@ -1,0 +1,209 @@
+r"""
+3. Why CVXPY refuses the energy
+===============================
+
+**Claim.** The energy of asperities that feel each other is not convex by the rules of a modelling
+language, and not convex everywhere in truth. A picture of charged shells shows how far it is
+convex: up to contact discs 57 % larger than discs that just touch their neighbours.
+
+Asperities on an elastic half-space act on each other as point forces, :math:`A_{ij} = 1 / (\pi E^*
+r_{ij})`. An asperity's effect on itself is already in Hertz's law, so :math:`A_{ii} = 0`. With unit
+:math:`E^*` the energy is
+
+.. math:: \Phi(P) = \sum_i \tfrac 3 5 k_i P_i^{5/3} + \tfrac 1 2 P^\top A P - D^\top P .
+"""
+
+# %%
+# The naive form
+# --------------
+#
+# Write it down as it stands, for the 19 asperities nearest to the axis in the source paper's
+# example.
+
+import cvxpy as cp
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+
+import convexrough as cr
+
+Array = NDArray[np.float64]
+
+asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0051)
+scene = cr.Scene(1.0, asperities, cr.Material(contact_modulus=1.0, poisson_ratio=0.3))
+
+
+def point_forces(points: Array) -> Array:
+    """A_ij = 1 / (pi r_ij), and 0 on the diagonal."""
+    distances = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+    np.fill_diagonal(distances, np.inf)
+    return np.asarray(1 / (np.pi * distances))
+
+
+length, force = 1.5e-5, 1e-8  # units in which the numbers are about 1
+A = point_forces(asperities.positions) * force / length
+k = (9 / (16 * scene.relative_radii)) ** (1 / 3) * force ** (2 / 3) / length
+D = (1.5e-5 + scene.offsets) / length
+
+P = cp.Variable(len(D))
+naive = cp.Minimize(0.6 * k @ cp.power(P, 5 / 3) + cp.quad_form(P, A) / 2 - D @ P)
+problem = cp.Problem(naive, [P >= 0])
+try:
+    problem.solve()
+except cp.error.DCPError as refusal:
+    print(refusal)
+    refused = True
+assert refused
+
+# %%
+# It points at the quadratic form, and it is right. A matrix with zeros on its diagonal has a trace
+# of 0, so if it has positive eigenvalues it has negative ones.
+
+eigenvalues = np.linalg.eigvalsh(A)
+print(f"eigenvalues of A: from {eigenvalues[0]:.3f} to {eigenvalues[-1]:.3f}")
+assert eigenvalues[0] < 0 < eigenvalues[-1]
+assert abs(eigenvalues.sum()) < 1e-10
+
+# %%
+# There is a way to silence the check: wrap the matrix in ``psd_wrap``, a promise that it is
+# semidefinite. It is a false promise, and with crowded asperities the answer is false, too. Here
+# are two that sit in each other's dent:
+
+crowded = cp.quad_form(P[:2], cp.psd_wrap(np.array([[0.0, 2.0], [2.0, 0.0]]))) / 2
+hertz = 0.6 * cp.sum(cp.power(P[:2], 5 / 3))
+lying = cp.Problem(cp.Minimize(hertz + crowded - cp.sum(P[:2])), [P >= 0])
+lying.solve(solver=cp.CLARABEL)
+better = 3 / 5 - 1  # of P = (1, 0)
+found, low_point = P.value[:2].round(3), float(lying.value)
+print(f"{lying.status}: P = {found}, energy {low_point:.3f}; but P = (1, 0) has {better:.3f}")
+assert lying.status == "optimal"
+assert lying.value > better + 0.1
+
+# %%
+# The repair: shells
+# ------------------
+#
+# Give each point force a spherical shell of radius :math:`s_i`, such that no two shells overlap,
+# and spread the force evenly over it, as if it were electric charge. By Newton's theorem two shells
+# act on each other as two points do, with energy :math:`P_i P_j / r_{ij}`. Each has also an energy
+# of its own, :math:`P_i^2 / (2 s_i)`. The energy of any charge distribution is not negative. Hence
+#
+# .. math:: M = A + \operatorname{diag}\Big(\frac{1}{\pi E^* s_i}\Big)
+#           \; \text{ is positive semidefinite if } s_i + s_j \le r_{ij} .
+#
+# Half the distance to the nearest neighbour is a choice that always works.
+
+s = 0.0025 / 2
+M = A + np.eye(len(D)) / (np.pi * s) * force / length
+print(f"least eigenvalue of M: {np.linalg.eigvalsh(M)[0]:.3f}")
+assert np.linalg.eigvalsh(M)[0] > 0
+
+# %%
+# Hertz's own energy can spare that diagonal. Its second derivative is :math:`\tfrac 2 3 k P^{-1/3}
+# = 1 / (2 E^* a)` with :math:`a` the contact radius, which is more than :math:`1 / (\pi E^* s)` as
+# long as :math:`a < \tfrac \pi 2 s`. So the energy *is* convex where all contact radii are below
+# :math:`\tfrac \pi 2 s_i`. The picture shows the energy of two equal asperities along the line on
+# which one takes load from the other: a valley while contacts are small, and a ridge when they are
+# too large.
+
+figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+shift = np.linspace(-1, 1, 201)
+for radius, style in [(0.5, "-"), (1.2, "--"), (1.7, ":")]:
+    # r = 1; loads P (1 +- shift) with 1/(2 a) = (2/3) k P^(-1/3), in units of k P^(5/3)
+    coupling = 2 * radius / np.pi * (2 / 3)  # A_12 P^2 / (k P^(5/3))
+    energy = 0.6 * ((1 + shift) ** (5 / 3) + (1 - shift) ** (5 / 3) - 2) - coupling * shift**2
+    left.plot(shift, energy, "k", ls=style, label=f"contact radius {radius:g} r")
+left.set(xlabel="share of load moved from one to the other [1]", ylabel="energy / $k P^{5/3}$ [1]")
+left.legend(fontsize=8)
+
+rng = np.random.default_rng(3)
+bare_least, shell_least = [], []
+for _ in range(300):
+    points = rng.uniform(-1, 1, (12, 2))
+    bare = point_forces(points)
+    bare_least.append(float(np.linalg.eigvalsh(bare)[0]))
+    nearest = 1 / (np.pi * bare.max(axis=1))
+    shell_least.append(float(np.linalg.eigvalsh(bare + np.diag(2 / (np.pi * nearest)))[0]))
+right.semilogx(-np.array(bare_least), np.zeros(300), "k|", ms=9, alpha=0.4)
+right.semilogx(shell_least, np.ones(300), "k|", ms=9, alpha=0.4)
+right.set(
+    yticks=[0, 1], yticklabels=["$A$: minus the\nleast eigenvalue", "$M$: the least\neigenvalue"]
+)
+right.set(xlabel="300 random layouts of 12 points [1/length]", ylim=(-0.5, 1.5))
+assert max(bare_least) < 0 < min(shell_least)
+
+# %%
+# Still refused
+# -------------
+#
+# The quadratic part is convex now, and each local part :math:`\tfrac 3 5 k P^{5/3} - \tfrac{1}{2
+# \pi E^* s} P^2` is convex on its range. But the rules look at one term at a time, and this one is
+# a difference of two convex functions.
+
+sigma = force / length / (np.pi * s)
+local = 0.6 * k @ cp.power(P, 5 / 3) - sigma / 2 * cp.sum_squares(P)
+split = cp.Problem(cp.Minimize(local + cp.quad_form(P, M) / 2 - D @ P), [P >= 0])
+print("accepted by the rules:", split.is_dcp())
+assert not split.is_dcp()
+
+# %%
+# Script :doc:`05_exact_cones` finds words for it that the rules accept.
+#
+# An independent check
+# --------------------
+#
+# The lemma rests on Newton's theorem, so test that: spread two charges over many points on two
+# shells and add up all pairs. The sum must be that of two point charges, whatever the radii, as
+# long as the shells do not overlap.
+
+
+def shell(radius: float, centre: float, count: int = 3000) -> Array:
+    """Points spread evenly over a sphere about (centre, 0, 0): a Fibonacci spiral."""
+    i = np.arange(count) + 0.5
+    z, turn = 1 - 2 * i / count, np.pi * (1 + np.sqrt(5)) * i
+    ring = np.sqrt(1 - z**2)
+    return radius * np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z]) + [centre, 0, 0]
+
+
+mutual = []
+for radii in [(0.2, 0.3), (0.4, 0.55), (0.6, 0.35)]:
+    one, other = shell(radii[0], 0.0), shell(radii[1], 1.0)
+    squares = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2 * one @ other.T
+    mutual.append(float((1 / np.sqrt(squares)).mean()))
+    print(f"shells of radius {radii} at distance 1: mean of 1/r = {mutual[-1]:.6f}")
+assert np.allclose(mutual, 1.0, atol=1e-4)
+
+# %%
+# Exercise
+# --------
+#
+# Two equal asperities alone, at distance :math:`r`. Up to which contact radius is their energy
+# convex in truth, and what does the lemma promise?
+#
+# *Answer.* The Hessian has :math:`1/(2 E^* a)` on its diagonal and :math:`1/(\pi E^* r)` beside it,
+# so it is definite up to :math:`a = \tfrac \pi 2 r`. The lemma, with :math:`s = r/2`, promises half
+# of that: two asperities have only one neighbour each to make room for. Either way discs touch at
+# :math:`a = r/2`, long before.
+
+
+def definite(radius: float) -> bool:
+    hessian = np.array([[1 / (2 * radius), 1 / np.pi], [1 / np.pi, 1 / (2 * radius)]])  # r = 1
+    return bool(np.linalg.eigvalsh(hessian)[0] > 0)
+
+
+low, high = 0.1, 10.0
+for _ in range(60):
+    middle = (low + high) / 2
+    low, high = (middle, high) if definite(middle) else (low, middle)
+print("convex up to a / r =", low)
+assert abs(low - np.pi / 2) < 1e-9
+
+
+def compare() -> list[tuple[str, float, float]]:
+    """(quantity, computed, reference): what the page says."""
+    certificate = cr.press(scene, approach=1.5e-5).certificate
+    largest_radius = np.sqrt(scene.relative_radii[0] * 1.5e-5)  # alone, under the axis
+    return [
+        ("radius up to which two are convex, over r", low, np.pi / 2),
+        ("convexity number", certificate.convexity_number, largest_radius / (np.pi / 2 * s)),
+    ]

@@ -1,0 +1,210 @@
+r"""
+7. A proof one can check by hand
+================================
+
+**Claim.** That two given loads are right to three digits, and that both asperities touch, can be
+proved with nothing but fractions. No number in the proof is rounded, and no solver is trusted.
+
+Choose units in which an asperity of contact radius :math:`a` carries :math:`P = a^3` and is
+indented by :math:`a^2` (:math:`E^* = \tfrac 3 4`, :math:`R = 1`). Two asperities act on each other
+with :math:`A = \tfrac 1 4`, and are asked to give way by :math:`D = (1, \tfrac 3 5)`:
+
+.. math:: a_1^2 + \tfrac 1 4 a_2^3 = 1, \qquad a_2^2 + \tfrac 1 4 a_1^3 = \tfrac 3 5 .
+"""
+
+# %%
+# The naive form
+# --------------
+#
+# Solve by computer and put the answer back into the equations.
+
+from fractions import Fraction
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import convexrough as cr
+
+Pair = tuple[Fraction, Fraction]
+A = Fraction(1, 4)
+D: Pair = (Fraction(1), Fraction(3, 5))
+
+
+def residuals(a: Pair) -> Pair:
+    """What the loads cause, less what is asked. Exact for fractions."""
+    return a[0] ** 2 + A * a[1] ** 3 - D[0], a[1] ** 2 + A * a[0] ** 3 - D[1]
+
+
+a1, a2 = 1.0, 0.6
+for _ in range(100):
+    a1, a2 = (1 - a2**3 / 4) ** 0.5, (0.6 - a1**3 / 4) ** 0.5
+near = [
+    (x, y)
+    for x in a1 + np.spacing(a1) * np.arange(-3, 4)
+    for y in a2 + np.spacing(a2) * np.arange(-3, 4)
+]
+solved = [(x, y) for x, y in near if x**2 + y**3 / 4 == 1.0]
+print("pairs of numbers that solve the first equation, says the computer:", len(solved))
+assert len(solved) > 1
+
+# %%
+# Many answers to one equation, all near each other, and each of them exact if the computer is to be
+# believed. In truth:
+
+for x, y in solved[:3]:
+    off = residuals((Fraction(float(x)), Fraction(float(y))))
+    print(f"a = ({x:.16f}, {y:.16f}): off by {float(off[0]):.1e}")
+    assert off[0] != 0
+
+# %%
+# None is exact. And none ever will be: the answer is no fraction, so equality cannot be checked
+# with finitely many digits. An *inequality* can.
+#
+# The repair, line by line
+# ------------------------
+#
+# **1. Trial values**, from anywhere. Three digits will do.
+
+a: Pair = (Fraction(round(1000 * a1), 1000), Fraction(round(1000 * a2), 1000))
+P: Pair = (a[0] ** 3, a[1] ** 3)
+print("a =", *a, "  P =", *P)
+
+# %%
+# **2. Their residuals.** These loads solve the contact law exactly, for :math:`D + e` instead of
+# :math:`D`.
+
+e = residuals(a)
+print("e =", *e)
+assert all(abs(value) < Fraction(1, 500) for value in e)
+
+# %%
+# **3. A box.** No asperity carries more than it would alone: :math:`a_i^2 \le D_i`. Fractions above
+# the square roots:
+
+b: Pair = (Fraction(1), Fraction(7, 9))
+assert all(b[i] ** 2 >= D[i] and b[i] >= a[i] for i in range(2))
+
+# %%
+# **4. Stiffness.** The indentation :math:`P^{2/3}` has the slope :math:`\tfrac 2 3 P^{-1/3} = 2 /
+# (3 a)`: in the box at least
+
+h: Pair = (2 / (3 * b[0]), 2 / (3 * b[1]))
+print("h =", *h)
+
+# %%
+# **5. Convexity.** For any two loads in the box, :math:`d` their difference, the displacements
+# differ by at least
+#
+# .. math:: d^\top (w(P) - w(P^*)) \ge h_1 d_1^2 + h_2 d_2^2 + 2 A d_1 d_2
+#           \ge (h_1 - A) d_1^2 + (h_2 - A) d_2^2 \ge (1 - \theta) (h_1 d_1^2 + h_2 d_2^2)
+#
+# with :math:`\theta = \max A / h_i`, because :math:`2 d_1 d_2 \ge - d_1^2 - d_2^2`.
+
+theta = max(A / h[0], A / h[1])
+print("theta =", theta)
+assert theta < 1
+
+# %%
+# **6. Complementarity.** The true gaps :math:`g^*` are not negative, and 0 where :math:`P^*` is
+# not. So
+#
+# .. math:: d^\top (w(P) - w(P^*)) = d^\top (e - g^*) = d^\top e - P^\top g^* \le d^\top e .
+#
+# **7. Together**, by Cauchy and Schwarz with weights :math:`h`: the square of the distance,
+# :math:`h_1 d_1^2 + h_2 d_2^2`, is at most
+
+square = (e[0] ** 2 / h[0] + e[1] ** 2 / h[1]) / (1 - theta) ** 2
+bounds = [square / h[i] for i in range(2)]  # on d_1^2 and d_2^2
+print("errors squared at most:", *(f"{float(bound):.2e}" for bound in bounds))
+
+# %%
+# **8. The words.** An asperity touches if its load exceeds the bound on its error. Squares spare us
+# the root.
+
+for i in range(2):
+    print(f"asperity {i + 1}: P^2 = {float(P[i] ** 2):.4f} > {float(bounds[i]):.1e}: contact")
+    assert P[i] ** 2 > bounds[i]
+
+# %%
+# That is a proof. Every line can be redone with pencil and paper. Where the proof would have failed
+# says as much: the picture shows, for all trial values, how large an error the certificate would
+# have granted, and where it would still have said "contact" of both.
+
+x, y = np.meshgrid(np.linspace(0.7, 1.1, 161), np.linspace(0.4, 0.9, 161))
+h1, h2 = float(h[0]), float(h[1])
+allowance = np.sqrt(
+    ((x**2 + y**3 / 4 - 1) ** 2 / h1 + (y**2 + x**3 / 4 - 0.6) ** 2 / h2) / (1 - float(theta)) ** 2
+)
+figure, axes = plt.subplots(figsize=(5.2, 4.2), layout="constrained")
+lines = axes.contour(x, y, allowance, [0.05, 0.1, 0.2, 0.4, 0.8], colors="0.3", linewidths=0.9)
+axes.clabel(lines, fontsize=8)
+said = (x**3 > allowance / np.sqrt(h1)) & (y**3 > allowance / np.sqrt(h2))
+said &= (x <= float(b[0])) & (y <= float(b[1]))
+axes.contourf(x, y, said, [0.5, 1.5], colors="0.85")
+axes.plot(a1, a2, "ko", ms=6)
+axes.set(xlabel="trial $a_1$ [length]", ylabel="trial $a_2$ [length]")
+axes.set_title("proved distance to the solution; grey: both proved to touch", fontsize=9)
+
+# %%
+# An independent check
+# --------------------
+#
+# First, 50 digits: bisection in fractions, and the true error beside the bound. Second, the
+# package, which does the same in floating-point numbers, and counts their rounding.
+
+low, high = Fraction(0), Fraction(1)  # a_1: the second equation gives a_2^2, the first judges
+for _ in range(170):
+    middle = Fraction(int((low + high) / 2 * 2**180), 2**180)
+    square_2 = D[1] - A * middle**3
+    # a_1^2 + A a_2^3 > 1, squared so that it stays in fractions
+    rest = D[0] - middle**2
+    above = rest < 0 or (A * A * square_2**3 > rest**2)
+    low, high = (low, middle) if above else (middle, high)
+true = (low**3, D[1] - A * low**3)
+error_1 = abs(P[0] - true[0])
+print(f"true error of P_1 {float(error_1):.2e}, proved {float(bounds[0]) ** 0.5:.2e}")
+assert error_1**2 <= bounds[0]
+
+apart = 16 / (3 * np.pi)  # 1 / (pi E* r) = 1/4
+summits = np.array([[-apart / 2, 0.0], [apart / 2, 0.0]])
+heights = np.array([0.0, -0.4]) + apart**2 / 16
+scene = cr.Scene(
+    2.0, cr.Asperities(summits, 2.0, heights), cr.Material(contact_modulus=0.75, poisson_ratio=0.3)
+)
+certificate = cr.certify(scene, [float(p) for p in P], approach=1.0)
+print(certificate.scope, certificate.status, certificate.load_errors)
+assert certificate.holds
+assert float(error_1) <= certificate.load_errors[0] < 2 * float(bounds[0]) ** 0.5
+
+# %%
+# Exercise
+# --------
+#
+# A third asperity stands between them, with :math:`A_{31} = \tfrac 1 4`, :math:`A_{32} = \tfrac 1
+# 5`, asked for :math:`D_3 = \tfrac 1 5`. Prove that it is open.
+#
+# *Answer.* Its trial load is 0 and its gap :math:`g_3 = \tfrac 1 4 P_1 + \tfrac 1 5 P_2 - \tfrac 1
+# 5` is positive, so :math:`e_3 = 0`. The box gets :math:`b_3 = \tfrac{9}{20}`, and in line 5 each
+# :math:`h_i` loses the sum of its row. The error of the gap is at most the distance times
+# :math:`(\tfrac 1 {16 h_1} + \tfrac 1 {25 h_2})^{1/2}`.
+
+h3 = 2 / (3 * Fraction(9, 20))
+rows = (A + Fraction(1, 4), A + Fraction(1, 5), Fraction(1, 4) + Fraction(1, 5))
+theta_3 = max(row / stiffness for row, stiffness in zip(rows, (*h, h3), strict=True))
+square_3 = (e[0] ** 2 / h[0] + e[1] ** 2 / h[1]) / (1 - theta_3) ** 2
+gap = P[0] / 4 + P[1] / 5 - Fraction(1, 5)
+doubt = square_3 * (1 / (16 * h[0]) + 1 / (25 * h[1]))
+print(f"theta {theta_3}, gap {float(gap):.4f}, its error at most {float(doubt) ** 0.5:.1e}: open")
+assert theta_3 < 1
+assert gap > 0
+assert gap**2 > doubt
+
+
+def compare() -> list[tuple[str, float, float]]:
+    """(quantity, computed, reference): what the page says."""
+    load = cr.press(scene, approach=1.0).loads[0]
+    return [
+        ("theta", float(theta), 0.375),
+        ("theta of three", float(theta_3), 0.75),
+        ("package's load over that of 50 digits", load / float(true[0]), 1.0),
+    ]

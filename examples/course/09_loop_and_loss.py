@@ -1,0 +1,189 @@
+r"""
+9. The loop, memory, and the loss
+=================================
+
+**Claim.** Shear to and fro at constant normal load. The energy that a cycle costs can be read off
+the *indentation curve*, without any shear: it is eight :math:`c_t f^2` times the area between the
+curve and its chord. And a contact remembers its turning points, and nothing else.
+"""
+
+# %%
+# The naive form
+# --------------
+#
+# By :doc:`08_shear` all shear states are differences of pressings. With :math:`V(L)` the least
+# energy at total load :math:`L`, whose slope is the approach :math:`D_0(L)`, the loss of a cycle
+# between :math:`\pm Q` is, with :math:`L = P - Q / f`,
+#
+# .. math:: W = 8 c_t f^2 \Big\{ V(P) - V(L) - (P - L) \frac{D_0(P) + D_0(L)}{2} \Big\} .
+#
+# Two pressings; nothing could be simpler. Beside it, the sum over asperities that ``cycle``
+# reports.
+
+from itertools import pairwise
+
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+
+import convexrough as cr
+
+Array = NDArray[np.float64]
+NU, FRICTION = 0.3, 0.5
+ratio = (2 - NU) / (2 * (1 - NU))  # c_t
+
+asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+scene = cr.Scene(1.0, asperities, cr.Material(contact_modulus=1.0, poisson_ratio=NU), FRICTION)
+pressed = cr.press(scene, approach=5e-5)
+limit = FRICTION * pressed.load
+
+points = asperities.positions
+distances = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+np.fill_diagonal(distances, np.inf)
+A = 1 / (np.pi * distances)
+k = (9 / (16 * scene.relative_radii)) ** (1 / 3)
+
+
+def least_energy(contact: cr.Contact) -> float:
+    """V at its load."""
+    P = contact.loads
+    return float(0.6 * k @ P ** (5 / 3) + P @ A @ P / 2 - scene.offsets @ P)
+
+
+def naive_loss(part: float) -> float:
+    """W of a cycle of amplitude part * f P, as the formula stands."""
+    less = cr.press(scene, load=(1 - part) * pressed.load)
+    fall = least_energy(pressed) - least_energy(less)
+    trapezoid = (pressed.load - less.load) * (pressed.approach + less.approach) / 2
+    return 8 * ratio * FRICTION**2 * (fall - trapezoid)
+
+
+for part in (0.5, 1e-2, 1e-4, 1e-6):
+    cycle = cr.cycle(pressed, maximum=part * limit)
+    print(f"Q/(fP) = {part:<6g} naive {naive_loss(part): .6e}  by asperities {cycle.energy:.6e}")
+tiny = cr.cycle(pressed, maximum=1e-6 * limit)
+assert abs(naive_loss(0.5) / cr.cycle(pressed, maximum=0.5 * limit).energy - 1) < 1e-9
+assert abs(naive_loss(1e-6) / tiny.energy - 1) > 10
+
+# %%
+# Right at large amplitudes; at small ones no digit is right, and even the sign is wrong: energies
+# of size :math:`P D_0` are subtracted, and what is left is of third order in :math:`Q`. A damper
+# lives at small amplitudes.
+#
+# The repair
+# ----------
+#
+# Solve for the increments :math:`u_i = P_i - p_i`, which are small themselves, and add up losses,
+# none of which is negative: Mindlin's for an asperity in partial slip, :math:`4 f P_i s_i` for one
+# that slides by :math:`s_i`. Nothing is subtracted. That is what ``cycle`` does; it reports as
+# ``balance_defect`` how well the trapezoid form, rearranged so that it does not cancel, agrees.
+
+print(f"loss over W0 at 1e-6: {tiny.energy_normalised:.10e}, defect {tiny.balance_defect:.0e}")
+assert tiny.balance_defect < 1e-12
+
+# %%
+# The picture
+# -----------
+#
+# Left: the loop, whose area is the loss, and the smooth sphere's. Right: the indentation curve
+# between :math:`L` and :math:`P`, and its chord. The grey sliver, times :math:`8 c_t f^2`, is the
+# same loss. A straight indentation curve, as of a flat punch, would cost nothing: no slip before
+# gross sliding.
+
+half = cr.cycle(pressed, maximum=0.8 * limit)
+loop = half.loop(200)
+smooth = cr.smooth(scene, load=pressed.load)
+X0 = smooth.displacement(limit)
+figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+left.plot(loop.displacements / X0, loop.forces / limit, "k-", label="rough")
+back = smooth.branch(loop.forces[:101], 0.8 * limit)
+left.plot(
+    np.append(back, -back) / X0,
+    np.append(loop.forces[:101], -loop.forces[:101]) / limit,
+    "k--",
+    lw=0.8,
+    label="smooth sphere",
+)
+left.set(xlabel="displacement $X / X_0$ [1]", ylabel="shear force $Q / (f P)$ [1]")
+left.legend(fontsize=8)
+share = np.linspace(0.2, 1, 41)
+curve = (
+    np.array([cr.press(scene, load=x * pressed.load).approach for x in share]) / pressed.approach
+)
+chord = np.interp(share, share[[0, -1]], curve[[0, -1]])
+right.plot(share, curve, "k-", label="indentation curve $D_0(L)$")
+right.plot(share, chord, "k--", lw=0.8, label="chord")
+right.fill_between(share, chord, curve, color="0.75")
+right.set(xlabel="load $L / P$ [1]", ylabel="approach $D_0 / D_0(P)$ [1]")
+right.legend(fontsize=8)
+
+# %%
+# An independent check
+# --------------------
+#
+# The area of the sliver by Gauss's rule, from pressings alone, piece by piece between the loads at
+# which a ring begins to touch; and the area of the loop as a polygon, which lies inside it.
+
+onsets = np.unique((1 - cr.onset_of_sliding(pressed) / limit).round(12))
+ends = np.concatenate(([0.2], onsets[(onsets > 0.2) & (onsets < 1)], [1.0]))
+nodes, weights = np.polynomial.legendre.leggauss(12)
+area = 0.0
+for low, high in pairwise(ends):
+    loads = (low + (high - low) * (nodes + 1) / 2) * pressed.load
+    area += (
+        float(weights @ [cr.press(scene, load=load).approach for load in loads]) * (high - low) / 2
+    )
+first = cr.press(scene, load=0.2 * pressed.load).approach
+sliver = pressed.load * (area - 0.8 * (first + pressed.approach) / 2)
+by_sliver = 8 * ratio * FRICTION**2 * sliver
+print(f"loss {half.energy:.9e}, sliver {by_sliver:.9e}, polygon {loop.area:.9e}")
+assert abs(by_sliver / half.energy - 1) < 1e-6
+assert 0 < half.energy - loop.area < 1e-3 * half.energy
+
+# %%
+# Memory
+# ------
+#
+# The displacement is no function of the force: at 0.3 on the way up and on the way down it differs.
+# What the contact knows of its past are the turning points; a small loop that closes wipes its own
+# two out. After the detour to 0.4 and back the path goes on as if nothing had been.
+
+plain = cr.history(pressed, forces=np.array([0.3, 0.7, 0.3, -0.5, 0.7]) * limit)
+nested = cr.history(pressed, forces=np.array([0.7, -0.1, 0.4, -0.1, -0.5, 0.7]) * limit)
+up, down = plain.displacements[0], plain.displacements[2]
+print(f"X at Q/(fP) = 0.3: {up:.3e} on the way up, {down:.3e} on the way down")
+assert down > 1.3 * up
+assert abs(nested.displacements[-1] / plain.displacements[-1] - 1) < 1e-12
+assert np.allclose(nested.forces[-1], plain.forces[-1], atol=1e-12 * limit)
+lost = nested.energy[-1] - plain.energy[-1]
+inner = cr.cycle(pressed, maximum=0.4 * limit, minimum=-0.1 * limit)
+print(f"the detour costs {lost:.6e}, its loop {inner.energy:.6e}")
+
+# %%
+# Exercise
+# --------
+#
+# Halve a small amplitude. By how much does the loss fall? And what is the smooth sphere's loss at
+# small :math:`t = Q / (f P)`?
+#
+# *Answer.* By eight: the trapezoid rule is wrong by :math:`-\tfrac 1 {12} D_0'' (P - L)^3`. For the
+# sphere, expand :math:`e(t) = 1 - (1-t)^{5/3} - \tfrac{5 t}{6} [1 + (1-t)^{2/3}]`: the terms in
+# :math:`t` and :math:`t^2` cancel, and :math:`e = \tfrac 5 {162} t^3 + \dots`
+
+small, smaller = (cr.cycle(pressed, maximum=part * limit) for part in (2e-4, 1e-4))
+print(f"halved: {small.energy / smaller.energy:.4f}")
+print(f"sphere: {tiny.smooth_normalised / 1e-18 * 162:.6f} / 162")
+assert abs(small.energy / smaller.energy - 8) < 0.01
+
+
+def compare() -> list[tuple[str, float, float]]:
+    """(quantity, computed, reference): what the page says."""
+    return [
+        ("loss of the detour over that of its loop", float(lost / inner.energy), 1.0),
+        (
+            "smooth loss at 1e-6 over 5/162 t^3, to 5 digits",
+            round(tiny.smooth_normalised / 1e-18 * 162 / 5, 5),
+            1.0,
+        ),
+        ("loss over W0 at 1e-6, in 1e-20", round(tiny.energy_normalised * 1e20, 8), 2.01107187),
+    ]

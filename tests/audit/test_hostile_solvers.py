@@ -1,0 +1,146 @@
+"""Solvers that lie: wrong, negative, missing or late answers with the status "optimal"."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_scenes import FRICTION, lengths, pressed
+from scenes import NAMED, PAPER_APPROACH, paper, reference
+from word_audit import Tally, require
+
+import convexrough as cr
+from convexrough import FrictionNewton, shear_vector
+from convexrough.solvers import Newton
+
+Spoil = Callable[[Any, np.random.Generator], Any]
+
+
+@dataclass(frozen=True)
+class Liar:
+    """Newton's answer, spoiled; everything else that it says is kept."""
+
+    spoil: Spoil
+    seed: int = 0
+    name: str = "liar"
+
+    def solve(self, problem: Any, start: Any = None, announce: Any = None) -> Any:
+        honest = Newton().solve(problem, start, announce)
+        rng = np.random.default_rng(self.seed)
+        return replace(honest, loads=self.spoil(honest.loads.copy(), rng))
+
+
+def put(value: float) -> Spoil:
+    def spoil(loads: Any, rng: np.random.Generator) -> Any:
+        loads[rng.integers(len(loads))] = value
+        return loads
+
+    return spoil
+
+
+NO_LOADS: dict[str, Spoil] = {
+    "nan": put(np.nan),
+    "inf": put(np.inf),
+    "negative": put(-1e-3),
+    "a little negative": put(-1e-25),
+    "one too few": lambda loads, rng: loads[:-1],
+    "one too many": lambda loads, rng: np.append(loads, 0.0),
+    "huge": lambda loads, rng: loads * 1e300,
+    "complex": lambda loads, rng: loads * (1 + 1j),
+    "words": lambda loads, rng: np.full(len(loads), "optimal"),
+}
+
+WRONG: dict[str, Spoil] = {
+    "zero in one place": put(0.0),
+    "something in one place": put(1e-3),
+    "scaled": lambda loads, rng: loads * (1 + 10.0 ** rng.uniform(-12, 2)),
+    "noise": lambda loads, rng: loads * rng.lognormal(0, 10.0 ** rng.uniform(-12, 0), len(loads)),
+    "swapped": lambda loads, rng: rng.permutation(loads),
+    "even": lambda loads, rng: np.full(len(loads), loads.mean()),
+    "late: of another scene": lambda loads, rng: loads**2 * 3,
+    "single": lambda loads, rng: loads.astype(np.float32),
+}
+
+CONTROLS = [{"approach": PAPER_APPROACH}, {"load": 2e-7}]
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=["approach", "load"])
+@pytest.mark.parametrize("kind", NO_LOADS)
+def test_what_are_no_loads_is_an_error(kind: str, control: Any) -> None:
+    with pytest.raises(cr.SolverError, match="liar: no loads were found: loads"):
+        cr.press(paper(), **control, solver=Liar(NO_LOADS[kind]))
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=["approach", "load"])
+@pytest.mark.parametrize("kind", WRONG)
+@pytest.mark.parametrize("name", ["paper", "rough, closest"])
+def test_wrong_loads_are_never_called_right(name: str, kind: str, control: Any) -> None:
+    """By bounds that hold for them all the same, and not by luck: twenty each."""
+    scene, _ = NAMED[name]
+    exact, tally = reference(scene, **control), Tally()
+    for seed in range(20):
+        contact = cr.press(scene, **control, solver=Liar(WRONG[kind], seed))
+        proof = contact.certificate
+        tally.compare("dense", "load", proof.load_errors, contact.loads, exact.loads)
+        tally.compare("dense", "gap", proof.gap_errors, proof.gaps, exact.gaps)
+        for word, load, gap in zip(proof.status, exact.loads, exact.gaps, strict=True):
+            require(word != "contact" or load > 0, "contact of an open asperity")
+            require(word != "open" or gap > 0, "open of one that touches")
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=["approach", "load"])
+@pytest.mark.parametrize("approach", [0.0, 1.0, np.nan, np.inf, -1e300])
+def test_an_approach_that_the_loads_exclude_is_not_reported(approach: float, control: Any) -> None:
+    class Far(Liar):
+        def solve(self, problem: Any, start: Any = None, announce: Any = None) -> Any:
+            return replace(Newton().solve(problem, start, announce), approach=approach)
+
+    honest = cr.press(paper(), **control)
+    contact = cr.press(paper(), **control, solver=Far(put(0.0)))
+    assert contact.approach == pytest.approx(honest.approach, rel=1e-12)
+
+
+@dataclass(frozen=True)
+class VectorLiar:
+    spoil: Callable[[Any, np.random.Generator], Any]
+    seed: int = 0
+    name: str = "liar"
+
+    def solve(self, problem: Any, total: Any) -> Any:
+        return self.spoil(FrictionNewton().solve(problem, total), np.random.default_rng(self.seed))
+
+
+@pytest.mark.parametrize("field", ["increments", "slips", "rise"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_are_no_forces_is_an_error(field: str, value: float) -> None:
+    def spoil(state: Any, rng: np.random.Generator) -> Any:
+        values = getattr(state, field).copy()
+        values.flat[0] = value
+        return state._replace(**{field: values})
+
+    contact = pressed("paper")
+    with pytest.raises(cr.SolverError, match=r"liar: no .* were found"):
+        shear_vector(contact, force=0.3 * FRICTION * contact.load, solver=VectorLiar(spoil))
+
+
+@pytest.mark.parametrize("field", ["increments", "slips", "rise", "total"])
+def test_wrong_forces_are_never_called_right(field: str) -> None:
+    contact = pressed("paper")
+    force = 0.5 * FRICTION * contact.load
+    truth = shear_vector(contact, force=force)
+    sliding = lengths(truth.slips) > 0
+
+    def spoil(state: Any, rng: np.random.Generator) -> Any:
+        values = getattr(state, field)
+        size = 10.0 ** rng.uniform(-14, 1)
+        return state._replace(**{field: values * (1 + size * rng.standard_normal(values.shape))})
+
+    for seed in range(40):
+        state = shear_vector(contact, force=force, solver=VectorLiar(spoil, seed))
+        proof, known = state.certificate, truth.certificate
+        off = lengths(state.forces - truth.forces)
+        assert (off <= proof.force_errors + known.force_errors).all()
+        assert (lengths(state.slips - truth.slips) <= proof.slip_errors + known.slip_errors).all()
+        assert not (state.status[~sliding] == "sliding").any()
+        assert not (state.status[sliding] == "partial").any()

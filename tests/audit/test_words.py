@@ -1,0 +1,54 @@
+"""The word audit: some hundred scenes by default, ten thousand with --full."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import word_audit
+from word_audit import Wrong, audit, draw, report
+
+import convexrough as cr
+
+
+def test_every_word_and_bound(pytestconfig: pytest.Config) -> None:
+    tally = audit(range(10_000 if pytestconfig.getoption("--full") else 180))
+    judged = tally.scenes - tally.refused - tally.unsolved
+    assert judged > 0.75 * tally.scenes
+    assert {kind for kind, _, _ in tally.words} == {*word_audit.KINDS, "limit"}
+    usual = [
+        seen
+        for (kind, _, stage), seen in tally.words.items()
+        if kind in ("usual", "units") and stage != "vector"
+    ]
+    words, undecided = np.sum(usual, axis=0)
+    assert undecided <= 0.01 * words
+    assert report(tally).count("|") > 100
+
+
+@pytest.mark.parametrize("kind", ["word", "load", "approach"])
+def test_the_audit_finds_what_is_wrong(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    press = cr.press
+
+    def lying(*arguments: Any, **options: Any) -> cr.Contact:
+        contact = press(*arguments, **options)
+        proof = contact.certificate
+        if kind == "word":
+            words = np.where(proof.status == "contact", "open", proof.status)
+            proof = replace(proof, status=words)
+        elif kind == "load":
+            proof = replace(proof, load_errors=1e-4 * proof.load_errors)
+        else:
+            proof = replace(proof, approach=proof.approach * (1 + 1e-9))
+        return replace(contact, certificate=proof)
+
+    monkeypatch.setattr(cr, "press", lying)
+    with pytest.raises(Wrong, match="seed"):
+        audit(range(24))
+
+
+def test_scenes_are_drawn_again() -> None:
+    for seed in range(12):
+        (kind, one, approach), (again, other, same) = draw(seed), draw(seed)
+        assert (kind, approach) == (again, same)
+        assert (one.asperities.positions == other.asperities.positions).all()

@@ -1,0 +1,85 @@
+"""Numbers whose products float64 cannot hold: refused, and never a wrong word."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scenes import MATERIAL
+
+import convexrough as cr
+from convexrough.influence.dense import DenseInfluence
+from convexrough.normal.units import Units
+from convexrough.scene.lattice import Lattice
+
+HEXAGON = cr.Asperities.hexagonal(spacing=0.25, tip_radius=1.0, within=0.5).positions
+
+
+@pytest.mark.parametrize("size", [1e-61, 1e-130, 1e-160])
+def test_coordinates_too_small(size: float) -> None:
+    with pytest.raises(cr.InputError, match=r"positions: found asperities .* at a distance of"):
+        cr.Asperities(HEXAGON * size, 1.0)
+
+
+@pytest.mark.parametrize("size", [1e-61, 1e-130, 5e-324])
+def test_tip_radii_and_heights_too_small(size: float) -> None:
+    with pytest.raises(cr.InputError, match=r"tip_radii\[1\]: found .* choose other units"):
+        cr.Asperities([[0, 0], [1, 0]], [1.0, size])
+    with pytest.raises(cr.InputError, match=r"heights\[0\]: found .* choose other units"):
+        cr.Asperities([[0, 0], [1, 0]], 1.0, [-size, 0.0])
+
+
+@pytest.mark.parametrize("exponent", [-59, -70, -82, -100, -140])
+def test_contact_points_too_near_to_each_other(exponent: int) -> None:
+    """Reached by "closest" from positions of a good size: no word, and no search without end."""
+    points = HEXAGON * 10.0**exponent
+    lattice = Lattice.through(points)
+    assert (lattice is None) == (exponent < -59)
+    if exponent < -59:
+        positions = HEXAGON * 1e-30
+        asperities = cr.Asperities(positions, 10.0 ** min(-40 - exponent, 59))
+        with pytest.raises(cr.InputError, match=r"at a distance of .* choose other units"):
+            cr.Scene(1e-10, asperities, MATERIAL, geometry="closest")
+
+
+def test_near_points_among_far_ones_on_no_lattice() -> None:
+    points = np.array([[0.0, 0.0], [1e-59, 0.0], [0.0, 1e-59], [1.0, 0.3], [0.2, 0.9]])
+    assert Lattice.through(points) is None
+
+
+SIZES = (1e-60, 1e-20, 1e20, 1e60)
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+@pytest.mark.parametrize("modulus", [1e-60, 1.0, 1e60])
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of float64's range, which is the point
+def test_extremes_are_answered_or_refused(modulus: float, geometry: str, control: str) -> None:
+    """Never ZeroDivisionError: of sums in the bound on the approach, above all."""
+    for radius, tip, size, given in itertools.product(SIZES, SIZES, (1e-57, 1e57), SIZES):
+        try:
+            scene = cr.Scene(
+                radius,
+                cr.Asperities(HEXAGON * size, tip),
+                cr.Material(modulus, 0.3),
+                0.5,
+                "closest" if geometry == "closest" else "summit",
+            )
+            contact = cr.press(scene, **{control: given})
+        except (cr.InputError, cr.SolverError):
+            continue
+        assert ((contact.status != "contact") | (contact.loads > 0)).all()
+
+
+def test_sums_of_powers_where_the_scale_has_none() -> None:
+    """scale^3 is 0 in float64; the sums do not depend on it."""
+    small = DenseInfluence.assemble(HEXAGON, 1e-110)
+    usual = DenseInfluence.assemble(HEXAGON, 1.0)
+    for power in (2, 3):
+        one, other = (A.falloff(np.ones(len(HEXAGON)), power) for A in (small, usual))
+        np.testing.assert_allclose(one, other, rtol=1e-12)
+
+
+@pytest.mark.parametrize("approach", [0.0, np.inf, np.nan])
+def test_no_units_for_nothing(approach: float) -> None:
+    with pytest.raises(cr.InputError, match=r"scene: found indentations of .* other units"):
+        Units.of(approach, 1.0)

@@ -1,0 +1,97 @@
+"""Figures of many asperities and of many cycles, and figures in a notebook."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from drawn import discs, fits
+from matplotlib.colors import to_rgba
+from scenes import MATERIAL, PAPER_APPROACH, paper
+
+import convexrough as cr
+from convexrough import plots
+from convexrough.plots.shear import SLIDING
+
+
+@cache
+def dense() -> cr.Contact:
+    asperities = cr.Asperities.hexagonal(
+        spacing=2e-4, tip_radius=1.6e-3, within=8.5e-3, height_std=2e-7, seed=3
+    )
+    return cr.press(cr.Scene(1.0, asperities, MATERIAL, friction=0.5), approach=PAPER_APPROACH)
+
+
+@cache
+def few() -> cr.Contact:
+    scene = paper()
+    return cr.press(
+        cr.Scene(1.0, scene.asperities, MATERIAL, friction=0.5), approach=PAPER_APPROACH
+    )
+
+
+def test_the_scene_is_dense() -> None:
+    assert np.count_nonzero(dense().loads) > 3000
+
+
+def test_a_dense_stick_slip_map_is_a_mosaic() -> None:
+    contact = dense()
+    state = cr.shear(contact, force=0.25 * contact.load)
+    figure = plots.shear_figures([state])["stick_slip"]
+    fits(figure)
+    (axes,) = figure.axes
+    assert not any(discs(axes, word) for word in ("sliding", "stick", "slip"))
+    (image,) = axes.images
+    colours = np.asarray(image.get_array())
+    shown = colours[..., 3] > 0.5
+    dark = np.abs(colours - to_rgba(SLIDING)).max(axis=-1) < 0.02
+    sliding = (state.status == "sliding").sum() / np.count_nonzero(contact.loads)
+    assert dark.sum() / shown.sum() == pytest.approx(sliding, abs=0.05)  # cells of one size
+
+
+def test_a_dense_profile_is_density_and_median() -> None:
+    contact = dense()
+    figures = plots.press_figures(contact, length_unit="mm", force_unit="N")
+    for figure in figures.values():
+        fits(figure)
+    _, profile, _ = figures["pressure"].axes
+    words = {line.get_label() for line in profile.lines}
+    assert words == {"their median", "smooth sphere"}
+    (axes,) = figures["loads"].axes
+    (median,) = [line for line in axes.lines if line.get_label() == "their median"]
+    r, share = (np.asarray(v, dtype=float) for v in median.get_data())
+    a_H = cr.smooth(contact.scene, load=contact.load).contact_radius
+    here = contact.loads > 0
+    near = here & (np.abs(contact.scene.asperities.distances / a_H - 0.5) < 0.02)
+    expected = 100 * np.median(contact.loads[near]) / contact.load
+    assert np.interp(0.5, r, share) == pytest.approx(expected, rel=0.05)
+
+
+def test_some_of_many_cycles_are_drawn_and_named() -> None:
+    contact = few()
+    parts = [0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]
+    cycles = cr.cycles(contact, np.array(parts) * 0.5 * contact.load)
+    figure = plots.cycle_figures(cycles)["hysteresis"]
+    fits(figure)
+    whole, upright, _ = figure.axes
+    assert [text.get_text() for text in upright.texts] == ["±0.2", "±0.4", "±0.7", "±0.9"]
+    assert whole.get_title(loc="left") == "whole contact: 4 of 13 cycles"
+    assert len(whole.lines) == 8
+
+
+def test_loops_at_hand_are_drawn_as_they_are() -> None:
+    contact = few()
+    cycles = cr.cycles(contact, np.array([0.2, 0.5]) * 0.5 * contact.load)
+    loops = cr.loops(cycles, 30, asperities=[0, 1, 31])
+    whole, _, single = plots.cycle_figures(cycles, loops=loops)["hysteresis"].axes
+    assert [len(line.get_xdata()) for line in whole.lines[::2]] == [  # type: ignore[arg-type]
+        len(loop.forces) for loop in loops
+    ]
+    assert len(single.get_legend().get_texts()) == 3  # type: ignore[union-attr]
+
+
+def test_figures_show_themselves_in_a_notebook() -> None:
+    figures = plots.press_figures(few())
+    page: Any = figures._repr_html_()
+    assert page.count('src="data:image/png;base64,') == 2
+    assert figures["pressure"]._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]

@@ -1,0 +1,344 @@
+"""Forged proof files: whatever the checker accepts is true by the 50-digit reference.
+
+2,000 forgeries by default; for more, CONVEXROUGH_FORGERIES=20000 pytest tests/proof/test_attack.py
+"""
+
+import json
+import os
+import random
+from collections import Counter
+from collections.abc import Callable
+from copy import deepcopy
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import proof_oracle
+import scenes
+
+import convexrough as cr
+from convexrough import checker
+
+FORGERIES = int(os.environ.get("CONVEXROUGH_FORGERIES", "2000"))
+
+Place = tuple[Any, ...]
+Forgery = Callable[[random.Random, Any], Any]
+
+
+@cache
+def honest() -> list[Any]:
+    """Small proofs of every kind: controls, geometries, arguments, scopes, friction, a graze."""
+    six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
+    heights = [0, -2e-6, -4e-6, -6e-6, -1e-5, -1.5e-5, -3e-5]  # the last is open
+    ring = cr.Asperities(0.0025 * np.array([[0, 0], *six]), 0.02, heights)
+    proofs = []
+    for geometry, friction in (("summit", 0.5), ("closest", None)):
+        scene = cr.Scene(1.0, ring, scenes.MATERIAL, friction=friction, geometry=geometry)
+        contact = cr.press(scene, approach=2e-5)
+        for each in (contact, cr.press(scene, load=contact.load)):
+            forces = [0.3 * friction * each.load, 0.9 * friction * each.load] if friction else []
+            proofs.append(each.proof(sheared=[cr.shear(each, force=Q) for Q in forces]))
+    proofs += [grazing().proof(), crowded(3, 5, 1.9, 0.5).proof(), crowded(9, 6, 2.2, 0.1).proof()]
+    documents = [json.loads(json.dumps(proof.document)) for proof in proofs]
+    assert {document["argument"]["shells"] is None for document in documents} == {True, False}
+    assert {document["claims"]["scope"] for document in documents} == {"global", "local"}
+    words = {word for document in documents for word in words_of(document["claims"])}
+    assert words == {"contact", "open", "undecided", "sliding", "partial"}
+    return documents
+
+
+def words_of(claims: Any) -> set[str]:
+    return {word for table in (claims, *claims["shear"]) for word in table["status"]}
+
+
+def grazing() -> cr.Contact:
+    """The middle of three touches by less than a roundoff of the approach, if at all."""
+    points = np.array([[0.0, 0.0], [0.003, 0.0], [-0.003, 0.0]])
+
+    def pressed(height: float) -> cr.Contact:
+        asperities = cr.Asperities(points, 0.02, [height, 0.0, 0.0])
+        return cr.press(cr.Scene(1.0, asperities, scenes.MATERIAL), approach=3e-5)
+
+    low, high = -3e-5, 0.0
+    for _ in range(80):
+        middle = (low + high) / 2
+        low, high = (middle, high) if pressed(middle).loads[0] == 0 else (low, middle)
+    return pressed(high)
+
+
+def crowded(*drawn: float) -> cr.Contact:
+    scene, approach = scenes.scattered(*drawn)
+    return cr.press(scene, approach=approach)
+
+
+def leaves(tree: Any, at: Place = ()) -> list[Place]:
+    """Where the strings are."""
+    if isinstance(tree, str):
+        return [at]
+    items = (
+        tree.items()
+        if isinstance(tree, dict)
+        else enumerate(tree)
+        if isinstance(tree, list)
+        else ()
+    )
+    return [path for key, value in items for path in leaves(value, (*at, key))]
+
+
+def look(tree: Any, path: Place) -> Any:
+    for key in path:
+        tree = tree[key]
+    return tree
+
+
+def put(tree: Any, path: Place, value: Any) -> None:
+    look(tree, path[:-1])[path[-1]] = value
+
+
+def a_number(rng: random.Random, document: Any, *under: str) -> Place:
+    start = look(document, under)
+    return rng.choice([(*under, *p) for p in leaves(start) if "0x" in look(start, p)])
+
+
+def one_digit(rng: random.Random, document: Any) -> Any:
+    path = a_number(rng, document)
+    text = look(document, path)
+    place = rng.randrange(len(text))
+    put(document, path, text[:place] + rng.choice("0123456789abcdef-+px.") + text[place + 1 :])
+    return document
+
+
+def one_number(rng: random.Random, document: Any, *under: str) -> Any:
+    path = a_number(rng, document, *under)
+    value = float.fromhex(look(document, path))
+    change = 2.0 ** rng.uniform(-60, 2) * rng.choice([1, -1])
+    changed = value * (1 + change) if value else change * 1e-9
+    if changed == value:
+        changed = float(np.nextafter(value, rng.choice([-np.inf, np.inf])))
+    put(document, path, changed.hex())
+    return document
+
+
+def one_claim(rng: random.Random, document: Any) -> Any:
+    return one_number(rng, document, "claims")
+
+
+def tighter_bound(rng: random.Random, document: Any) -> Any:
+    """By less than its width: what is left may still hold the truth, and may not be proved."""
+    path = a_number(rng, document, "claims")[:-1]
+    low, high = (float.fromhex(text) for text in look(document, path))
+    cut = rng.choice([0.01, 0.3, 0.6, 0.99]) * (high - low)
+    low, high = rng.choice([(low + cut, high), (low, high - cut), (high, high), (high, low)])
+    put(document, path, [low.hex(), high.hex()])
+    return document
+
+
+def one_word(rng: random.Random, document: Any) -> Any:
+    words = ("contact", "open", "undecided", "sliding", "partial", "global", "local", "")
+    claims = document["claims"]
+    path = rng.choice([p for p in leaves(claims) if look(claims, p) in words])
+    put(claims, path, rng.choice(words))
+    return document
+
+
+def several_words(rng: random.Random, document: Any) -> Any:
+    words = document["claims"]["status"]
+    rng.shuffle(words)
+    return document
+
+
+def swapped_scene(rng: random.Random, document: Any) -> Any:
+    document["scene"] = deepcopy(rng.choice(honest())["scene"])
+    return document
+
+
+def changed_scene(rng: random.Random, document: Any) -> Any:
+    return one_number(rng, document, "scene")
+
+
+def changed_control(rng: random.Random, document: Any) -> Any:
+    if rng.random() < 0.5:
+        return one_number(rng, document, "prescribed")
+    document["prescribed"] = deepcopy(rng.choice(honest())["prescribed"])
+    return document
+
+
+def changed_box(rng: random.Random, document: Any) -> Any:
+    factor = 2.0 ** (rng.uniform(-3, 3) * rng.choice([1, 0.01]))
+    which = rng.choice(["box", "shells", "box", "one", "theta"])
+    argument = document["argument"]
+    if which == "theta" or (which == "shells" and argument["shells"] is None):
+        argument["convexity_number"] = rng.uniform(0, 1.2).hex()
+    elif which == "one":
+        put(argument["box"], (rng.randrange(len(argument["box"])),), (0.0).hex())
+    else:
+        argument[which] = [(factor * float.fromhex(text)).hex() for text in argument[which]]
+    return document
+
+
+def changed_radii(rng: random.Random, document: Any) -> Any:
+    place = rng.choice([document["pressed"], *document["sheared"]])
+    radii = place["radii"]
+    if rng.random() < 0.3:
+        rng.shuffle(radii)
+    else:
+        radii[rng.randrange(len(radii))] = rng.choice(
+            [(0.0).hex(), rng.choice(radii), (1e-3).hex()]
+        )
+    return document
+
+
+def changed_friction(rng: random.Random, document: Any) -> Any:
+    if not document["sheared"]:
+        document["sheared"] = deepcopy(honest()[0]["sheared"])
+        document["claims"]["shear"] = deepcopy(honest()[0]["claims"]["shear"])
+        return document
+    entries = document["sheared"]
+    what = rng.choice(["order", "fewer", "force", "radii"])
+    if what == "order":
+        entries.reverse()
+    elif what == "fewer":
+        entries.pop()
+    elif what == "force":
+        return one_number(rng, document, "sheared", rng.randrange(len(entries)), "force")
+    else:
+        entries[0]["radii"] = document["pressed"]["radii"]
+    return document
+
+
+def no_number(rng: random.Random, document: Any) -> Any:
+    path = a_number(rng, document)
+    values: list[Any] = [
+        "nan",
+        "inf",
+        "-inf",
+        "0x1.8p+99999",
+        "0x1p-5000",
+        "1e-3",
+        "0X1.8P+1",
+        None,
+    ]
+    values += [1, 0.5, True, [], {}, "", " 0x1.0000000000000p+0", "0x1p+0", float("nan"), 10**400]
+    put(document, path, rng.choice(values))
+    return document
+
+
+def huge_number(rng: random.Random, document: Any) -> Any:
+    value = rng.choice([1.7e308, 5e-324, 1e150, 1e-150, 0.0, -0.0, -1.0])
+    put(document, a_number(rng, document), value.hex())
+    return document
+
+
+def missing_or_more(rng: random.Random, document: Any) -> Any:
+    tables = [(), *{p[:k] for p in leaves(document) for k in range(1, len(p))}]
+    place = look(document, rng.choice(sorted(tables, key=str)))
+    if isinstance(place, dict):
+        if rng.random() < 0.5:
+            place.pop(rng.choice(sorted(place)))
+        else:
+            place["note"] = "believe me"
+    elif rng.random() < 0.5:
+        place.pop()
+    else:
+        place.append(deepcopy(place[0]))
+    return document
+
+
+def another_claim(rng: random.Random, document: Any) -> Any:
+    """All that another proof claims."""
+    document["claims"] = deepcopy(rng.choice(honest())["claims"])
+    return document
+
+
+FORGED: tuple[Forgery, ...] = (
+    one_digit,
+    one_number,
+    one_claim,
+    tighter_bound,
+    one_word,
+    several_words,
+    swapped_scene,
+    changed_scene,
+    changed_control,
+    changed_box,
+    changed_radii,
+    changed_friction,
+    no_number,
+    huge_number,
+    missing_or_more,
+    another_claim,
+)
+
+
+def forged(rng: random.Random) -> tuple[str, bytes]:
+    """How, and the file: one or two forgeries, mostly under a hash that fits, at times torn."""
+    document, names = deepcopy(rng.choice(honest())), []
+    for _ in range(rng.choice([1, 1, 1, 2])):
+        forge = rng.choice(FORGED)
+        try:
+            document = forge(rng, document)
+        except (LookupError, TypeError, ValueError, AttributeError):
+            continue  # the second finds no place after the first
+        names.append(forge.__name__)
+    if rng.random() < 0.8 and {"scene", "prescribed", "sha256"} <= set(document):
+        document["sha256"] = checker.digest(document["scene"], document["prescribed"])
+        names.append("hash")
+    contents = json.dumps(document).encode()
+    if rng.random() < 0.1:
+        names.append("torn")
+        contents = torn(rng, contents)
+    return "+".join(names), contents
+
+
+def torn(rng: random.Random, contents: bytes) -> bytes:
+    place = rng.randrange(len(contents))
+    return rng.choice(
+        [
+            contents[:place],
+            contents[:place] + bytes([rng.randrange(256)]) + contents[place + 1 :],
+            contents[:place] + contents[place + 1 :],
+            contents + b"{}",
+            b"\xef\xbb\xbf" + contents,
+            contents[:-1] + b', "claims": {}}',
+            b"[" * 100000,
+        ]
+    )
+
+
+def judge(seed: int, folder: Path) -> str:
+    """What the checker says of a forgery; the forgery must be true if it accepts."""
+    rng = random.Random(seed)
+    how, contents = forged(rng)
+    path = folder / "proof.json"
+    path.write_bytes(contents)
+    status = checker.main([str(path)])
+    if status == 0:
+        document = json.loads(contents)
+        assert not proof_oracle.false_claims(document), (seed, how)
+    assert status in (0, 1, 2)
+    return ("accepted", "refused", "unreadable")[status]
+
+
+def test_no_forgery_that_is_accepted_claims_something_false(tmp_path: Path) -> None:
+    outcomes = Counter(judge(seed, tmp_path) for seed in range(FORGERIES))
+    assert all(outcomes[what] > FORGERIES / 50 for what in ("accepted", "refused", "unreadable"))
+    print(outcomes)
+
+
+def test_the_judge_would_see_it() -> None:
+    """Every kind of false claim, judged without the checker."""
+    document = deepcopy(honest()[0])
+    assert not proof_oracle.false_claims(document)
+    claims = document["claims"]
+    for place, key in (
+        (claims, "load"),
+        (claims["loads"], 1),
+        (claims["gaps"], 0),
+        (claims["shear"][0], "energy"),
+    ):
+        kept, place[key] = place[key], [(1e-3).hex(), (2e-3).hex()]
+        assert proof_oracle.false_claims(document)
+        place[key] = kept
+    claims["status"][1] = "open"
+    assert proof_oracle.false_claims(document) == ["asperity 1 is contact, not open"]

@@ -1,0 +1,325 @@
+"""The checker by itself: what it imports, its arithmetic, its answers."""
+
+import ast
+import json
+import math
+import random
+import subprocess
+import sys
+from copy import deepcopy
+from fractions import Fraction
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import proof_oracle
+import pytest
+import scenes
+from flint import arb, ctx, fmpq
+
+import convexrough as cr
+from convexrough import checker
+from convexrough.checker import Interval, Refused
+
+SOURCE = Path(checker.__file__)
+
+
+def test_it_imports_the_standard_library_only() -> None:
+    for node in ast.walk(ast.parse(SOURCE.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            names = [node.module or ""]
+        else:
+            assert not isinstance(node, ast.Constant) or not isinstance(node.value, float)
+            continue
+        assert {name.split(".")[0] for name in names} <= sys.stdlib_module_names
+
+
+@pytest.fixture(scope="module")
+def document() -> Any:
+    scene, approach = scenes.NAMED["paper"]
+    return json.loads(json.dumps(cr.press(scene, approach=approach).proof().document))
+
+
+def alone(path: Path) -> subprocess.CompletedProcess[str]:
+    """Without site packages, without environment: as on a stranger's machine."""
+    copy = path.parent / "checker.py"
+    copy.write_bytes(SOURCE.read_bytes())
+    command = [sys.executable, "-I", "-S", str(copy), str(path)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_it_runs_alone(document: Any, tmp_path: Path) -> None:
+    path = tmp_path / "proof.json"
+    path.write_text(json.dumps(document))
+    said = alone(path)
+    assert (said.returncode, said.stderr) == (0, "")
+    assert said.stdout.startswith(
+        "proved: under the approach 5e-05 there is a solution, the only one"
+    )
+    assert "37 contact, 24 open, 0 undecided" in said.stdout
+    assert said.stdout.count("\n") == 1
+
+    document = deepcopy(document)
+    document["claims"]["status"][60] = "contact"
+    path.write_text(json.dumps(document))
+    said = alone(path)
+    assert (said.returncode, said.stdout) == (1, "")
+    assert said.stderr == "refused: claims status [60]: claimed 'contact', proved 'open'\n"
+
+    path.write_text(json.dumps(document)[:-1])
+    said = alone(path)
+    assert (said.returncode, said.stdout) == (2, "")
+    assert said.stderr.startswith("unreadable: ")
+    assert alone(tmp_path / "none.json").returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("contents", "reason"),
+    [
+        (b"", "JSONDecodeError"),
+        (b"\xff\xfe", "UnicodeDecodeError"),
+        (b"[" * 100_000, "RecursionError"),
+        (b"[]", "expected a table"),
+        (b'{"format": 1}', "the number 1: numbers are strings"),
+        (b'{"format": NaN}', "the number NaN"),
+        (b'{"format": "", "format": ""}', "a key is there twice"),
+        (b'{"format": ""}', "expected a table of format, scene"),
+        (b" " * (checker.MOST_BYTES + 1), "more than"),
+    ],
+)
+def test_unreadable(
+    contents: bytes, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "proof.json"
+    path.write_bytes(contents)
+    assert checker.main([str(path)]) == 2
+    assert reason in capsys.readouterr().err
+
+
+def test_more_than_one_file_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert checker.main(["a", "b"]) == 2
+    assert "usage" in capsys.readouterr().err
+
+
+def test_larger_scenes_are_refused(document: Any) -> None:
+    scene = deepcopy(document["scene"])
+    for name in ("x", "y", "heights", "tip_radii"):
+        scene[name] = [scene[name][0]] * (checker.MOST_ASPERITIES + 1)
+    with pytest.raises(Refused, match="3001 asperities"):
+        checker.read_scene(scene)
+
+
+def test_a_hash_that_was_kept_is_refused(document: Any) -> None:
+    document = deepcopy(document)
+    document["scene"]["heights"][0] = (1e-30).hex()
+    with pytest.raises(Refused, match="sha256"):
+        checker.check(document, lambda line: None)
+
+
+def proof_of(scene: cr.Scene, approach: float, **more: Any) -> Any:
+    return json.loads(json.dumps(cr.press(scene, approach=approach).proof(**more).document))
+
+
+def scaled(values: list[str], factor: float) -> list[str]:
+    return [(factor * float.fromhex(text)).hex() for text in values]
+
+
+def refused(document: Any, reason: str, **changes: Any) -> None:
+    """That the checker refuses a proof, changed at the keys named a__b__c, for this reason."""
+    document = deepcopy(document)
+    for keys, value in changes.items():
+        *path, last = (int(key) if key.isdigit() else key for key in keys.split("__"))
+        place = document
+        for key in path:
+            place = place[key]
+        place[last] = value
+    with pytest.raises(Refused, match=reason):
+        checker.check(document, lambda line: None)
+
+
+def test_boxes_and_shells_that_prove_nothing_are_refused(document: Any) -> None:
+    argument, radii = document["argument"], document["pressed"]["radii"]
+    refused(document, "may be outside the box", argument__box__0=radii[0])
+    refused(document, "outside the box", argument__box__0=(0.0).hex())
+    refused(document, "too small for its box", argument__shells=scaled(argument["shells"], 0.9))
+    refused(document, "overlaps another", argument__shells=scaled(argument["shells"], 1.001))
+    refused(document, "convexity number", argument__convexity_number=(1.0).hex())
+    wide = {"argument__box": scaled(argument["box"], 4.0), "argument__shells": None}
+    refused(document, "breaks down", **wide, argument__convexity_number=(0.999).hex())
+    refused(document, "not the one prescribed", pressed__approach=(5.0001e-5).hex())
+
+
+def test_who_could_touch_may_not_be_left_out() -> None:
+    scene, approach = scenes.scattered(1, 6, 0.7, 0.3)
+    document = proof_of(scene, approach)
+    assert document["claims"]["status"][5] == "open"
+    refused(document, "left out", argument__box__5=(0.0).hex())
+
+
+def test_a_local_proof_is_not_a_global_one() -> None:
+    document = proof_of(*scenes.scattered(9, 6, 2.2, 0.1))
+    refused(document, "claimed 'global', proved 'local'", claims__scope="global")
+
+
+def test_each_end_of_each_bound_counts(document: Any) -> None:
+    claims = document["claims"]
+    for key in ("load", "loads__7", "gaps__60"):
+        name, *place = key.split("__")
+        low, high = (
+            float.fromhex(x) for x in (claims[name][int(place[0])] if place else claims[name])
+        )
+        inside = 0.3 * (high - low)
+        for bounds in ((low + inside, high), (low, high - inside), (high, low)):
+            ends = [bound.hex() for bound in bounds]
+            refused(document, "not proved to be within", **{f"claims__{key}": ends})
+
+
+def test_numbers_are_written_one_way_and_nothing_is_left_unread(document: Any) -> None:
+    for text in (
+        "0x1p+1",
+        "0x1.8p-1",
+        " 0x1.0000000000000p+0",
+        "1.0",
+        "nan",
+        "inf",
+        "0x1p99999",
+        None,
+    ):
+        changed = deepcopy(document)
+        changed["pressed"]["radii"][0] = text
+        with pytest.raises(checker.Unreadable, match="not a finite float64"):
+            checker.check(changed, lambda line: None)
+    for where in (document, document["claims"], document["argument"], document["pressed"]):
+        changed = deepcopy(where) | {"note": "believe me"}
+        with pytest.raises(checker.Unreadable, match="expected a table"):
+            checker.table(changed, *where)
+
+
+def test_an_asperity_that_is_dragged_along_is_refused() -> None:
+    """One between six blunt ones loses load as the total rises, so regains some in shear.
+
+    There Ciavarella and Jaeger's difference is no friction state.
+    """
+    six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
+    points = 0.0025 * np.array([[0, 0], *six])
+    ring = cr.Asperities(points, [0.02, *[0.1] * 6], [-1e-5, *[0.0] * 6])
+    contact = cr.press(cr.Scene(1.0, ring, scenes.MATERIAL, friction=0.5), approach=7.6e-5)
+    assert contact.proof().document["claims"]["scope"] == "global"
+    left = cr.press(contact.scene, load=0.99 * contact.load)
+    assert left.loads[0] > contact.loads[0]
+    travel = 0.5 * 1.7 / 1.4
+    state = SimpleNamespace(
+        force=0.01 * 0.5 * contact.load,
+        displacement=travel * (contact.approach - left.approach),
+        stick_radii=left.contact_radii,
+    )
+    with pytest.raises(cr.ProofError, match="dragged along"):
+        contact.proof(sheared=[state])
+
+
+def exact(x: Fraction) -> arb:
+    return arb(fmpq(x.numerator, x.denominator))
+
+
+def test_intervals_hold_what_they_should() -> None:
+    rng = random.Random(1)
+
+    def drawn() -> Fraction:
+        size = Fraction(2) ** rng.randrange(-400, 400)
+        return Fraction(rng.randrange(-(10**50), 10**50), rng.randrange(1, 10**50)) * size
+
+    for _ in range(300):
+        x, y = drawn(), drawn()
+        a, b = Interval(x), Interval(min(y, y / 3), max(y, y / 3))
+        for held, value in ((a + b, x + y), (a - b, x - y), (a * b, x * y)):
+            assert held.low <= value <= held.high
+        assert (Interval(x) / abs(y)).low <= x / abs(y) <= (Interval(x) / abs(y)).high
+        assert a.high - a.low <= abs(x) / 2**126
+        root = Interval(abs(x)).root()
+        assert root.low**2 <= abs(x) <= root.high**2
+        assert root.high - root.low <= root.high / 2**120
+    with pytest.raises(Refused, match="may be 0"):
+        Interval(1) / Interval(-1, 1)
+
+
+def test_pi() -> None:
+    with ctx.workdps(60):
+        assert exact(checker.PI.low) < arb.pi() < exact(checker.PI.high)
+
+
+def test_distances_hold_the_true_ones() -> None:
+    scene, _ = scenes.scattered(5, 12, 0.5, 0.5)
+    scene = cr.Scene(scene.sphere_radius, scene.asperities, scene.material, geometry="closest")
+    read = checker.read_scene(cr.press(scene, approach=1e-9).proof().document["scene"])
+    R, tips = Fraction(scene.sphere_radius), [Fraction(t) for t in scene.asperities.tip_radii]
+    points = [
+        [Fraction(float(p)) * R / (R + t) for p in point]
+        for point, t in zip(scene.asperities.positions, tips, strict=True)
+    ]
+    for i, apart in checker.distances(read, list(range(12)), lambda line: None):
+        for j, m in enumerate(apart):
+            square = sum((p - q) ** 2 for p, q in zip(points[i], points[j], strict=True))
+            assert i == j or (m - 2) ** 2 < square * read.grid**2 < (m + 3) ** 2
+
+
+def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
+    scene, _ = scenes.scattered(11, 12, 0.5, 0.5)
+    read = checker.read_scene(cr.press(scene, approach=1e-9).proof().document["scene"])
+    radii = np.random.default_rng(0).uniform(0.1, 1, 12)
+    points = scene.contact_points
+    apart = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
+    np.fill_diagonal(apart, np.inf)
+    root = np.sqrt(2 * radii)
+    end = -1 / np.linalg.eigvalsh(root[:, None] / (np.pi * apart) * root).min()
+    for factor, definite in ((0.5, True), (1 - 1e-12, True), (1 + 1e-12, False), (2, False)):
+        given = [Fraction(float(radius * end * factor)) for radius in radii]
+        try:
+            checker.prove_definite(read, given, list(range(12)), lambda line: None)
+            assert definite
+        except Refused:
+            assert not definite
+
+
+def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
+    """Deep in two neighbours: one carries all and keeps the other open, or the other way round."""
+    depth, apart = 1.0, 1.0
+    scene = cr.Scene(1e30, cr.Asperities([[0, 0], [apart, 0]], 9.0), scenes.MATERIAL)
+    radius = float(scene.relative_radii[0])
+    a = math.sqrt(radius * depth)
+    assert a > 3 * math.pi / 4 * apart  # then it pushes the other down by more than the approach
+    trivial = cr.press(scene, approach=1e-9).proof().document
+    for first, second in ((a, 0.0), (0.0, a)):
+        box = [max(1.01 * x, 0.3).hex() for x in (first, second)]
+        document = deepcopy(trivial) | {
+            "prescribed": {"approach": depth.hex()},
+            "argument": {"box": box, "convexity_number": (0.99).hex(), "shells": None},
+            "pressed": {"radii": [first.hex(), second.hex()], "approach": depth.hex()},
+        }
+        document["sha256"] = checker.digest(document["scene"], document["prescribed"])
+        proved = checker.prove(document, lambda line: None)
+        assert proved["scope"] == "local"
+        assert proved["status"] == ["contact" if x else "open" for x in (first, second)]
+        wide = [(1.01 * a).hex()] * 2
+        document["argument"] |= {"box": wide}
+        with pytest.raises(Refused, match="breaks down"):
+            checker.prove(document, lambda line: None)
+
+
+def test_the_oracle_knows_the_loss_of_one_sphere() -> None:
+    """[16] of the source, doubled: (9 (2 - nu) f^2 P^2 / (5 G a)) e(t)."""
+    scene = cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), scenes.MATERIAL, friction=0.5)
+    contact = cr.press(scene, approach=1e-5)
+    claims = contact.proof(sheared=[cr.shear(contact, force=0.25 * contact.load)]).document[
+        "claims"
+    ]
+    nu, G, a, P = 0.3, scene.material.shear_modulus, contact.contact_radii[0], contact.load
+    e = 1 - 0.5 ** (5 / 3) - 5 / 12 * (1 + 0.5 ** (2 / 3))
+    loss = 9 * (2 - nu) * 0.25 * P**2 / (5 * G * a) * e
+    low, high = (float.fromhex(text) for text in claims["shear"][0]["energy"])
+    assert low == pytest.approx(loss, rel=1e-12)
+    assert high == pytest.approx(loss, rel=1e-12)
+    assert proof_oracle.false_claims(contact.proof().document) == []

@@ -1,0 +1,173 @@
+"""Honest proofs: accepted, true by the 50-digit reference, and not weaker than the certificate."""
+
+import json
+from contextlib import suppress
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import proof_oracle
+import pytest
+import scenes
+
+import convexrough as cr
+from convexrough import checker
+from convexrough.proof import prove
+
+
+def judged(proof: Any) -> Any:
+    """The claims of a proof that the checker accepts and the oracle finds true."""
+    document = json.loads(json.dumps(proof.document))
+    assert checker.check(document, lambda line: None) == proof.proved
+    assert proof_oracle.false_claims(document) == []
+    return document["claims"]
+
+
+def both_controls(scene: cr.Scene, approach: float) -> list[cr.Contact]:
+    contact = cr.press(scene, approach=approach)
+    return [contact, cr.press(scene, load=contact.load)] if contact.load else [contact]
+
+
+def width(bounds: list[str]) -> float:
+    low, high = (Fraction(float.fromhex(text)) for text in bounds)
+    return float(high - low)
+
+
+@pytest.mark.parametrize("name", scenes.NAMED)
+def test_named_scenes_are_proved_and_sharply(name: str) -> None:
+    for contact in both_controls(*scenes.NAMED[name]):
+        claims = judged(contact.proof())
+        assert claims["scope"] == "global"
+        assert claims["status"] == list(contact.status)
+        errors = [width(bounds) / 2 for bounds in claims["loads"]]
+        assert max(errors) < 1e-13 * contact.loads.max()
+        assert max(errors) < contact.certificate.load_error
+
+
+@pytest.mark.parametrize("name", ["paper", "rough, closest"])
+def test_friction_states_and_losses_are_proved(name: str) -> None:
+    scene, approach = scenes.NAMED[name]
+    for contact in both_controls(replace(scene, friction=0.5), approach):
+        forces = np.array([1e-6, 0.37, 0.99]) * 0.5 * contact.load
+        states = [cr.shear(contact, force=float(force)) for force in forces]
+        claims = judged(contact.proof(sheared=states))
+        for state, claim in zip(states, claims["shear"], strict=True):
+            assert claim["status"] == list(state.status)
+            low, high = (float.fromhex(text) for text in claim["energy"])
+            assert low <= cr.cycle(contact, maximum=state.force).energy <= high
+        assert width(claims["shear"][1]["energy"]) < 1e-9 * high
+
+
+def test_random_scenes() -> None:
+    """Where there is a certificate there is a proof, and no word of it is lost."""
+    proved = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        make = scenes.scattered if seed % 2 else scenes.on_lattice
+        roughness = float(rng.choice([0.0, 0.1, 0.5, 2.0]))
+        scene, approach = make(
+            seed, int(rng.integers(1, 13)), float(rng.uniform(0.05, 2.0)), roughness
+        )
+        for contact in both_controls(scene, approach):
+            if contact.certificate.scope == "none":
+                continue
+            claims = judged(contact.proof())
+            decided = contact.status != "undecided"
+            assert (np.array(claims["status"]) == contact.status)[decided].all()
+            proved += 1
+    assert proved > 40
+
+
+def test_loads_from_anywhere() -> None:
+    """Bounds as wide as the loads are off; nothing false from loads that are far off."""
+    scene, approach = scenes.NAMED["paper"]
+    loads = cr.press(scene, approach=approach).loads
+    rng = np.random.default_rng(0)
+    for off in (1e-9, 1e-4, 1e-2):
+        near = loads * (1 + off * rng.uniform(-1, 1, len(loads)))
+        claims = judged(prove(scene, near, approach=approach))
+        assert max(map(width, claims["loads"])) > off * loads.max()
+        claims = judged(prove(scene, near, load=float(loads.sum())))
+
+
+def test_loads_of_another_total_are_scaled() -> None:
+    scene = cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), scenes.MATERIAL)
+    low, high = judged(prove(scene, [1.001e-8], load=1e-8))["loads"][0]
+    assert float.fromhex(low) <= 1e-8 <= float.fromhex(high)
+
+
+def test_a_dropped_asperity_is_not_proved_open() -> None:
+    scene, approach = scenes.scattered(2, 6, 0.6, 0.0)
+    loads = cr.press(scene, approach=approach).loads.copy()
+    for dropped in range(6):
+        given = np.where(np.arange(6) == dropped, 0.0, loads)
+        with suppress(cr.ProofError):  # or nothing is proved
+            judged(prove(scene, given, approach=approach))
+
+
+def test_the_bound_holds_where_the_energy_is_flattest() -> None:
+    """Two equal contacts, as near to the end of convexity as is provable, off in opposite ways."""
+    a, apart = 0.75 * np.pi / 2, 1.0
+    scene = cr.Scene(1e30, cr.Asperities([[0, 0], [apart, 0]], 1e3), scenes.MATERIAL)
+    approach = a**2 / 1e3 * (1 + 4 * a / (3 * np.pi * apart))
+    loads = cr.press(scene, approach=approach).loads
+    claims = judged(prove(scene, loads * [1 + 1e-6, 1 - 1e-6], approach=approach))
+    assert claims["scope"] == "global"
+
+
+def test_nothing_touches() -> None:
+    scene, _ = scenes.NAMED["paper"]
+    contact = cr.press(scene, approach=-1e-6)
+    claims = judged(contact.proof())
+    assert set(claims["status"]) == {"open"}
+
+
+def test_no_proof_where_contacts_overlap() -> None:
+    scene, approach = scenes.scattered(9, 12, 4.0, 0.0)
+    contact = cr.press(scene, approach=approach)
+    assert contact.certificate.scope == "none"
+    with pytest.raises(cr.ProofError, match="nothing is proved"):
+        contact.proof()
+
+
+def test_what_is_asked_for_is_checked() -> None:
+    scene, approach = scenes.NAMED["paper"]
+    contact = cr.press(scene, approach=approach)
+    with pytest.raises(cr.InputError, match="approach"):
+        prove(scene, contact.loads)
+    with pytest.raises(cr.InputError, match="loads"):
+        prove(scene, contact.loads[:-1], approach=approach)
+    with pytest.raises(cr.InputError, match="a load on some asperity"):
+        prove(scene, 0 * contact.loads, load=1e-7)
+    rough = cr.press(replace(scene, friction=0.5), approach=approach)
+    state = cr.shear(rough, force=0.1 * rough.load)
+    with pytest.raises(cr.InputError, match="friction"):
+        contact.proof(sheared=[state])
+    many = cr.Asperities.square(spacing=1e-3, tip_radius=0.02, within=0.0312)
+    assert len(many) > checker.MOST_ASPERITIES
+    with pytest.raises(cr.InputError, match="at most 3,000"):
+        cr.press(replace(scene, asperities=many), approach=1e-6).proof()
+
+
+def test_a_prescribed_load_is_proved_as_it_was_prescribed() -> None:
+    scene, _ = scenes.NAMED["paper"]
+    contact = cr.press(scene, load=1e-7)
+    document = contact.proof().document
+    assert document["prescribed"] == {"load": (1e-7).hex()}
+    assert cr.press(scene, approach=5e-5).proof().document["prescribed"] == {
+        "approach": (5e-5).hex()
+    }
+
+
+def test_saved_whole_or_not_at_all(tmp_path: Any) -> None:
+    scene, approach = scenes.NAMED["paper"]
+    proof = cr.press(scene, approach=approach).proof()
+    with pytest.raises(cr.FileError, match="cannot be written"):
+        proof.save(tmp_path / "none" / "proof.json")
+    (tmp_path / "proof.json").mkdir()
+    with pytest.raises(cr.FileError, match="cannot be written"):
+        proof.save(tmp_path / "proof.json")
+    assert [path.name for path in tmp_path.iterdir()] == ["proof.json"]
+    proof.save(tmp_path / "p.json")
+    assert checker.read(str(tmp_path / "p.json")) == proof.document

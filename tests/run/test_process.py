@@ -1,0 +1,74 @@
+"""The command as a process: `python -m`, interrupts, and an output that nobody takes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from scene_files import HEXAGONAL, scene_text
+
+# A job in the background inherits a signal that is ignored; this one must not.
+START = (
+    "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "print('started', flush=True); from convexrough.__main__ import main; sys.exit(main())"
+)
+
+
+def module(*arguments: str, cwd: Path, stdout: int) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "convexrough", *arguments]
+    return subprocess.run(
+        command, cwd=cwd, stdout=stdout, stderr=subprocess.PIPE, text=True, check=False
+    )
+
+
+def test_python_m(tmp_path: Path) -> None:
+    done = module("--version", cwd=tmp_path, stdout=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("convexrough, version ")
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.1, 0.3, 0.6, 1.0])
+def test_an_interrupt_at_any_moment(tmp_path: Path, delay: float) -> None:
+    rough = HEXAGONAL.replace("0.0025", "1e-4").replace("0.02", "8e-4")
+    (tmp_path / "a.toml").write_text(scene_text(rough + "height_std = 1e-7\nseed = 1"))
+    running = subprocess.Popen(
+        [sys.executable, "-c", START, "run", "a.toml"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert running.stdout is not None
+    running.stdout.readline()
+    time.sleep(delay)
+    running.send_signal(signal.SIGINT)
+    _, said = running.communicate()
+    assert (running.returncode, said) == (130, "convexrough: interrupted\n")
+    assert not [path for path in tmp_path.rglob(".*") if path.is_file()]
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("run", "a.toml", "--no-figures")])
+def test_a_full_standard_output(tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    with open("/dev/full", "w") as full:
+        done = module(*arguments, cwd=tmp_path, stdout=full.fileno())
+    assert done.returncode == 1
+    assert done.stderr == "convexrough: error: standard output: No space left on device\n"
+    assert len(arguments) == 1 or (tmp_path / "a-results" / "summary.json").exists()
+
+
+def test_a_standard_output_that_nobody_reads(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = module("--help", cwd=tmp_path, stdout=writing)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_no_standard_output_at_all(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    code = f'"{sys.executable}" -m convexrough run a.toml --no-figures >&-'
+    done = subprocess.run(
+        ["sh", "-c", code], cwd=tmp_path, stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")

@@ -1,0 +1,63 @@
+"""`run --proof`, `verify --proof`, `check`: files, output, exit status."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from scene_files import HEXAGONAL, scene_text
+
+
+def test_run_proves_and_check_accepts(command: Any, tmp_path: Path) -> None:
+    assert command("new", "first.toml").status == 0
+    ran = command("run", "first.toml", "--proof", "--no-figures")
+    assert (ran.status, ran.err) == (0, "")
+    assert "proved: under the approach 5e-05 there is a solution, the only one" in ran.out
+    path = tmp_path / "first-results" / "proof.json"
+    document = json.loads(path.read_text())
+    assert len(document["sheared"]) == 3  # forces and amplitudes are the same
+    checked = command("check", str(path))
+    assert (checked.status, checked.err) == (0, "")
+    assert checked.out in ran.out
+
+    document["claims"]["shear"][2]["status"][0] = "sliding"
+    path.write_text(json.dumps(document))
+    checked = command("check", str(path))
+    assert (checked.status, checked.out) == (1, "")
+    assert checked.err.startswith("refused: claims shear [2] status [0]: claimed 'sliding'")
+    path.write_text("{")
+    assert command("check", str(path)).status == 2
+    assert command("check", "none.json").status == 2
+
+
+def test_json_alone_on_standard_output(command: Any) -> None:
+    command("new", "first.toml")
+    ran = command("run", "first.toml", "--proof", "--no-figures", "--json")
+    assert json.loads(ran.out)["normal"]["contact"] == 37
+    assert "proved: " in ran.err
+
+
+def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path) -> None:
+    command("new", "first.toml")
+    command("run", "first.toml", "--no-figures")
+    loads = "first-results/asperities.csv"
+    assert command("verify", "first.toml", loads, "--proof").status == 0
+    assert command("check", "proof.json").status == 0
+    again = command("verify", "first.toml", loads, "--proof")
+    assert again.status == 2
+    assert "proof.json: is there already" in again.err
+
+
+def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "many.toml").write_text(scene_text(f"{HEXAGONAL}within = 0.08"))
+    refused = command("run", "many.toml", "--proof", "--no-figures")
+    assert refused.status == 2
+    assert "many.toml: asperities of a scene to prove" in refused.err
+    assert not (tmp_path / "many-results").exists()
+
+    crowded = HEXAGONAL.replace("0.02\n", "50.0\nwithin = 0.0102")
+    (tmp_path / "crowded.toml").write_text(scene_text(crowded))
+    ran = command("run", "crowded.toml", "--proof", "--no-figures")
+    assert ran.status == 3
+    assert "warning: nothing is proved" in ran.err
+    written = {path.name for path in (tmp_path / "crowded-results").iterdir()}
+    assert written == {"summary.json", "asperities.csv"}

@@ -1,0 +1,76 @@
+"""Scene files that are no TOML: the line is shown, and what is meant."""
+
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scene_files import scene_text
+
+import convexrough as cr
+from convexrough.run.scene_file import read_scene
+from convexrough.run.toml_slips import explained
+
+
+def refused(folder: Path, text: str) -> list[str]:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(cr.FileError) as caught:
+        read_scene(path)
+    lines = str(caught.value).split("\n")
+    assert all(line.startswith(f"{path}: ") for line in lines)
+    return [line.removeprefix(f"{path}: ") for line in lines]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "meant", "why"),
+    [
+        ("spacing = 0,0025", "spacing = 0.0025", "a decimal point"),
+        ("spacing=2,5e-3 # mm", "spacing = 2.5e-3", "a decimal point"),
+        ("spacing = 0.0025 m", "spacing = 0.0025", "without unit"),
+        ("spacing = 2.5mm", "spacing = 2.5", "without unit"),
+        ("spacing = 2.5 µm", "spacing = 2.5", "without unit"),
+        ("spacing = 2.5D-3", "spacing = 2.5e-3", "exponent"),
+        ("spacing = .0025", "spacing = 0.0025", "both sides"),
+        ("spacing = 5.", "spacing = 5.0", "both sides"),
+        ("spacing: 0.0025", "spacing = 0.0025", "equals sign"),
+        ("spacing = 0.0025;", "spacing = 0.0025", "end of the line"),
+        ("spacing = 0.0025,", "spacing = 0.0025", "end of the line"),
+        ("pattern = hexagonal", 'pattern = "hexagonal"', "straight quotes"),
+        ("pattern = “hexagonal”", 'pattern = "hexagonal"', "straight quotes"),
+        ("path = my summits.csv", 'path = "my summits.csv"', "straight quotes"),
+    ],
+)
+def test_a_slip(tmp_path: Path, wrong: str, meant: str, why: str) -> None:
+    text = scene_text('pattern = "hexagonal"\n' + wrong if "spacing" in wrong else wrong)
+    (line,) = refused(tmp_path, text)
+    number = text.split("\n").index(wrong) + 1
+    assert line.startswith(f"line {number}: found {wrong}, expected {meant}: ")
+    assert why in line
+
+
+def test_all_slips_at_once(tmp_path: Path) -> None:
+    text = "[sphere]\nradius = 1,0\n[normal]\napproach = 5e-5 m\n[friction]\ncoefficient 0.5\n"
+    lines = refused(tmp_path, text)
+    assert (
+        lines[0] == "line 2: found radius = 1,0, expected radius = 1.0: a decimal point, no comma"
+    )
+    assert lines[1].startswith("line 4: found approach = 5e-5 m, expected approach = 5e-5: ")
+    assert lines[2].startswith("not a TOML file: ")
+    assert lines[2].endswith("(at line 6, column 13): coefficient 0.5")
+    assert len(lines) == 3
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.text(alphabet=st.sampled_from('ab=0.,;:"“[]#\n m1eD-\t'), max_size=80))
+def test_any_text_is_explained(text: str) -> None:
+    assert explained("a.toml", text, ValueError("wrong (at line 1, column 1)"))
+
+
+@pytest.mark.parametrize("unit", ["1", "a", " ", "1,", "a ", "= "])
+def test_a_long_line_takes_no_time(tmp_path: Path, unit: str) -> None:
+    began = time.perf_counter()
+    lines = refused(tmp_path, "radius = x" + unit * 1_000_000)
+    assert time.perf_counter() - began < 10.0
+    assert all(len(line) < 300 for line in lines)

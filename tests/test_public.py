@@ -1,0 +1,77 @@
+"""What `import convexrough` gives: names, laziness, and words for values of the wrong type."""
+
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+from scenes import PAPER_APPROACH, paper
+
+import convexrough as cr
+
+HEAVY = ("numpy", "scipy", "cvxpy", "clarabel", "osqp", "matplotlib", "pydantic", "click", "rich")
+
+
+def run_python(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_the_import_alone_imports_nothing() -> None:
+    assert run_python(f"import sys, convexrough; print({set(HEAVY)} & set(sys.modules))") == "set()"
+
+
+def test_every_public_name_is_there() -> None:
+    assert all(hasattr(cr, name) for name in cr.__all__)
+    assert {*cr.__all__, "plots", "testing", "compare", "fields"} == set(dir(cr))
+    with pytest.raises(AttributeError, match="no attribute 'pres'"):
+        _ = cr.pres
+
+
+def test_modules_are_attributes_without_importing_them() -> None:
+    code = "import sys, convexrough as cr; cr.testing.assert_certified; cr.compare.compare; "
+    assert run_python(code + "print('matplotlib' in sys.modules)") == "False"
+    assert run_python("import convexrough as cr; print(cr.plots.press_figures.__name__)")
+
+
+@pytest.mark.parametrize("name", ["newton", "conic", "conic_cvxpy", "bristles"])
+def test_solvers_by_name(name: str) -> None:
+    assert cr.press(paper(), approach=PAPER_APPROACH, solver=name).certificate.scope == "global"
+
+
+def wrong(call: str) -> Any:
+    scene = paper()
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    return eval(call, {"cr": cr, "scene": scene, "contact": contact})
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (
+            "cr.press(scene.asperities, approach=5e-5)",
+            "scene: found something of Asperities, expected a Scene",
+        ),
+        ("cr.press(cr.Scene, approach=5e-5)", "scene: found the class Scene, expected a Scene"),
+        ("cr.press(scene, approach='5e-5')", "approach: found '5e-5', expected a finite number"),
+        ("cr.press(scene, load='1')", "load: found '1', expected a positive number"),
+        ("cr.press(scene, approach=5e-5, solver=cr.solvers.Newton)", "found the class Newton"),
+        ("cr.press(scene, approach=5e-5, solver='connic')", 'expected one of "newton", "conic"'),
+        ("cr.certify(scene.asperities, [1.0], approach=5e-5)", "expected a Scene"),
+        ("cr.certify(scene, ['1'] * 61, approach=5e-5)", r"loads: found \['1'.*expected numbers"),
+        ("cr.Scene(1.0, scene.asperities, cr.Material)", "found the class Material, expected a M"),
+        ("cr.Scene('1', scene.asperities, scene.material)", "sphere_radius: found '1'"),
+        ("cr.Asperities([['0', '0']], 1.0)", "positions: .*expected numbers"),
+        ("cr.shear(scene, force=0.0)", "contact: found something of Scene, expected a Contact"),
+        ("cr.cycle(scene, maximum=0.0)", "expected a Contact"),
+        ("cr.history(cr.Contact, forces=[0.0])", "found the class Contact"),
+        ("cr.onset_of_sliding(scene)", "expected a Contact"),
+        ("cr.shear_vector(scene, force=0.0)", "expected a Contact"),
+        ("cr.smooth(contact, load=1.0)", "expected a Scene"),
+        ("cr.Material(youngs_modulus=2.0, poisson_ratio=0.3)", r"Material\.from_youngs\("),
+        ("cr.Material(1.0)", "poisson_ratio: found None, expected a number from 0"),
+    ],
+)
+def test_wrong_types_are_said(call: str, said: str) -> None:
+    with pytest.raises(cr.InputError, match=said):
+        wrong(call)

@@ -1,0 +1,239 @@
+"""The word audit: every word and bound of random and hostile scenes against ball arithmetic.
+
+    python tests/word_audit.py 10000        prints the tables of docs/reliability.md
+
+Each scene is drawn from a seed of its own, pressed through one operator under one control, sheared,
+cycled and sheared with vectors, and all that is said of it is compared with proved 60-digit states:
+in exact arithmetic, so that a bound too small by a roundoff is found too.
+"""
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import multiprecision
+import numpy as np
+from flint import arb, ctx
+from scenes import on_lattice, operators, scattered, solve_exactly
+
+import convexrough as cr
+
+FRICTION = 0.5
+DIGITS = 60  # of the exact states, whose differences lose some where Q is small
+BITS = 4096  # nothing is rounded in a comparison
+
+#: How scenes are made hostile.
+KINDS = ("usual", "crowded", "ring", "grazing", "near", "units")
+
+#: Of f P: how far the contacts are sheared.
+FRACTIONS = (1e-12, 1e-6, 0.1, 0.4, 0.8, 0.999, 1 - 1e-9, 1 - 1e-13, 1.0)
+
+
+class Wrong(AssertionError):
+    """A word or a bound that is not true."""
+
+
+@dataclass
+class Tally:
+    """What was found, by kind of scene, operator and stage."""
+
+    scenes: int = 0
+    refused: int = 0
+    unsolved: int = 0  # by the oracle, which needs both signs of every gap
+    words: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
+    ratios: dict[tuple[str, str], list[float]] = field(default_factory=dict)
+
+    def count(self, kind: str, operator: str, stage: str, words: Any) -> None:
+        seen = self.words.setdefault((kind, operator, stage), [0, 0])
+        seen[0] += len(words)
+        seen[1] += int((words == "undecided").sum())
+
+    def compare(self, operator: str, stage: str, bounds: Any, values: Any, exact: Any) -> None:
+        """Bound by bound; the ratio is that of the largest bound and the largest error."""
+        errors = []
+        with ctx.workprec(BITS):
+            for bound, value, true in zip(bounds, values, exact, strict=True):
+                error = abs(arb(float(value)) - true)
+                if np.isfinite(bound):
+                    require(error <= arb(float(bound)), f"{stage} bound {bound} of {value}")
+                errors.append(float(error.mid()))
+        if len(errors) and np.isfinite(bounds).all() and max(errors) > 0:
+            ratio = float(np.max(bounds)) / max(errors)
+            self.ratios.setdefault((operator, stage), []).append(ratio)
+
+
+def require(holds: Any, message: str) -> None:
+    if not bool(holds):
+        raise Wrong(message)
+
+
+def draw(seed: int) -> tuple[str, cr.Scene, float]:
+    """A kind, a scene with friction, and an approach."""
+    rng = np.random.default_rng(seed)
+    kind = KINDS[seed % len(KINDS)]
+    make = on_lattice if rng.random() < 0.5 else scattered
+    crowding = rng.uniform(0.9, 2.0) if kind == "crowded" else rng.uniform(0.05, 0.8)
+    roughness = float(rng.choice([0.0, 0.1, 0.5]))
+    count = int(rng.integers(1, 8))
+    if kind == "ring":
+        angles = 2 * np.pi * np.arange(count) / count + rng.uniform(0, 1)
+        points = 3e-3 * np.column_stack((np.cos(angles), np.sin(angles)))
+        scene = cr.Scene(1.0, cr.Asperities(points, 0.02), cr.Material(1.0, 0.3))
+        approach = float(rng.uniform(2e-5, 9e-5))
+    else:
+        scene, approach = make(int(rng.integers(2**32)), count, crowding, roughness)
+    if kind == "grazing":
+        scene = _grazing(scene, approach, rng)
+    if kind == "near":  # two asperities much closer than the others
+        a = scene.asperities
+        points = np.vstack((a.positions, a.positions[0] + 1e-2 * np.abs(a.positions).max()))
+        radii = np.append(a.tip_radii, 1e-7 * a.tip_radii[0])
+        scene = replace(scene, asperities=cr.Asperities(points, radii, np.append(a.heights, 0.0)))
+    if kind == "units":
+        length, modulus = 10.0 ** rng.uniform(-40, 40), 10.0 ** rng.uniform(-40, 40)
+        a = scene.asperities
+        asperities = cr.Asperities(a.positions * length, a.tip_radii * length, a.heights * length)
+        material = cr.Material(modulus, 0.3)
+        scene = cr.Scene(scene.sphere_radius * length, asperities, material, None, scene.geometry)
+        approach *= length
+    return kind, replace(scene, friction=FRICTION), approach
+
+
+def _grazing(scene: cr.Scene, approach: float, rng: np.random.Generator) -> cr.Scene:
+    """One asperity more, which touches or fails to by 1e-6 to 1e-17 of the approach."""
+    a = scene.asperities
+    size = float(np.abs(a.positions).max()) or approach
+    point = size * rng.uniform(1.2, 1.5, 2)
+    low = -2.0 * approach
+
+    def grown(height: float) -> cr.Scene:
+        points, heights = np.vstack((a.positions, point)), np.append(a.heights, height)
+        radii = np.append(a.tip_radii, np.median(a.tip_radii))
+        return replace(scene, asperities=cr.Asperities(points, radii, heights))
+
+    gap = cr.press(grown(low), approach=approach).gaps[-1]
+    off = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-17, -6) * approach
+    return grown(float(low + gap + off))
+
+
+def audit(seeds: Iterator[int] | range) -> Tally:
+    """Raises Wrong at the first wrong word or bound, with the seed of its scene."""
+    tally = Tally()
+    for seed in seeds:
+        tally.scenes += 1
+        try:
+            _audit_scene(seed, tally)
+        except Wrong as wrong:
+            raise Wrong(f"seed {seed}: {wrong}") from wrong
+        except multiprecision.NotProved:
+            tally.unsolved += 1
+        except (cr.InputError, cr.SolverError):
+            tally.refused += 1
+    return tally
+
+
+def _audit_scene(seed: int, tally: Tally) -> None:
+    rng = np.random.default_rng((seed, 1))
+    kind, scene, approach = draw(seed)
+    operator = str(rng.choice(operators(scene)))
+    given: Any = {"approach": approach}
+    contact = cr.press(scene, **given, influence=operator)
+    if contact.load == 0:
+        return
+    if rng.random() < 0.5:
+        given = {"load": contact.load}
+        contact = cr.press(scene, **given, influence=operator)
+    exact = solve_exactly(scene, **given, start=contact.loads, digits=DIGITS)
+    proof = contact.certificate
+    if proof.scope == "none":
+        require((proof.status == "undecided").all(), "a word without a proof")
+        tally.count(kind, operator, "press", proof.status)
+        return
+    for word, load, gap in zip(proof.status, exact.loads, exact.gaps, strict=True):
+        require(word != "contact" or load > 0, "contact of an open asperity")
+        require(word != "open" or gap > 0, "open of one that touches")
+    tally.count(kind, operator, "press", proof.status)
+    tally.compare(operator, "load", proof.load_errors, contact.loads, exact.loads)
+    tally.compare(operator, "gap", proof.gap_errors, proof.gaps, exact.gaps)
+    tally.compare(operator, "approach", [proof.approach_error], [proof.approach], [exact.approach])
+    _audit_shear(kind, operator, contact, exact, float(rng.choice(FRACTIONS)), tally)
+
+
+def _audit_shear(
+    kind: str, operator: str, contact: cr.Contact, full: Any, fraction: float, tally: Tally
+) -> None:
+    """Against Ciavarella and Jaeger's theorem: Q_i = f (P_i - p_i(P - Q / f)), slips f c_t g_i."""
+    force = fraction * FRICTION * contact.load
+    state = cr.shear(contact, force=force)
+    with ctx.workdps(DIGITS + 30):
+        nu = arb(contact.scene.material.poisson_ratio)
+        travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
+        left = full.load - arb(force) / arb(FRICTION)
+        if left > 0:
+            start = np.maximum(contact.loads - state.forces / FRICTION, 0.0) + 1e-30 * contact.load
+            reduced = solve_exactly(contact.scene, load=left.mid(), start=start, digits=DIGITS)
+            forces = [FRICTION * (a - b) for a, b in zip(full.loads, reduced.loads, strict=True)]
+            if any(q < 0 for q in forces):
+                return  # dragged along: the theorem is not for this
+            slips = [
+                travel * gap if load > 0 else arb(0)
+                for gap, load in zip(reduced.gaps, full.loads, strict=True)
+            ]
+            rise = travel * (full.approach - reduced.approach)
+        else:  # beyond the limit of the true loads: all slide, how far is not determined
+            forces, slips, rise = [FRICTION * p for p in full.loads], None, None
+    cycle = cr.cycle(contact, maximum=force)
+    vector = cr.shear_vector(_without_poisson(contact), force=force)
+    for stage, words in (
+        ("shear", state.status),
+        ("cycle", cycle.status),
+        ("vector", vector.status),
+    ):
+        for i, (word, load) in enumerate(zip(words, full.loads, strict=True)):
+            slides = slips is None or slips[i] > 0
+            require(word != "sliding" or (load > 0 and slides), f"{stage}: sliding of {i}")
+            require(word != "partial" or (load > 0 and not slides), f"{stage}: partial of {i}")
+            require(word != "open" or not load > 0, f"{stage}: open of {i}")
+        tally.count(kind if fraction < 1 else "limit", operator, stage, words)
+    proof = state.certificate
+    tally.compare(operator, "force", proof.force_errors, state.forces, forces)
+    errors = vector.certificate.force_errors
+    tally.compare(operator, "vector force", errors, vector.forces[:, 0], forces)
+    if slips is not None:
+        tally.compare(operator, "slip", proof.slip_errors, state.slips, slips)
+        tally.compare(operator, "rise", [proof.displacement_error], [state.displacement], [rise])
+
+
+def _without_poisson(contact: cr.Contact) -> cr.Contact:
+    """At nu = 0 the tensor is the scalar kernel, and the theorem holds for vectors along x."""
+    scene = contact.scene
+    material = cr.Material(scene.material.contact_modulus, 0.0)
+    return replace(contact, scene=replace(scene, material=material))
+
+
+def report(tally: Tally) -> str:
+    """Tables in Markdown."""
+    lines = [
+        f"{tally.scenes:,} scenes, {tally.refused} refused, {tally.unsolved} beyond the oracle; "
+        "no wrong word, no bound too small.",
+        "",
+        "| scenes | stage | words | undecided |",
+        "|---|---|---|---|",
+    ]
+    merged: dict[tuple[str, str], list[int]] = {}
+    for (kind, _, stage), (words, undecided) in tally.words.items():
+        seen = merged.setdefault((kind, stage), [0, 0])
+        seen[0] += words
+        seen[1] += undecided
+    for (kind, stage), (words, undecided) in sorted(merged.items()):
+        lines.append(f"| {kind} | {stage} | {words:,} | {100 * undecided / words:.2f} % |")
+    lines += ["", "| operator | bound | least | median | 99 % |", "|---|---|---|---|---|"]
+    for (operator, stage), ratios in sorted(tally.ratios.items()):
+        least, median, most = np.quantile(ratios, [0.0, 0.5, 0.99])
+        lines.append(f"| {operator} | {stage} | {least:.2g} | {median:.2g} | {most:.2g} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(report(audit(range(int(sys.argv[1])))))
