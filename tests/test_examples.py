@@ -10,7 +10,13 @@ import pytest
 
 FOLDER = Path(__file__).parent.parent / "examples"
 #: Relative tolerances: of the paper's rounded numbers, of quadrature, of extrapolation.
-TOLERANCES = {"papers_example": 1e-3, "random_heights": 2e-4, "continuum_limit": 1e-5}
+TOLERANCES = {
+    "papers_example": 1e-3,
+    "random_heights": 2e-4,
+    "continuum_limit": 1e-5,
+    "limits_of_shakedown": 1e-7,
+    "normal_and_shear_together": 5e-5,
+}
 
 
 #: All `compare()` at their end; the scripts of the course also assert what they say on the way.

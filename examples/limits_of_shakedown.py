@@ -1,0 +1,56 @@
+"""How far a load may swing until sliding goes on for ever: the exact limit, and Melan's.
+
+An asperity slides in every cycle once the level that sticks for ever falls below the load at which
+it first touched. Melan's theorem, for asperities that stick elastically until they slide, puts the
+limit lower: the share of a light contact is that of its whole area, while in truth its edge gives
+way first. `python examples/limits_of_shakedown.py`
+"""
+
+import numpy as np
+
+import convexrough as cr
+
+Pairs = list[tuple[str, float, float]]
+
+FRICTION = 0.5
+
+
+def compare() -> Pairs:
+    """(quantity, computed, reference)."""
+    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    material = cr.Material(contact_modulus=1.0, poisson_ratio=0.0)
+    scene = cr.Scene(1.0, asperities, material, friction=FRICTION)
+    contact = cr.press(scene, approach=5e-5)
+    P, last = contact.load, 31  # an asperity of ring A, the last to touch
+    swing = FRICTION * P * np.array([1.0, -1.0])
+
+    exact = cr.shakedown(scene, loads=P, force_amplitudes=swing)
+    elastic = cr.shakedown(scene, loads=P, force_amplitudes=swing, kind="elastic")
+    across = np.column_stack((0 * swing, swing))
+    vector = cr.shakedown(scene, loads=P, force_amplitudes=across, kind="vector")
+
+    # On first loading the same asperity slides first, and at the same force.
+    onset = cr.onset_of_sliding(contact, which=[last])[0] / (FRICTION * P)
+
+    # Why Melan's limit is lower: P_i (P) <= (P - sigma) P_i'(P), as P_i(s) is convex.
+    step = 1e-4 * P
+    ahead, behind = (cr.press(scene, load=P + s).loads[last] for s in (step, -step))
+    sigma = P * (1 - exact.factor)
+    tangent = contact.loads[last] / ((ahead - behind) / (2 * step))
+
+    # A cycle 1 % above the limit: ring A slides by what is missing; below, none does.
+    above = cr.steady(scene, loads=[P, P], forces=1.01 * exact.factor * swing)
+    below = cr.steady(scene, loads=[P, P], forces=0.99 * exact.factor * swing)
+    return [
+        ("exact limit over f P, ring A", exact.factor, float(onset)),
+        ("elastic limit over f P: P_i / P_i' over P", elastic.factor, float(tangent / P)),
+        ("elastic over exact", elastic.factor / exact.factor, float(tangent / (P - sigma))),
+        ("vector friction at nu = 0", vector.factor, elastic.factor),
+        ("sliding 1 % above", float((above.status == "sliding").sum()), 6),
+        ("sliding 1 % below", float((below.status == "sliding").sum()), 0),
+    ]
+
+
+if __name__ == "__main__":
+    for name, computed, reference in compare():
+        print(f"{name:<46} {computed:14.9g} {reference:14.9g}")

@@ -1,0 +1,78 @@
+"""Normal load and shear that move together: what the order and the phase of loads cost.
+
+One smooth sphere first, against the increments of Mindlin and Deresiewicz as Thornton and Yin write
+them, integrated. Then the rough contact: shear in phase with the normal load, and a quarter of a
+cycle behind. A straight line that follows the load costs nothing, a steeper one what a divided
+difference of the energy says. `python examples/normal_and_shear_together.py`
+"""
+
+import numpy as np
+
+import convexrough as cr
+
+Pairs = list[tuple[str, float, float]]
+
+FRICTION = 0.5
+MATERIAL = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
+RATIO = (2 - 0.3) / (2 * (1 - 0.3))  # tangential over normal compliance
+
+
+def one_sphere() -> Pairs:
+    """Shear that grows twice as fast as friction, on a load that grows too."""
+    asperity = cr.Asperities(positions=[[0.0, 0.0]], tip_radii=1.0)
+    scene = cr.Scene(1.0, asperity, MATERIAL, friction=FRICTION)
+    first, last, shear = 1e-6, 1.4e-6, 0.8e-6  # P from, P to; T = Q / f in the end
+    path = cr.load_path(scene, loads=[first, last], forces=[0.0, FRICTION * shear])
+
+    # dX = (dQ - f dP (1 - th)) / (8 G* a th), th = (L / P)^(1/3), L = P - T the front.
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    part, weights = (nodes + 1) / 2, weights / 2
+    P, T = first + part * (last - first), part * shear
+    radius = np.cbrt(3 * P * 0.5 / 4)  # of contact; the relative radius is 1/2
+    th = np.cbrt((P - T) / P)
+    rate = FRICTION * (shear - (last - first) * (1 - th)) / (2 * radius / RATIO * th)
+    return [("one sphere, X by increments", float(path.displacements[-1]), float(rate @ weights))]
+
+
+def rough() -> Pairs:
+    """Three cycles between the same loads and the same shear forces, in different phase."""
+    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION)
+    P = cr.press(scene, approach=4e-5).load
+    p, t = 0.2 * P, 0.4 * P  # amplitudes of P and of Q / f
+
+    in_phase = cr.steady(scene, loads=[P + p, P - p], forces=[FRICTION * t, -FRICTION * t])
+    gentle = cr.steady(
+        scene, loads=[P + p, P - p], forces=[0.9 * FRICTION * p, -0.9 * FRICTION * p]
+    )
+    loads, forces = cr.elliptic_path(
+        load=P, load_amplitude=p, force_amplitude=FRICTION * t, friction=FRICTION, chords=48
+    )
+    behind = cr.steady(scene, loads=loads, forces=forces)
+
+    # The line, in closed form: mean slopes of V, which are means of D0.
+    def mean(low: float, high: float, panels: int = 12) -> float:
+        nodes, weights = np.polynomial.legendre.leggauss(4)
+        ends = np.linspace(low, high, panels + 1)
+        levels = ends[:-1, None] + (nodes + 1) / 2 * np.diff(ends)[:, None]
+        curve = [[cr.press(scene, load=level).approach for level in panel] for panel in levels]
+        return float(np.mean(np.array(curve) @ weights / 2))
+
+    still = cr.press(scene, load=P - t).approach
+    bracket = mean(P - t, P + p) + mean(P - t, P - p) - mean(P - p, P + p) - still
+    line = 4 * RATIO * FRICTION**2 * t * bracket
+    return [
+        ("line in phase, loss / closed form", in_phase.energy / line, 1.0),
+        ("line that follows the load, loss", gentle.energy / in_phase.energy, 0.0),
+        ("quarter of a cycle behind, stuck level / P", behind.level / P, 1 - np.hypot(0.2, 0.4)),
+    ]
+
+
+def compare() -> Pairs:
+    """(quantity, computed, reference)."""
+    return one_sphere() + rough()
+
+
+if __name__ == "__main__":
+    for name, computed, reference in compare():
+        print(f"{name:<46} {computed:14.9g} {reference:14.9g}")
