@@ -65,6 +65,7 @@ def page_data(
     followed = np.array(evenly_chosen(away.tolist(), MOST_FOLLOWED), dtype=np.intp)
     x, y = (contact.scene.contact_points / a_H).T
     points, radii = contact.scene.contact_points[drawn] / a_H, contact.contact_radii[drawn] / a_H
+    radii *= np.sqrt(len(touching) / max(1, len(drawn)))  # together they cover the same area
     reach = np.hypot(*points.T) + radii
     empty = _some(np.flatnonzero(contact.loads == 0), MOST_DRAWN)
     edge = 1.06 * max(1.0, float(reach.max(initial=0.0)))
@@ -175,7 +176,7 @@ def _left_out(touching: int, drawn: int, followed: int, forces: int) -> list[str
     """What the page does not show of many asperities, in sentences; the counts are of all."""
     said = []
     if drawn < touching:
-        said.append(f"{drawn:,} of {touching:,} touching asperities are drawn, by lot.")
+        said.append(f"{drawn:,} of {touching:,} touching asperities are drawn, by lot and larger.")
     if followed < touching:
         said.append(f"{followed:,} of the asperities can be followed.")
     if forces < next(iter(FORCES.values())):

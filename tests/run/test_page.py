@@ -125,7 +125,10 @@ def test_of_more_some_are_drawn_at_fewer_forces(
     assert len(data["discs"]["x"]) == len(data["stick"][0]) == 300
     assert len(data["stick"]) == len(data["states"]["fraction"]) == 21
     drawn, _, forces = data["left_out"]
-    assert drawn == f"300 of {data['touching']:,} touching asperities are drawn, by lot."
+    assert drawn == f"300 of {data['touching']:,} touching asperities are drawn, by lot and larger."
+    a_H = cr.smooth(many.scene, load=many.load).contact_radius
+    covered, whole = np.square(data["discs"]["radius"]).sum(), np.square(many.contact_radii / a_H)
+    assert covered == pytest.approx(whole.sum(), rel=0.1)
     assert forces == "There are 21 forces."
     sliding = (cr.shear(many, force=0.25 * many.load).status == "sliding").sum()
     assert data["states"]["sliding"][10] == sliding  # of all
@@ -198,6 +201,7 @@ class Opened:
 def opened(browser: Browser, contact: cr.Contact, tmp_path: Path) -> Iterator[Opened]:
     (tmp_path / "slider.html").write_text(page_of(contact), encoding="utf-8")
     shown = Opened(browser, tmp_path / "slider.html")
+    follow(shown, 36)
     yield shown
     shown.close()
 
