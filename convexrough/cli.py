@@ -29,6 +29,7 @@ DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2,
 Command = TypeVar("Command", bound=Callable[..., Any])
 _PATH = click.Path(path_type=Path)
 _proof = click.option("--proof", is_flag=True, help="Write proof.json, for anybody to check.")
+_html = click.option("--html", is_flag=True, help="Write slider.html: a page to move the force.")
 _json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object, no text.")
 
 
@@ -76,14 +77,22 @@ def program() -> None:
 @program.command()
 @click.argument("scene", type=_PATH)
 @_proof
+@_html
 @_output
 def run(
-    scene: Path, out: Path | None, no_figures: bool, force: bool, as_json: bool, proof: bool
+    scene: Path,
+    out: Path | None,
+    no_figures: bool,
+    force: bool,
+    as_json: bool,
+    html: bool,
+    proof: bool,
 ) -> int:
     """Press and shear the scene of a TOML file; write tables, certificate and figures.
 
     Results go to the folder SCENE-results unless --out names another.
     """
+    from convexrough import checks
     from convexrough.contact import solve
     from convexrough.run.results import claim_folder, write_results
     from convexrough.run.scene_file import read_scene
@@ -91,6 +100,9 @@ def run(
     from convexrough.run.summary import summarise
 
     file = read_scene(scene)
+    if html:
+        with _blamed_on(scene):
+            checks.friction(file.scene.friction)
     if proof:
         from convexrough.proof import refuse_many
 
@@ -112,6 +124,7 @@ def run(
             found,
             summary,
             figures=not no_figures,
+            html=html,
             units=file.units,
             source=file,
             announce=lambda news: show(f"writing results: {news}"),
@@ -265,8 +278,9 @@ def new(scene: Path) -> int:
 
 
 @program.command()
+@_html
 @_output
-def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int:
+def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool, html: bool) -> int:
     """Reproduce the source paper's example (Dini and Hills 2009)."""
     from convexrough.paper import example
     from convexrough.paper.figure_data import figure_data
@@ -284,7 +298,7 @@ def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool) -> int
             from convexrough.paper.figures import paper_figures
 
             files += results.write_figures(folder, paper_figures(found.contact))
-        files += results.write_results(folder, found, summary, figures=False)
+        files += results.write_results(folder, found, summary, figures=False, html=html)
     lines = ["", *example.table(comparison), *_written(folder, files)]
     return _say(summary, as_json, lines)
 

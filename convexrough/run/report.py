@@ -37,9 +37,9 @@ def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
         ("load", _quantity(f"{normal['load']:.10g}", force_unit)),
         ("certificate", _SCOPES[proof["scope"]] + _of_what(normal)),
         ("convexity number", f"{proof['convexity_number']:.4g}  (convex below 1)"),
-        ("load error", f"{_quantity(_bound(proof['load_error']), force_unit)}{relative}"),
-        ("gap error", _quantity(_bound(proof["gap_error"]), length_unit)),
-        ("duality gap", _quantity(_bound(proof["duality_gap"]), f"{force_unit} {length_unit}")),
+        ("load error", f"{_quantity(bound(proof['load_error']), force_unit)}{relative}"),
+        ("gap error", _quantity(bound(proof["gap_error"]), length_unit)),
+        ("duality gap", _quantity(bound(proof["duality_gap"]), f"{force_unit} {length_unit}")),
     ]
     if "solver" in normal:
         steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
@@ -175,7 +175,7 @@ def _quantity(number: str, unit: str) -> str:
     return f"{number} {unit}".rstrip()
 
 
-def _bound(value: float) -> str:
+def bound(value: float) -> str:
     """Two digits, never below the value."""
     return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
 
@@ -183,11 +183,11 @@ def _bound(value: float) -> str:
 def _ratio(error: float, largest: float) -> str:
     if largest == 0 or not math.isfinite(error):
         return ""
-    return f"  ({_bound(error / largest)} of the largest load)"
+    return f"  ({bound(error / largest)} of the largest load)"
 
 
 def _relative_bound(error: float, largest: float) -> str:
-    return _bound(error / largest) if largest else _bound(np.inf if error else 0.0)
+    return bound(error / largest) if largest else bound(np.inf if error else 0.0)
 
 
 def _two(value: float) -> str:

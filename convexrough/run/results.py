@@ -17,6 +17,7 @@ import numpy as np
 
 from convexrough.errors import FileError
 from convexrough.progress import Announce
+from convexrough.run.page import slider_page
 from convexrough.run.scene_file import SceneFile, UnitNames, digest
 from convexrough.run.stage_tables import stage_tables
 from convexrough.run.stages import Findings
@@ -73,12 +74,14 @@ def write_results(
     summary: Summary,
     *,
     figures: bool,
+    html: bool = False,
     units: UnitNames | None = None,
     source: SceneFile | None = None,
     announce: Announce | None = None,
 ) -> list[Path]:
-    """Write summary.json, a table per stage (.csv, or .npz if long) and the figures.
+    """Write summary.json, a table per stage (.csv, or .npz if long), the figures and the page.
 
+    html     : write the slider page
     source   : the scene file, for a copy of it, and of what else says where the results are from
     announce : told the name of each file
 
@@ -98,6 +101,13 @@ def write_results(
     if figures:
         tell("figures")
         written += write_figures(folder, _draw(found, units or UnitNames()), tell)
+    if html:
+        tell("page")
+        page = slider_page(found.contact, summary, units or UnitNames(), tell)
+        path = folder / "slider.html"
+        with beside(path) as temporary:
+            temporary.write_text(page, encoding="utf-8")
+        written.append(path)
     # Last, so that a summary says that the rest is there.
     path = folder / "summary.json"
     with beside(path) as temporary:
