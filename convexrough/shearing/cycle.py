@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +18,11 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
+from convexrough.drawn import Drawn
 from convexrough.errors import InputError
+from convexrough.frames import Variables
 from convexrough.progress import Announce
+from convexrough.record import Along, Table
 from convexrough.shearing.certificate import friction_words
 from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.judgement import Bounds
@@ -30,15 +33,25 @@ from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
 
 
-@dataclass(frozen=True, eq=False)
-class Loop:
+@dataclass(frozen=True, eq=False, repr=False)
+class Loop(Table):
     """Points of a closed loop, from the maximum to the minimum and back.
 
     asperities : (k,) indices of those whose own loops follow
     forces : (m,) Q [force];  displacements : (m,) X [length], both bodies
     asperity_forces : (m, k) Q_i [force]
     asperity_displacements : (m, k) X_i + slip_i [length]
+
+    >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
+    >>> len(loop.forces), loop.asperity_forces.shape
+    (101, (101, 61))
     """
+
+    _shown = ("area",)
+    _along: ClassVar[Along] = {
+        ("point",): ("forces", "displacements"),
+        ("point", "asperity"): ("asperity_forces", "asperity_displacements"),
+    }
 
     asperities: Indices
     forces: Array
@@ -46,14 +59,17 @@ class Loop:
     asperity_forces: Array
     asperity_displacements: Array
 
+    def _variables(self) -> Variables:
+        return super()._variables() | {"asperity": (("asperity",), self.asperities)}
+
     @property
     def area(self) -> float:
         """[force length] of the polygon through the points: the loss, from inside."""
         return float(np.trapezoid(self.forces, self.displacements))
 
 
-@dataclass(frozen=True, eq=False)
-class Cycle:
+@dataclass(frozen=True, eq=False, repr=False)
+class Cycle(Table, Drawn):
     """A steady cycle between two shear forces. Arrays are (n,), in the scene's order.
 
     maximum, minimum       : [force]
@@ -66,7 +82,16 @@ class Cycle:
     displacement_amplitude : X_a, half the range of X [length]
     displacement_error     : proved bound on |X_a - solution| [length], infinite without proof
     sliding, partial       : proved to slide in each half of the cycle; proved never to
+
+    >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
+    >>> print(f"{cycle.loss_factor:.4f}", f"{cycle.secant_stiffness:.4g}")
+    0.0488 0.009131
     """
+
+    _shown = ("status", "secant_stiffness", "loss_factor")
+    _along: ClassVar[Along] = {
+        ("asperity",): ("status", "partial_slip_energies", "sliding_energies")
+    }
 
     contact: Contact
     maximum: float
@@ -138,6 +163,10 @@ def loops(
     asperities : as in `Cycle.loop`
 
     Half of the points are solved for: by Masing's rule the way back is the way there, mirrored.
+
+    >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2]))
+    >>> [len(loop.forces) for loop in cr.loops(several, points=40)]
+    [23, 41]
     """
     if not isinstance(points, int) or points < 4:
         raise InputError("points", found=points, expected="a whole number, at least 4")
@@ -224,6 +253,10 @@ def cycle(
 
     Raises InputError where the scene has no friction, the minimum exceeds the maximum, or either
     exceeds f P in size, or the displacement that of gross sliding.
+
+    >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
+    >>> print(f"{cycle.energy:.4g}", (cycle.status == "sliding").sum())
+    1.367e-13 6
     """
     upper = None if maximum is None else [maximum]
     lower = None if minimum is None else [minimum]
@@ -239,7 +272,12 @@ def cycles(
     displacement: ArrayLike | None = None,
     announce: Announce | None = None,
 ) -> list[Cycle]:
-    """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives."""
+    """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives.
+
+    >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2, 0.4]))
+    >>> print([f"{cycle.energy_normalised:.2g}" for cycle in several])
+    ['0.00021', '0.0028', '0.048']
+    """
     checks.instance("contact", contact, Contact)
     limit = checks.friction(contact.scene.friction) * contact.load
     checks.exactly_one("maximum", maximum, "displacement", displacement)
