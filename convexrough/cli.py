@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+from click.shell_completion import shell_complete
 
 from convexrough.errors import ConvexroughError, FileError, InputError, ProofError, SolverError
 from convexrough.version import __version__
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from convexrough.run.summary import Summary
 
 DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2, 3, 4, 130
+
+#: What a shell sets that wants a script for completion, or the completions of a line.
+COMPLETE = "_CONVEXROUGH_COMPLETE"
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 _PATH = click.Path(path_type=Path)
@@ -339,6 +343,8 @@ def bench(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; errors are a message, never a traceback."""
     try:
+        if arguments is None and (asked := os.environ.get(COMPLETE)):
+            return shell_complete(program, {}, "convexrough", COMPLETE, asked)
         given = sys.argv[1:] if arguments is None else list(arguments)
         with program.make_context("convexrough", given) as context:
             status = int(program.invoke(context) or DONE)

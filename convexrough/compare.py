@@ -21,10 +21,13 @@ import numpy as np
 from convexrough import solvers
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press
+from convexrough.drawn import Drawn
 from convexrough.errors import ConvexroughError, InputError, SolverError
+from convexrough.frames import Variables
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
 from convexrough.progress import Announce
+from convexrough.record import LINE, Record, Table, in_words
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
@@ -36,8 +39,8 @@ MOST_NAMED = 5
 THROUGH_CVXPY = ("SCS", "QOCO")
 
 
-@dataclass(frozen=True, eq=False)
-class Entry:
+@dataclass(frozen=True, eq=False, repr=False)
+class Entry(Record):
     """What one solver made of the scene.
 
     outcome : "answered"; "refused": the scene is not one for this solver; or "failed"
@@ -58,8 +61,8 @@ class Entry:
     memory: int | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Table, Drawn):
     """All entries, that of the reference (Newton's method) first.
 
     contradictions : pairs of certified answers, one of them globally, that exclude each other, in
@@ -78,6 +81,35 @@ class Comparison:
     def certified(self) -> bool:
         """Some answer has a proved word for every asperity."""
         return any(contact.certificate.holds for contact in self.contacts)
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        for entry in self.entries:
+            if (found := entry.contact) is None:
+                yield entry.solver, f"{entry.outcome}: {entry.message}"[:LINE]
+            else:
+                proved = f"{found.certificate.scope}; {in_words(found.status)}"
+                yield entry.solver, f"{proved}; {found.seconds:.2g} s"
+        yield "contradictions", "; ".join(self.contradictions) or "none"
+
+    def _variables(self) -> Variables:
+        """A row for each entry; nan and "" where there is no answer."""
+        none = np.full(len(self.contacts[0].scene), np.nan) if self.contacts else np.empty(0)
+        answers = [entry.contact for entry in self.entries]
+        words = [entry.different_words for entry in self.entries]
+        columns = {
+            "solver": [entry.solver for entry in self.entries],
+            "outcome": [entry.outcome for entry in self.entries],
+            "message": [entry.message for entry in self.entries],
+            "scope": ["" if each is None else each.certificate.scope for each in answers],
+            "seconds": [np.nan if each is None else each.seconds for each in answers],
+            "iterations": [np.nan if each is None else each.iterations for each in answers],
+            "disagreement": [entry.disagreement for entry in self.entries],
+            "different_words": [np.nan if each is None else each for each in words],
+        }
+        loads = np.array([none if each is None else each.loads for each in answers])
+        return {name: (("entry",), np.array(column)) for name, column in columns.items()} | {
+            "loads": (("entry", "asperity"), loads)
+        }
 
 
 def compare(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks, solvers
 from convexrough.arrays import Array, frozen
 from convexrough.convex.newton_step import correct
+from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
 from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
@@ -22,6 +23,7 @@ from convexrough.normal.certificate import Certificate, judge
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.units import Units
 from convexrough.progress import Announce
+from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
@@ -30,8 +32,8 @@ if TYPE_CHECKING:
     from convexrough.proof import Proof, Sheared
 
 
-@dataclass(frozen=True, eq=False)
-class Contact(Keeper):
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(Keeper, Table, Drawn):
     """A solved normal contact. Arrays are (n,), in the order of the scene's asperities.
 
     loads         : [force]
@@ -45,7 +47,16 @@ class Contact(Keeper):
     crowding      : largest (a_i + a_j) / r_ij; above 1 contact discs overlap and the model fails
     influence     : how the candidates were coupled: "dense", "lattice" or "scattered"
     seconds       : [s] that `press` took, or `solve`
+
+    >>> contact = cr.press(scene, approach=5e-5)
+    >>> print(contact.status[0], contact.status[-1], f"{contact.loads[0] / contact.load:.4f}")
+    contact open 0.0536
     """
+
+    _shown = ("status",)
+    _along: ClassVar[Along] = {
+        ("asperity",): ("status", "loads", "contact_radii", "mean_pressures", "gaps")
+    }
 
     scene: Scene
     loads: Array
@@ -120,6 +131,10 @@ def press(
 
     Raises InputError for bad values and SolverError where the solver stops without an answer. An
     answer without a certificate is returned: look at `contact.certificate.scope`.
+
+    >>> contact = cr.press(scene, approach=5e-5)
+    >>> print(f"{contact.load:.4g}", (contact.status == "contact").sum(), contact.certificate.scope)
+    3.609e-07 37 global
     """
     began = time.perf_counter()
     checks.instance("scene", scene, Scene)

@@ -82,3 +82,14 @@ class SolverError(ConvexroughError):
 
 class ProofError(ConvexroughError):
     """Nothing could be proved; the message says why."""
+
+
+class ExtraError(ConvexroughError, ImportError):
+    """A package that is not among the requirements is missing; the message says what to install.
+
+    extra : its name, which is that of the extra to install
+    """
+
+    def __init__(self, extra: str) -> None:
+        self.extra = extra
+        super().__init__(f"needs {extra}: pip install 'convexrough[{extra}]'")

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,16 +20,18 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact, solve
+from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.coupling import Kind
 from convexrough.normal.certificate import Certificate, judge
 from convexrough.normal.claims import Claim
 from convexrough.normal.problem import NormalProblem
+from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
 
-@dataclass(frozen=True, eq=False)
-class Verdict(Claim):
+@dataclass(frozen=True, eq=False, repr=False)
+class Verdict(Claim, Table, Drawn):
     """What is proved of a claim. Indices and arrays are those of the scene's asperities.
 
     loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"
@@ -38,7 +41,14 @@ class Verdict(Claim):
     certificate : of the loads as given, those up to the floor counted as 0
     solution    : the solution that Newton's method finds from them, with its own certificate; None
         where the claim holds without, or none is found
+
+    >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
+    >>> verdict.holds, verdict.decided_alone
+    (True, True)
     """
+
+    _shown = ("holds", "wrongly_open", "wrongly_loaded", "undecided", "suspects")
+    _along: ClassVar[Along] = {("asperity",): ("status", "claimed", "loads", "errors")}
 
     scene: Scene
     loads: Array
@@ -124,6 +134,12 @@ def verify(
     influence : how to couple the asperities; None for the cheapest exact way
 
     Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.
+
+    >>> claimed = contact.loads.copy()
+    >>> claimed[3] = 0.0
+    >>> verdict = cr.verify(scene, claimed, approach=5e-5)
+    >>> verdict.holds, verdict.wrongly_open.tolist()
+    (False, [3])
     """
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
     return verify_on(problem, loads, within=within, floor=floor)

@@ -5,7 +5,7 @@ meanings stand in aligned lines, and formulas of their own are indented. So
 
 - a line "name : meaning" and the indented lines after it become an item of a list; two that share
   a line are set apart by a semicolon and two spaces;
-- indented paragraphs stay as they are, in fixed width;
+- indented paragraphs stay as they are, in fixed width, and so do examples, which begin with >>>;
 - everything else is a paragraph, in which only `backquotes` mean anything: code.
 """
 
@@ -43,6 +43,8 @@ def _paragraphs(lines: list[str]) -> Iterator[list[str]]:
 def _shown(paragraph: list[str]) -> list[str]:
     if paragraph[0].startswith(" "):
         return ["::", "", *(f"    {line}" for line in paragraph)]
+    if paragraph[0].startswith(">>> "):
+        return paragraph
     if any(ITEM.match(line) for line in paragraph):
         return list(_list(paragraph))
     return [_plain(line) for line in paragraph]

@@ -38,6 +38,11 @@ def test_aligned_names_become_items() -> None:
     ]
 
 
+def test_examples_stay_as_they_are() -> None:
+    text = "It counts.\n\n>>> print(f'{x_ : .3g}', *y)\n0.1 |2|"
+    assert shown(text) == ["It counts.", ">>> print(f'{x_ : .3g}', *y)", "0.1 |2|"]
+
+
 def test_formulas_of_their_own_stay_as_they_are() -> None:
     text = "It stops where\n\n    max |g_i| <= 1e-13 * (|D0|)\n\nand not before."
     assert shown(text) == [

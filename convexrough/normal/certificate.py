@@ -7,6 +7,7 @@ are the given float64 numbers, and includes the rounding of everything computed 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +17,7 @@ from convexrough.arrays import Array, frozen
 from convexrough.influence import Kind, couple
 from convexrough.normal.judgement import Judgement, Scope
 from convexrough.normal.problem import NormalProblem
+from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
@@ -23,8 +25,8 @@ from convexrough.sphere import hertz
 WORDS = np.array(["undecided", "contact", "open"])
 
 
-@dataclass(frozen=True, eq=False)
-class Certificate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(Table):
     """What is proved of given loads. Arrays are (n,), in the caller's order.
 
     scope : "global": the scene has one solution, and the bounds are on the distance to it;
@@ -45,7 +47,14 @@ class Certificate:
         a dual point made from the loads alone; 0 to rounding at a solution, infinite where the
         shells do not prove the energy convex up to there. Under load control of the loads as they
         are judged: scaled, and none on asperities that cannot touch
+
+    >>> judged = contact.certificate
+    >>> judged.scope, judged.holds, judged.load_error < 1e-12 * contact.load
+    ('global', True, True)
     """
+
+    _shown = ("holds", "load_error", "gap_error")
+    _along: ClassVar[Along] = {("asperity",): ("status", "load_errors", "gaps", "gap_errors")}
 
     scope: Scope
     convexity_number: float
@@ -89,6 +98,10 @@ def certify(
     influence : how to couple the asperities: "dense", "lattice", "scattered"; None for the cheapest
 
     Raises InputError for loads of the wrong length, negative or not finite.
+
+    >>> judged = cr.certify(scene, contact.loads.round(12), approach=5e-5)
+    >>> judged.holds, judged.load_error < 1e-11
+    (True, True)
     """
     checks.instance("scene", scene, Scene)
     values = checks.array("loads", loads, length=len(scene), sign="not negative")

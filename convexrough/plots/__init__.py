@@ -1,13 +1,16 @@
 """Figures of every stage, fit to print.
 
-Each function returns figures by the stem of the file each belongs in; units are only said, never
+`..._figures` return figures by the stem of the file each belongs in; units are only said, never
 converted. No global state of matplotlib is touched: save a figure, or show it in a notebook. Discs
 of dense scenes are pixels inside a vector file: save that with a `dpi` too.
+
+`plot` draws the main picture of any result into axes of your own; `contact.plot()` is the same.
 """
 
+from convexrough.plots.axes import plot
 from convexrough.plots.cycle import cycle_figures
 from convexrough.plots.history import history_figures
 from convexrough.plots.press import press_figures
 from convexrough.plots.shear import shear_figures
 
-__all__ = ["cycle_figures", "history_figures", "press_figures", "shear_figures"]
+__all__ = ["cycle_figures", "history_figures", "plot", "press_figures", "shear_figures"]

@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure as MatplotlibFigure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
@@ -263,7 +264,8 @@ def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
     loss.plot(t, mindlin.loss(t), ls=DASHED, lw=1.1, color=SMOOTH, label="smooth sphere")
     loss.plot(amplitude, rough, label="asperities", **marks)
     loss.set(xscale="log", yscale="log", xlim=(t[0], 1.0))
-    _few_ticks(loss)
+    few_ticks(loss.xaxis)
+    few_ticks(loss.yaxis)
     label(loss, f"amplitude of $Q\\,/\\,(fP)$  ({scale.limit()})", scale.energy_label())
     loss.legend(loc="upper left", fontsize=TICK, frameon=False)
     loss.set_title("energy lost per cycle", fontsize=TICK, loc="left")
@@ -276,14 +278,13 @@ def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
     return figure
 
 
-def _few_ticks(axes: Axes) -> None:
+def few_ticks(axis: Axis) -> None:
     """At most 6 labelled powers of ten, or where there are too few, 2 and 5 times them too."""
-    for axis in (axes.xaxis, axes.yaxis):
-        low, high = axis.get_view_interval()
-        subs = (1.0, 2.0, 5.0) if high / low < 50 else (1.0,)
-        axis.set_major_locator(LogLocator(subs=subs, numticks=6))
-        if len(subs) == 1:
-            axis.set_major_formatter(LogFormatterSciNotation())
-        else:
-            axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter(NullFormatter())
+    low, high = axis.get_view_interval()
+    subs = (1.0, 2.0, 5.0) if high / low < 50 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=6))
+    if len(subs) == 1:
+        axis.set_major_formatter(LogFormatterSciNotation())
+    else:
+        axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())

@@ -41,7 +41,7 @@ def history_figures(past: History, *, length_unit: str = "", force_unit: str = "
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     path, cost = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     steps = len(past.applied)
-    at, x, q, w = _between_steps(past)
+    at, x, q, w = between_steps(past)
     x, q, w = x / scale.displacement, q / scale.force, w / scale.energy
     colours = ScalarMappable(Normalize(0.0, max(1, steps)), _darkening())
     for axes, across, up in ((path, x, q), (cost, at, w)):
@@ -76,7 +76,7 @@ def _darkening() -> Any:
     return matplotlib.colors.ListedColormap(whole(np.linspace(0.15, 1.0, 256)))
 
 
-def _between_steps(past: History) -> tuple[Array, Array, Array, Array]:
+def between_steps(past: History) -> tuple[Array, Array, Array, Array]:
     """Step (from 0), X, Q and energy, at the steps and, where these are few, between them too.
 
     Fewer points where many asperities touch: each takes time.

@@ -64,6 +64,20 @@ def pressure_figure(contact: Contact, scale: Scale) -> Figure:
         return _no_pressure(contact, scale)
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
+    colours, edge = draw_pressure(chart, contact, scale)
+    top = colours.get_clim()[1] or 1.0
+    chart.set_anchor("E")
+    label(chart, "$x\\,/\\,a_H$", "$y\\,/\\,a_H$")
+    draw_pressure_bar(chart, contact, colours)
+    _draw_profile(profile, contact, scale, edge)
+    profile.set(xlim=(-edge, edge), ylim=(0.0, 1.04 * top))
+    label(profile, scale.length_label("x"), scale.pressure_label())
+    profile.xaxis.set_major_locator(round_ticks())
+    return figure
+
+
+def draw_pressure(axes: Axes, contact: Contact, scale: Scale) -> tuple[ScalarMappable, float]:
+    """The map of the contact discs; its colours up to the largest p / p0, and half its width."""
     touching = contact.loads > 0
     points = contact.scene.contact_points / scale.length
     radii = contact.contact_radii[touching] / scale.length
@@ -73,25 +87,22 @@ def pressure_figure(contact: Contact, scale: Scale) -> Figure:
 
     colours = ScalarMappable(Normalize(0.0, top), COLOURS)
     if len(radii) < CROWDED:
-        draw_open(chart, points[~touching & (np.abs(points).max(axis=1) < edge)])
-        _draw_peaks(chart, points[touching], radii, peaks[touching], colours)
+        draw_open(axes, points[~touching & (np.abs(points).max(axis=1) < edge)])
+        _draw_peaks(axes, points[touching], radii, peaks[touching], colours)
     else:
-        draw_mosaic(chart, points, colours.to_rgba(peaks), touching, edge, 500)
-    draw_circle(chart, 1.0)
-    frame_map(chart, edge)
-    chart.set_anchor("E")
-    chart.set_title(census(contact), fontsize=TICK, loc="left")
-    label(chart, "$x\\,/\\,a_H$", "$y\\,/\\,a_H$")
-    bar = figure.colorbar(colours, ax=chart, aspect=28, pad=0.02)
-    bar.ax.tick_params(labelsize=TICK)
-    peak = "" if len(radii) < CROWDED else "peak "
-    bar.ax.set_title(peak + "$p\\,/\\,p_0$", fontsize=TICK)
+        draw_mosaic(axes, points, colours.to_rgba(peaks), touching, edge, 500)
+    draw_circle(axes, 1.0)
+    frame_map(axes, edge)
+    axes.set_title(census(contact), fontsize=TICK, loc="left")
+    return colours, edge
 
-    _draw_profile(profile, contact, scale, edge)
-    profile.set(xlim=(-edge, edge), ylim=(0.0, 1.04 * top))
-    label(profile, scale.length_label("x"), scale.pressure_label())
-    profile.xaxis.set_major_locator(round_ticks())
-    return figure
+
+def draw_pressure_bar(axes: Axes, contact: Contact, colours: ScalarMappable) -> None:
+    """Beside a map of the pressure, what its colours mean."""
+    bar = axes.figure.colorbar(colours, ax=axes, aspect=28, pad=0.02)
+    bar.ax.tick_params(labelsize=TICK)
+    peak = "" if np.count_nonzero(contact.loads) < CROWDED else "peak "
+    bar.ax.set_title(peak + "$p\\,/\\,p_0$", fontsize=TICK)
 
 
 def _draw_peaks(

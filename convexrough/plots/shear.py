@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -40,6 +40,9 @@ from convexrough.plots.style import (
 )
 from convexrough.scene.rings import evenly_chosen
 from convexrough.shearing.state import ShearState
+from convexrough.vector_shear.state import VectorShearState
+
+State: TypeAlias = ShearState | VectorShearState
 
 #: The more slip, the darker, also in grey.
 STICK, SLIP, SLIDING = "#b9d0e5", "#e0842a", "#701c05"
@@ -76,7 +79,7 @@ def shear_figures(
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, state in zip(panels, shown, strict=False):
         draw_state(axes, state, scale, float(friction.sphere.stick_radius(state.force)))
-        axes.set_title(_title(state, friction, narrow=columns == 4), fontsize=TICK)
+        axes.set_title(state_title(state, friction, narrow=columns == 4), fontsize=TICK)
         if columns == 4:
             axes.xaxis.set_major_locator(round_ticks(4))
     for axes in panels[len(shown) :]:
@@ -98,7 +101,7 @@ def shear_figures(
     return Figures({"stick_slip": figure})
 
 
-def draw_state(axes: Axes, state: ShearState, scale: Scale, stick_radius: float) -> None:
+def draw_state(axes: Axes, state: State, scale: Scale, stick_radius: float) -> None:
     """Contact discs, stick discs, open dots.
 
     stick_radius : of the smooth sphere, for comparison [length]
@@ -122,7 +125,7 @@ def draw_state(axes: Axes, state: ShearState, scale: Scale, stick_radius: float)
     frame_map(axes, edge)
 
 
-def _mean_shades(state: ShearState) -> Array:
+def _mean_shades(state: State) -> Array:
     """(n, 4) the mean colour of each contact disc: its stick disc's and its annulus' by area."""
     radii = state.contact.contact_radii
     inside = np.divide(state.stick_radii, radii, out=np.zeros(len(radii)), where=radii > 0)
@@ -133,7 +136,7 @@ def _mean_shades(state: ShearState) -> Array:
     return np.asarray(shades)
 
 
-def _draw_words(axes: Axes, state: ShearState, points: Array, scale: Scale) -> None:
+def _draw_words(axes: Axes, state: State, points: Array, scale: Scale) -> None:
     """Every contact disc in true size, its stick disc inside."""
     touching, radii = state.contact.loads > 0, state.contact.contact_radii
     many = int(touching.sum()) >= DENSE
@@ -154,7 +157,7 @@ def _draw_words(axes: Axes, state: ShearState, points: Array, scale: Scale) -> N
             draw_discs(axes, points[chosen], across[chosen] / scale.length, word, **look)
 
 
-def legend_handles(contact: Contact, states: Sequence[ShearState]) -> list[Artist]:
+def legend_handles(contact: Contact, states: Sequence[State]) -> list[Artist]:
     """What each look means, of those that occur."""
     words = {word for state in states for word in np.unique(state.status[contact.loads > 0])}
     entries = [
@@ -173,21 +176,23 @@ def legend_handles(contact: Contact, states: Sequence[ShearState]) -> list[Artis
         handles.append(Line2D([], [], ls="", marker="o", ms=2, mew=0, color=FAINT, label="open"))
     line: dict[str, Any] = {"lw": 0.9, "color": SMOOTH}
     handles.append(Line2D([], [], ls=DASHED, label="smooth sphere: contact", **line))
-    if any(state.force != 0 for state in states):
+    if any(np.any(state.force != 0) for state in states):
         handles.append(Line2D([], [], ls=DOTTED, label="smooth sphere: stick", **line))
     return handles
 
 
-def _doubtful(state: ShearState) -> Any:
+def _doubtful(state: State) -> Any:
     """(n,) which asperities to mark; where nothing is proved, those with a load."""
     unsure = state.status == "undecided"
     return unsure & (state.contact.loads > 0) if state.certificate.scope == "none" else unsure
 
 
-def _title(state: ShearState, scale: ShearScale, *, narrow: bool) -> str:
+def state_title(state: State, scale: ShearScale, *, narrow: bool) -> str:
+    """The shear force, of a vector its size, and how many slide."""
     touching = state.contact.loads > 0
     slide = int((touching & (state.status == "sliding")).sum())
-    share = f"{state.force / scale.force:.4g}".replace("-", "\u2212")
+    force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)
+    share = f"{force / scale.force:.4g}".replace("-", "\u2212")
     words = f"{slide:,} of {int(touching.sum()):,} slide"
     unsure = doubt(state.certificate.scope, state.status)
     return f"$Q/(fP)$ = {share}:{chr(10) if narrow else ' '}{words}" + unsure.replace(" ", "\n", 1)

@@ -42,13 +42,14 @@ def verdict_figures(
     figure = Figure(figsize=(width, 3.9), layout="constrained")
     points = verdict.scene.asperities.positions
     for axes, claim in zip(figure.subplots(1, len(claims), squeeze=False)[0], claims, strict=True):
-        _draw(axes, claim, points)
-        unit = f"  [{literal(length_unit)}]" if length_unit else ""
-        label(axes, f"$x${unit}", f"$y${unit}")
+        draw_claim(axes, claim, points, length_unit)
     return {"verdict": figure}
 
 
-def _draw(axes: Axes, claim: Claim, points: Array) -> None:
+def draw_claim(axes: Axes, claim: Claim, points: Array, length_unit: str = "") -> None:
+    """The map of one claim."""
+    unit = f"  [{literal(length_unit)}]" if length_unit else ""
+    label(axes, f"$x${unit}", f"$y${unit}")
     words = claim.status
     shades = np.select([words == "open", words == "sliding"], [0, 2], default=1)
     margin = 0.04 * float(np.ptp(points, axis=0).max()) or 1.0

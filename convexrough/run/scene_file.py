@@ -45,6 +45,11 @@ class SceneFile(Stages):
     influence : how to couple the asperities; None for the cheapest exact way
     text   : the file itself;  seed : of its random heights and radii, None where there are none
     inputs : the SHA-256 of each file it was read from, by its path
+
+    >>> file = cr.read_scene(new_scene)
+    >>> contact = cr.press(file.scene, approach=file.approach, load=file.load)
+    >>> contact.certificate.holds
+    True
     """
 
     path: Path
@@ -75,6 +80,10 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
 
     Raises FileError where a file cannot be read or is no TOML, SceneFileError with every mistake in
     the tables, and InputError for mistakes that show only in building the scene.
+
+    >>> file = cr.read_scene(new_scene)  # what `convexrough new` writes
+    >>> len(file.scene)
+    61
     """
     from convexrough.run.schema import validate
 

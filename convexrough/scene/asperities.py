@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
+from convexrough.record import Record
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.neighbours import refuse_coincident
 from convexrough.scene.patterns import (
@@ -26,13 +27,17 @@ from convexrough.scene.patterns import (
 MANY = 5000
 
 
-@dataclass(frozen=True, eq=False)
-class Asperities:
+@dataclass(frozen=True, eq=False, repr=False)
+class Asperities(Record):
     """Spherical asperities on the half-space, in the caller's order.
 
     positions : (n, 2) [length]  summits; the axis of the sphere is the origin
     tip_radii : (n,) [length]    one number stands for all
     heights   : (n,) [length]    offset of each summit, positive is taller; one number for all
+
+    >>> asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    >>> len(asperities)
+    61
     """
 
     positions: Array

@@ -16,6 +16,10 @@ class Material:
     poisson_ratio   : nu, from 0 to 0.5
     hardness        : the mean pressure at which asperities yield [force / length^2], if known:
         nothing is computed from it, a contact beyond it is warned of
+
+    >>> steel = cr.Material.from_youngs(210e9, 0.3)
+    >>> print(f"{steel.contact_modulus:.4g}")
+    1.154e+11
     """
 
     contact_modulus: float

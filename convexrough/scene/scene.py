@@ -11,6 +11,7 @@ import numpy as np
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.errors import InputError
+from convexrough.record import Record
 from convexrough.scene.asperities import MANY, Asperities
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.material import Material
@@ -19,14 +20,20 @@ from convexrough.scene.neighbours import refuse_coincident
 Geometry = Literal["summit", "closest"]
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene(Record):
     """A sphere, the asperities it is pressed on, and what both are made of.
 
     sphere_radius : R [length]
     friction      : Coulomb's coefficient f; only the shear stages need it
     geometry      : "summit" (the source paper: an asperity meets the sphere at its summit) or
                     "closest" (it meets it where the two undeformed paraboloids are closest)
+
+    >>> asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    >>> material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
+    >>> scene = cr.Scene(sphere_radius=1.0, asperities=asperities, material=material, friction=0.5)
+    >>> len(scene)
+    61
     """
 
     sphere_radius: float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,7 @@ from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact
 from convexrough.normal.certificate import Certificate
 from convexrough.normal.judgement import Scope
+from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.judgement import Bounds, judge_states
 from convexrough.shearing.normal_map import States, evaluate, gross_sliding, slips
@@ -21,8 +23,8 @@ from convexrough.shearing.problem import TangentialProblem
 NEAR_SLIDING = 1e-2
 
 
-@dataclass(frozen=True, eq=False)
-class ShearCertificate:
+@dataclass(frozen=True, eq=False, repr=False)
+class ShearCertificate(Table):
     """What is proved of a friction state. Arrays are (n,), in the caller's order.
 
     scope : that of the contact it starts from, or "none" where nothing is proved
@@ -30,7 +32,14 @@ class ShearCertificate:
         "open" (proved to carry no load) or "undecided"
     force_errors : [force];  slip_errors : [length] bounds on the distance to the solution
     displacement_error : [length] likewise
+
+    >>> judged = cr.shear(contact, force=0.25 * contact.load).certificate
+    >>> judged.scope, judged.holds, (judged.status == "sliding").sum().item()
+    ('global', True, 6)
     """
+
+    _shown = ("holds",)
+    _along: ClassVar[Along] = {("asperity",): ("status", "force_errors", "slip_errors")}
 
     scope: Scope
     status: NDArray[np.str_]
@@ -94,6 +103,11 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     the forces leave.
 
     Raises InputError if the scene has no friction, |Q| exceeds f P, or forces are not numbers.
+
+    >>> force = 0.25 * contact.load
+    >>> state = cr.shear(contact, force=force)
+    >>> cr.certify_shear(contact, state.forces, force=force).holds
+    True
     """
     limit = checks.friction(contact.scene.friction) * contact.load
     total = abs(float(checks.bearable("force", checks.finite("force", force), limit)))

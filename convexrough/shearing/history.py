@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,15 +11,17 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
+from convexrough.drawn import Drawn
 from convexrough.progress import Announce
+from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.masing import remember
 from convexrough.shearing.normal_map import States
 
 
-@dataclass(frozen=True, eq=False)
-class History:
+@dataclass(frozen=True, eq=False, repr=False)
+class History(Table, Drawn):
     """A sequence of shear forces from 0, monotonic from each to the next.
 
     applied       : (m,) Q [force]
@@ -28,7 +31,16 @@ class History:
     asperity_displacements : (m, n) X_i + slip_i [length]
     slips         : (m, n) gross slip [length]
     energy        : (m,) lost since the beginning [force length]
+
+    >>> past = cr.history(contact, forces=contact.load * np.array([0.4, -0.4, 0.4]))
+    >>> past.forces.shape, bool((np.diff(past.energy) > 0).all())
+    ((3, 61), True)
     """
+
+    _along: ClassVar[Along] = {
+        ("step",): ("applied", "displacements", "displacement_errors", "energy"),
+        ("step", "asperity"): ("forces", "asperity_displacements", "slips"),
+    }
 
     contact: Contact
     applied: Array
@@ -44,6 +56,10 @@ def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = 
     """Any sequence of shear forces (m,) [force], |Q| <= f P, from the freshly pressed contact.
 
     announce : told in a line how far long work has come
+
+    >>> past = cr.history(contact, forces=contact.load * np.array([0.4, 0.0]))
+    >>> print([f"{moved:.3g}" for moved in past.displacements])  # the way back is not the way there
+    ['1.81e-05', '2.66e-06']
     """
     checks.instance("contact", contact, Contact)
     limit = checks.friction(contact.scene.friction) * contact.load

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,28 +12,43 @@ from numpy.typing import ArrayLike
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.frames import Variables
 from convexrough.progress import Announce
+from convexrough.record import Along, Table
 from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.normal_map import States
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.shearing.state import indices
 
 
-@dataclass(frozen=True, eq=False)
-class Loop:
+@dataclass(frozen=True, eq=False, repr=False)
+class Loop(Table):
     """Points of a closed loop, from the maximum to the minimum and back.
 
     asperities : (k,) indices of those whose own loops follow
     forces : (m,) Q [force];  displacements : (m,) X [length], both bodies
     asperity_forces : (m, k) Q_i [force]
     asperity_displacements : (m, k) X_i + slip_i [length]
+
+    >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
+    >>> len(loop.forces), loop.asperity_forces.shape
+    (101, (101, 61))
     """
+
+    _shown = ("area",)
+    _along: ClassVar[Along] = {
+        ("point",): ("forces", "displacements"),
+        ("point", "asperity"): ("asperity_forces", "asperity_displacements"),
+    }
 
     asperities: Indices
     forces: Array
     displacements: Array
     asperity_forces: Array
     asperity_displacements: Array
+
+    def _variables(self) -> Variables:
+        return super()._variables() | {"asperity": (("asperity",), self.asperities)}
 
     @property
     def area(self) -> float:

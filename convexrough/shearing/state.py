@@ -10,6 +10,7 @@ every loaded asperity the displacement of the deep points is, [A16] of the sourc
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,8 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
+from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.progress import Announce
+from convexrough.record import Along, Table
 from convexrough.shearing.certificate import ShearCertificate
 from convexrough.shearing.judgement import judge_states
 from convexrough.shearing.many_states import by_matrices
@@ -29,8 +32,8 @@ from convexrough.shearing.problem import TangentialProblem
 MOST_ONSETS = 256
 
 
-@dataclass(frozen=True, eq=False)
-class ShearState:
+@dataclass(frozen=True, eq=False, repr=False)
+class ShearState(Table, Drawn):
     """A friction state. Arrays are (n,), in the order of the scene's asperities.
 
     force         : Q [force];  displacement : X of the deep points, both bodies [length]
@@ -38,7 +41,16 @@ class ShearState:
     displacements : X_i + slip_i [length]: own deflection and slip, without the others' influence
     slips         : [length] gross slip, 0 where not sliding
     stick_radii   : c_i [length], 0 where sliding
+
+    >>> state = cr.shear(contact, displacement=9.88e-6)
+    >>> print(f"{state.force / contact.load:.3f}", (state.status == "sliding").sum())
+    0.250 6
     """
+
+    _shown = ("status",)
+    _along: ClassVar[Along] = {
+        ("asperity",): ("status", "forces", "displacements", "slips", "stick_radii")
+    }
 
     contact: Contact
     force: float
@@ -70,6 +82,10 @@ def shear(
 
     Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding) or X its
     displacement there, and SolverError where Newton's method stops without an answer.
+
+    >>> state = cr.shear(contact, force=0.25 * contact.load)
+    >>> print((state.status == "sliding").sum(), f"{state.displacement:.3g}")
+    6 9.88e-06
     """
     checks.instance("contact", contact, Contact)
     friction = checks.friction(contact.scene.friction)
@@ -150,6 +166,10 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
     which : indices of the asperities to look at, in this order; default all. Each takes about
         ten friction states of the contact, so of many loaded asperities some must be named.
+
+    >>> onsets = cr.onset_of_sliding(contact, which=[0, 36])
+    >>> print((onsets / contact.load).round(3))
+    [0.5   0.176]
     """
     from scipy.optimize.elementwise import find_root  # 0.1 s to import: only when asked
 

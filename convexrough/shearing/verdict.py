@@ -12,6 +12,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.normal.claims import Claim
+from convexrough.record import Record
 from convexrough.shearing.certificate import ShearCertificate, certify_shear
 from convexrough.shearing.state import ShearState, shear
 
@@ -19,8 +20,8 @@ from convexrough.shearing.state import ShearState, shear
 CLAIMS_SLIDING = 1e-4
 
 
-@dataclass(frozen=True, eq=False)
-class ShearVerdict(Claim):
+@dataclass(frozen=True, eq=False, repr=False)
+class ShearVerdict(Claim, Record):
     """What is proved of shear forces of first loading. Arrays are those of the scene's asperities.
 
     contact : pressed;  forces : (n,) [force] as given

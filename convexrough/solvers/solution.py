@@ -10,10 +10,11 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import Announce
+from convexrough.record import Record
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(Record):
     """Loads of the candidates and the approach, in the problem's units.
 
     residual : problem.residual(loads, approach), recomputed from the loads

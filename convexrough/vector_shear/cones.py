@@ -106,6 +106,10 @@ class FrictionConic:
     accepted  : an answer is accepted if the dual bound made from its forces and its displacement
         proves its energy to be within this of the least, relatively, and its `residual`, slips
         included, is at most 1e4 times this; else SolverError
+
+    >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionConic())
+    >>> state.residual < 1e-5
+    True
     """
 
     tolerance: float = 1e-12

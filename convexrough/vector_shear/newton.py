@@ -35,6 +35,10 @@ class FrictionNewton:
 
     Stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step no longer halves
     that. Raises SolverError if `max_iterations` steps do not get there.
+
+    >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionNewton())
+    >>> state.residual < 1e-12
+    True
     """
 
     tolerance: float = 1e-12

@@ -9,7 +9,7 @@ by Newton's method or as a second-order cone program. Derived in docs/theory/fri
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact
+from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
+from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF
 from convexrough.shearing.certificate import ShearCertificate
 from convexrough.vector_shear.judgement import judge_vectors
@@ -34,8 +36,8 @@ class FrictionSolver(Protocol):
     def solve(self, problem: VectorProblem, total: Array) -> VectorState: ...
 
 
-@dataclass(frozen=True, eq=False)
-class VectorShearState:
+@dataclass(frozen=True, eq=False, repr=False)
+class VectorShearState(Table, Drawn):
     """A vector friction state. Arrays are in the order of the scene's asperities.
 
     force        : (2,) [force];  displacement : (2,) X of the deep points, both bodies [length]
@@ -53,7 +55,18 @@ class VectorShearState:
     At |Q| = f P exactly, forces are f P_i along Q. A state of several asperities then exists, in
     general, only in the limit of an infinite displacement: that and the slips, `residual` and
     `duality_gap` are infinite.
+
+    >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
+    >>> state.forces.shape, state.certificate.holds
+    ((61, 2), True)
     """
+
+    _shown = ("status",)
+    _along: ClassVar[Along] = {
+        ("asperity",): ("status", "stick_radii"),
+        ("asperity", "direction"): ("forces", "slips"),
+        ("direction",): ("force", "displacement"),
+    }
 
     contact: Contact
     force: Array
@@ -85,6 +98,10 @@ def shear_vector(
     Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding), and
     SolverError where the solver stops without an answer, is missing, or finds asperities so dense
     that the program is not convex.
+
+    >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
+    >>> print(f"{state.disagreement:.3f}")
+    0.027
     """
     checks.instance("contact", contact, Contact)
     solver = FrictionNewton() if solver is None else solver

@@ -30,6 +30,29 @@ def test_python_m(tmp_path: Path) -> None:
     assert done.stdout.startswith("convexrough, version ")
 
 
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_is_given_a_script(
+    shell: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("_CONVEXROUGH_COMPLETE", f"{shell}_source")
+    done = module(cwd=tmp_path, stdout=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"{shell}_complete" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"), [("ver", ["plain,verify"]), ("run --pr", ["plain,--proof"])]
+)
+def test_a_line_is_completed(
+    words: str, completed: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("_CONVEXROUGH_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", f"convexrough {words}")
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split())))
+    done = module(cwd=tmp_path, stdout=subprocess.PIPE)
+    assert (done.returncode, done.stdout.split(), done.stderr) == (0, completed, "")
+
+
 @pytest.mark.parametrize("delay", [0.02, 0.1, 0.3, 0.6, 1.0])
 def test_an_interrupt_at_any_moment(tmp_path: Path, delay: float) -> None:
     rough = HEXAGONAL.replace("0.0025", "1e-4").replace("0.02", "8e-4")

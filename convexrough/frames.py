@@ -1,0 +1,54 @@
+"""Named arrays as a data frame of pandas or a data set of xarray, which are loaded only here."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.errors import ExtraError
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+#: What each array is along, and the array. What the first is along are the rows of a data frame.
+Variables: TypeAlias = dict[str, tuple[tuple[str, ...], NDArray[Any]]]
+
+#: The names of the components of a vector.
+DIRECTION = {"direction": ["x", "y"]}
+
+
+def dataframe(variables: Variables, attributes: dict[str, Any]) -> pandas.DataFrame:
+    """Those along the rows, and along rows and direction, as columns."""
+    rows, _ = next(iter(variables.values()))
+    columns: dict[str, NDArray[Any]] = {}
+    for name, (along, values) in variables.items():
+        if along == rows:
+            columns[name] = values
+        elif along == (*rows, "direction"):
+            columns |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1]}
+    frame: pandas.DataFrame = _loaded("pandas").DataFrame(columns, copy=True)
+    frame.index.name = rows[0]
+    frame.attrs.update(attributes)
+    return frame
+
+
+def dataset(variables: Variables, attributes: dict[str, Any]) -> xarray.Dataset:
+    """All of them, copied: a data set may be written to, a result may not."""
+    arrays = {name: (along, np.array(values)) for name, (along, values) in variables.items()}
+    known = {"x", "y", "asperity"} & set(arrays)
+    vectors = any("direction" in along for along, _ in arrays.values())
+    held: xarray.Dataset = _loaded("xarray").Dataset(
+        arrays, DIRECTION if vectors else {}, attributes
+    )
+    return held.set_coords(sorted(known))
+
+
+def _loaded(extra: str) -> Any:
+    try:
+        return import_module(extra)
+    except ImportError as error:
+        raise ExtraError(extra) from error

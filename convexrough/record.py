@@ -1,0 +1,152 @@
+"""What every result can do: say itself on one screen, become a table, be pickled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import frames
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+#: Names of attributes by what their arrays are along.
+Along: TypeAlias = dict[tuple[str, ...], tuple[str, ...]]
+
+#: How many values of an array are written out, and how many letters of a text.
+FEW, LINE = 4, 76
+
+
+class Record:
+    """A dataclass that prints a line for each field, and whose copies are read-only, too."""
+
+    #: Properties that are printed before the fields.
+    _shown: ClassVar[tuple[str, ...]] = ()
+
+    def __repr__(self) -> str:
+        rows = list(self._rows())
+        width = max(len(name) for name, _ in rows)
+        return "\n".join((type(self).__name__, *(f"  {name:{width}}  {it}" for name, it in rows)))
+
+    def _repr_html_(self) -> str:
+        from html import escape  # only in a notebook
+
+        rows = "".join(
+            f"<tr><th style='text-align:left'>{escape(name)}</th>"
+            f"<td style='text-align:left'>{escape(it)}</td></tr>"
+            for name, it in self._rows()
+        )
+        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: what is kept beside them is made again."""
+        return {each.name: getattr(self, each.name) for each in self._fields()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False  # which a pickle forgets
+        self.__dict__.update(state)
+
+    def _fields(self) -> Any:
+        return fields(self)  # type: ignore[arg-type]
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        """The name of each line, and what stands there."""
+        for name in (*self._shown, *(each.name for each in self._fields())):
+            yield name, in_words(getattr(self, name))
+
+    def _headline(self) -> str:
+        """All of it in one line."""
+        parts = [str(getattr(self, name)) for name in ("scope", "solver") if hasattr(self, name)]
+        if hasattr(self, "status"):
+            parts.append(in_words(self.status))
+        if hasattr(self, "__len__"):
+            parts.append(f"{len(self):,} asperities")
+        return f"{type(self).__name__}: {'; '.join(parts)}" if parts else type(self).__name__
+
+
+class Table(Record):
+    """A record whose arrays are along asperities, steps or points."""
+
+    #: The first key is what the rows of a data frame are.
+    _along: ClassVar[Along] = {}
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """A data frame of pandas: a row for each asperity, step, point or solver.
+
+        Columns have the names of the attributes, those of vectors with _x and _y; numbers and words
+        of the whole are in `attrs`. What is along two things, such as the forces of asperities at
+        each step of a history, is in `to_xarray` alone.
+
+        Raises ExtraError where pandas is not installed.
+        """
+        return frames.dataframe(self._variables(), self._attributes())
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A data set of xarray: every array, by the names of what it is along.
+
+        Numbers and words of the whole are in `attrs`.
+
+        Raises ExtraError where xarray is not installed.
+        """
+        return frames.dataset(self._variables(), self._attributes())
+
+    def _variables(self) -> frames.Variables:
+        places: frames.Variables = {}
+        if (scene := getattr(getattr(self, "contact", self), "scene", None)) is not None:
+            x, y = scene.asperities.positions.T
+            places = {"x": (("asperity",), x), "y": (("asperity",), y)}
+        arrays = {
+            name: (along, getattr(self, name))
+            for along, names in self._along.items()
+            for name in names
+        }
+        rows_first = next(iter(self._along)) == ("asperity",)
+        return places | arrays if rows_first else arrays | places
+
+    def _attributes(self) -> dict[str, Any]:
+        """The fields that are one number or word."""
+        values = self.__getstate__()
+        return {name: it for name, it in values.items() if isinstance(it, (str, int, float))}
+
+
+def in_words(value: Any) -> str:
+    """A value in one line: of an array its size and range, or how many there are of each word."""
+    if isinstance(value, Record):
+        return value._headline()
+    if isinstance(value, np.ndarray):
+        return _of_array(value)
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    text = str(value)
+    return text if len(text) <= LINE else f"{text[: LINE - 3]}..."
+
+
+def _of_array(values: NDArray[Any]) -> str:
+    if values.size == 0:
+        return "none"
+    if values.dtype.kind == "U":
+        return ", ".join(_counted(values))
+    if values.dtype.kind == "b":
+        return f"{np.count_nonzero(values):,} of {values.size:,}"
+    if values.size <= FEW:
+        return ", ".join(f"{value:.6g}" for value in values.ravel())
+    size = " x ".join(f"{n:,}" for n in values.shape)
+    if values.dtype.kind == "i":
+        return f"{size} indices: {', '.join(map(str, values.ravel()[:FEW]))}, ..."
+    low, high = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
+    return f"{size} from {low:.6g} to {high:.6g}"
+
+
+def _counted(words: NDArray[np.str_]) -> Iterator[str]:
+    """How many there are of each, in the order in which they come."""
+    while len(words):
+        same = words == words[0]
+        yield f"{np.count_nonzero(same):,} {words[0]}"
+        words = words[~same]

@@ -1,0 +1,321 @@
+"""Results in the forms people use: printed, as tables, pickled, drawn, and in the docstrings."""
+
+import copy
+import dataclasses
+import doctest
+import importlib
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scenes import MATERIAL, PAPER_APPROACH, paper
+
+import convexrough as cr
+from convexrough import plots, solvers
+from convexrough.compare import compare
+from convexrough.errors import ExtraError
+
+
+@cache
+def results() -> dict[str, Any]:
+    """One of each kind."""
+    scene = dataclasses.replace(paper(), friction=0.5)
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    Q = 0.25 * contact.load
+    wrong = contact.loads.copy()
+    wrong[3] = 0.0
+    state, cycle = cr.shear(contact, force=Q), cr.cycle(contact, maximum=Q)
+    few = (solvers.Conic(), solvers.BristleQP())
+    found = (
+        scene,
+        scene.asperities,
+        contact,
+        contact.certificate,
+        state,
+        state.certificate,
+        cr.shear_vector(contact, force=Q),
+        cycle,
+        cycle.loop(16, asperities=[0, 3]),
+        cr.history(contact, forces=[Q, -Q / 2]),
+        cr.verify(scene, wrong, approach=PAPER_APPROACH),
+        compare(scene, approach=PAPER_APPROACH, solvers=few),
+        cr.smooth(scene, load=contact.load),
+    )
+    return {type(each).__name__: each for each in found}
+
+
+NAMES = tuple(results())
+WITH_TABLES = tuple(name for name in NAMES if hasattr(results()[name], "to_dataframe"))
+DRAWN = tuple(name for name in NAMES if hasattr(results()[name], "plot"))
+
+
+def test_every_kind_is_here() -> None:
+    public = {name for name in cr.__all__ if dataclasses.is_dataclass(getattr(cr, name))}
+    settings = {"FrictionConic", "FrictionNewton", "Material", "SceneFile"}
+    assert public - settings <= set(NAMES)
+    assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "History",
+                          "Verdict", "Comparison"}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_is_printed_on_one_screen(name: str) -> None:
+    lines = repr(results()[name]).split("\n")
+    assert lines[0] == name
+    assert 2 <= len(lines) <= 24
+    assert max(map(len, lines)) <= 110
+    assert "array(" not in repr(results()[name])
+
+
+def test_what_is_printed_is_what_is_there() -> None:
+    contact, verdict = results()["Contact"], results()["Verdict"]
+    assert "status           37 contact, 24 open\n" in repr(contact)
+    assert f"loads            61 from 0 to {contact.loads.max():.6g}\n" in repr(contact)
+    assert "certificate      Certificate: global; 37 contact, 24 open\n" in repr(contact)
+    assert "sliding                 6 of 61\n" in repr(results()["Cycle"])
+    assert "wrongly_open      3\n" in repr(verdict)
+    assert "wrongly_loaded    none\n" in repr(verdict)
+    assert "contradictions          none" in repr(results()["Comparison"])
+
+
+def test_nothing_printed_grows_with_the_scene() -> None:
+    asperities = cr.Asperities.hexagonal(spacing=1e-4, tip_radius=8e-4, within=0.003)
+    scene = cr.Scene(1.0, asperities, MATERIAL)
+    contact = cr.press(scene, approach=5e-6)
+    wrong = cr.verify(scene, np.zeros(len(scene)), approach=5e-6)
+    for result in (contact, wrong):
+        assert len(repr(result).split("\n")) <= 24
+        assert max(map(len, repr(result).split("\n"))) <= 110
+
+
+class Cells(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.text: list[str] = []
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_notebook_shows_the_same_lines(name: str) -> None:
+    cells = Cells()
+    cells.feed(results()[name]._repr_html_())
+    lines = [line.strip().split("  ", 1) for line in repr(results()[name]).split("\n")]
+    shown = [part.strip() for line in lines for part in line]
+    assert [text.strip() for text in cells.text if text.strip()] == [it for it in shown if it]
+
+
+def arrays(record: Any) -> Iterator[np.ndarray[Any, Any]]:
+    """Those of a result and of the results inside."""
+    for field in dataclasses.fields(record):
+        value = getattr(record, field.name)
+        if isinstance(value, np.ndarray):
+            yield value
+        elif dataclasses.is_dataclass(value):
+            yield from arrays(value)
+        elif isinstance(value, tuple):
+            for each in value:
+                if dataclasses.is_dataclass(each):
+                    yield from arrays(each)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "copied", [lambda it: pickle.loads(pickle.dumps(it)), copy.deepcopy], ids=["pickle", "deepcopy"]
+)
+def test_pickling_keeps_every_bit_and_what_is_read_only(name: str, copied: Any) -> None:
+    first, second = results()[name], copied(results()[name])
+    assert type(second) is type(first)
+    assert repr(second) == repr(first)
+    for one, other in zip(arrays(first), arrays(second), strict=True):
+        assert one is not other
+        np.testing.assert_array_equal(one, other)
+        assert not other.flags.writeable
+
+
+def test_a_pickled_contact_goes_on() -> None:
+    contact = results()["Contact"]
+    again = pickle.loads(pickle.dumps(contact))
+    assert "_kept" in vars(contact)
+    assert "_kept" not in vars(again)  # what is made from a contact is made again, not carried
+    force = 0.25 * contact.load
+    state = cr.shear(again, force=force)
+    np.testing.assert_array_equal(state.forces, results()["ShearState"].forces)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_replace(name: str) -> None:
+    replace = getattr(copy, "replace", dataclasses.replace)  # copy.replace is new in Python 3.13
+    result = results()[name]
+    assert repr(replace(result)) == repr(result)
+    first = dataclasses.fields(result)[0].name
+    assert getattr(replace(result, **{first: getattr(result, first)}), first) is not None
+
+
+@pytest.mark.parametrize("name", WITH_TABLES)
+def test_a_data_frame_has_the_arrays(name: str) -> None:
+    result = results()[name]
+    frame = result.to_dataframe()
+    rows = {"History": "step", "Loop": "point", "Comparison": "entry"}.get(name, "asperity")
+    assert frame.index.name == rows
+    for column in frame.columns:
+        if hasattr(result, column):
+            np.testing.assert_array_equal(frame[column].to_numpy(), getattr(result, column))
+        elif column not in ("x", "y") and name == "VectorShearState":
+            vector, direction = column.rsplit("_", 1)
+            values = getattr(result, vector)[:, "xy".index(direction)]
+            np.testing.assert_array_equal(frame[column].to_numpy(), values)
+    for key, value in frame.attrs.items():
+        assert getattr(result, key) == value
+
+
+@pytest.mark.parametrize("name", WITH_TABLES)
+def test_a_data_set_has_the_arrays(name: str) -> None:
+    result = results()[name]
+    held = result.to_xarray()
+    for key in {*held.data_vars} - {"loads"}:
+        if hasattr(result, key):
+            np.testing.assert_array_equal(held[key].to_numpy(), getattr(result, key))
+    for key, value in held.attrs.items():
+        assert getattr(result, key) == value
+    if "loads" in held:
+        held["loads"][0] = -1.0  # a copy: the result stays as it is
+
+
+def test_asperities_can_be_found_by_name() -> None:
+    contact, past = results()["Contact"], results()["History"]
+    x, y = contact.scene.asperities.positions.T
+    frame = contact.to_dataframe()
+    np.testing.assert_array_equal(frame["x"], x)
+    np.testing.assert_array_equal(frame["y"], y)
+    assert frame.query("status == 'contact'")["loads"].sum() == pytest.approx(contact.load)
+    held = past.to_xarray()
+    assert dict(held.sizes) == {"step": 2, "asperity": 61}
+    np.testing.assert_array_equal(held["forces"].sel(step=1), past.forces[1])
+    loop = results()["Loop"]
+    own = loop.to_xarray()["asperity_forces"].sel(asperity=3)
+    np.testing.assert_array_equal(own, loop.asperity_forces[:, 1])
+    vector = results()["VectorShearState"]
+    np.testing.assert_array_equal(
+        vector.to_xarray()["slips"].sel(direction="y"), vector.slips[:, 1]
+    )
+
+
+def test_solvers_side_by_side() -> None:
+    comparison = results()["Comparison"]
+    frame, held = comparison.to_dataframe(), comparison.to_xarray()
+    assert frame["solver"].tolist() == [entry.solver for entry in comparison.entries]
+    assert (frame["scope"] == "global").all()
+    assert held["loads"].shape == (3, 61)
+    refused = compare(
+        cr.Scene(1.0, cr.Asperities([[0.0, 0.0], [0.001, 0.0]], 1.0), MATERIAL),
+        approach=1e-5,
+        solvers=[solvers.Conic()],
+    )
+    assert refused.entries[1].contact is None
+    assert np.isnan(refused.to_xarray()["loads"][1]).all()
+    assert np.isnan(refused.to_dataframe()["seconds"][1])
+    assert refused.entries[1].outcome in repr(refused)
+    refused.plot()
+
+
+@pytest.mark.parametrize("extra", ["pandas", "xarray"])
+def test_without_an_extra(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, extra, None)
+    contact = results()["Contact"]
+    with pytest.raises(ExtraError, match=rf"needs {extra}: pip install 'convexrough\[{extra}\]'"):
+        _ = contact.to_dataframe() if extra == "pandas" else contact.to_xarray()
+    assert issubclass(ExtraError, cr.ConvexroughError)
+    assert issubclass(ExtraError, ImportError)
+
+
+def test_nothing_is_loaded_before_it_is_asked_for() -> None:
+    code = """
+import sys, convexrough as cr
+scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), cr.Material(1.0, 0.3))
+repr(cr.press(scene, approach=1e-4))
+print({"pandas", "xarray", "matplotlib"} & set(sys.modules))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_axes_in_axes_out(name: str) -> None:
+    result = results()[name]
+    alone = result.plot(length_unit="mm", force_unit="N")
+    assert isinstance(alone, Axes)
+    alone.figure.canvas.draw()
+    mine, other = Figure().subplots(1, 2)
+    assert plots.plot(result, other) is other
+    assert other.has_data()
+    assert not mine.has_data()
+    assert other.get_xlabel()
+
+
+@pytest.mark.parametrize("name", ["Contact", "ShearState", "VectorShearState", "Cycle", "History"])
+def test_axes_without_contact(name: str) -> None:
+    scene = dataclasses.replace(paper(), friction=0.5)
+    heights = np.full(len(scene), -1e-3)
+    low = cr.Asperities(scene.asperities.positions, scene.asperities.tip_radii, heights)
+    contact = cr.press(dataclasses.replace(scene, asperities=low), approach=PAPER_APPROACH)
+    made = {
+        "Contact": lambda: contact,
+        "ShearState": lambda: cr.shear(contact, force=0.0),
+        "VectorShearState": lambda: cr.shear_vector(contact, force=0.0),
+        "Cycle": lambda: cr.cycle(contact, maximum=0.0),
+        "History": lambda: cr.history(contact, forces=[0.0]),
+    }[name]()
+    assert [text.get_text() for text in made.plot().texts] == ["no contact"]
+    repr(made)
+    made.to_dataframe()
+
+
+def test_what_has_no_picture_says_so() -> None:
+    with pytest.raises(cr.InputError, match="found something of Scene, expected a result that has"):
+        plots.plot(results()["Scene"])
+
+
+def test_the_loop_that_is_drawn_is_the_loop() -> None:
+    matplotlib.use("agg")
+    cycle = results()["Cycle"]
+    rough = cycle.plot().lines[0]
+    loop, whole = cycle.loop(), cr.smooth(cycle.contact.scene, load=cycle.contact.load)
+    np.testing.assert_allclose(rough.get_ydata(), loop.forces / whole.largest_force)
+    farthest = whole.displacement(whole.largest_force)
+    np.testing.assert_allclose(rough.get_xdata(), loop.displacements / farthest)
+
+
+PUBLIC = sorted({*cr.__all__} - {"__version__", "solvers"})  # functions and classes
+
+#: Where they live: modules whose docstrings' examples are run.
+MODULES = sorted({getattr(cr, name).__module__ for name in PUBLIC} - {"convexrough.errors"})
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_examples_in_docstrings(module: str) -> None:
+    scene = dataclasses.replace(paper(), friction=0.5)
+    assert cr.__file__ is not None
+    file = Path(cr.__file__).parent / "run/new_scene.toml"
+    names = {"cr": cr, "np": np, "scene": scene, "contact": results()["Contact"], "new_scene": file}
+    found = doctest.DocTestFinder().find(importlib.import_module(module), extraglobs=names)
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    for test in found:
+        runner.run(test)
+    assert runner.tries > 0
+    assert runner.failures == 0
+
+
+@pytest.mark.parametrize("name", [name for name in PUBLIC if not name.endswith("Error")])
+def test_every_public_name_has_an_example(name: str) -> None:
+    assert "\n    >>> " in (getattr(cr, name).__doc__ or "")
