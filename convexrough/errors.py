@@ -13,6 +13,14 @@ if TYPE_CHECKING:
 class ConvexroughError(Exception):
     """Base of every error this package raises on purpose."""
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickled as it is: its words are not composed anew, and it passes between processes."""
+        return _again, (type(self), self.args), self.__dict__
+
+
+def _again(kind: type[ConvexroughError], arguments: tuple[object, ...]) -> ConvexroughError:
+    return kind.__new__(kind, *arguments)
+
 
 class InputError(ConvexroughError, ValueError):
     """A value the user gave is wrong.

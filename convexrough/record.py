@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -117,14 +117,18 @@ class Table(Record):
 
 
 def in_words(value: Any) -> str:
-    """A value in one line: of an array its size and range, or how many there are of each word."""
+    """A value in one line: of an array its size and range, or how many there are of each word.
+
+    Of a mapping its keys.
+    """
     if isinstance(value, Record):
         return value._headline()
     if isinstance(value, np.ndarray):
         return _of_array(value)
     if isinstance(value, float):
         return f"{value:.6g}"
-    text = str(value)
+    text = ", ".join(map(str, value)) if isinstance(value, Mapping) else str(value)
+    text = " ".join(text.split())
     return text if len(text) <= LINE else f"{text[: LINE - 3]}..."
 
 

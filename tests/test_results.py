@@ -23,7 +23,9 @@ from scenes import MATERIAL, PAPER_APPROACH, paper
 import convexrough as cr
 from convexrough import plots, solvers
 from convexrough.compare import compare
-from convexrough.errors import ExtraError
+from convexrough.errors import ExtraError, SceneFileError
+
+NEW_SCENE = Path(plots.__file__).parent.parent / "run/new_scene.toml"
 
 
 @cache
@@ -50,6 +52,8 @@ def results() -> dict[str, Any]:
         cr.verify(scene, wrong, approach=PAPER_APPROACH),
         compare(scene, approach=PAPER_APPROACH, solvers=few),
         cr.smooth(scene, load=contact.load),
+        cr.read_scene(NEW_SCENE),
+        contact.proof(),
     )
     return {type(each).__name__: each for each in found}
 
@@ -61,7 +65,7 @@ DRAWN = tuple(name for name in NAMES if hasattr(results()[name], "plot"))
 
 def test_every_kind_is_here() -> None:
     public = {name for name in cr.__all__ if dataclasses.is_dataclass(getattr(cr, name))}
-    settings = {"FrictionConic", "FrictionNewton", "Material", "SceneFile"}
+    settings = {"FrictionConic", "FrictionNewton", "Material"}
     assert public - settings <= set(NAMES)
     assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "History",
                           "Verdict", "Comparison"}  # fmt: skip
@@ -141,6 +145,23 @@ def test_pickling_keeps_every_bit_and_what_is_read_only(name: str, copied: Any) 
         assert one is not other
         np.testing.assert_array_equal(one, other)
         assert not other.flags.writeable
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        cr.InputError("load", found=-1, expected="a positive number", where="a.toml"),
+        cr.SolverError("no step", solver="newton", advice="less load", iterate=np.ones(2)),
+        SceneFileError("a.toml", ["one", "two"]),
+        ExtraError("pandas"),
+        cr.FileError("a.toml: missing"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_errors_pass_between_processes(error: cr.ConvexroughError) -> None:
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again), again.args) == (type(error), str(error), error.args)
+    assert repr(vars(again)) == repr(vars(error))
 
 
 def test_a_pickled_contact_goes_on() -> None:
@@ -305,9 +326,13 @@ MODULES = sorted({getattr(cr, name).__module__ for name in PUBLIC} - {"convexrou
 @pytest.mark.parametrize("module", MODULES)
 def test_examples_in_docstrings(module: str) -> None:
     scene = dataclasses.replace(paper(), friction=0.5)
-    assert cr.__file__ is not None
-    file = Path(cr.__file__).parent / "run/new_scene.toml"
-    names = {"cr": cr, "np": np, "scene": scene, "contact": results()["Contact"], "new_scene": file}
+    names = {
+        "cr": cr,
+        "np": np,
+        "scene": scene,
+        "contact": results()["Contact"],
+        "new_scene": NEW_SCENE,
+    }
     found = doctest.DocTestFinder().find(importlib.import_module(module), extraglobs=names)
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
     for test in found:

@@ -18,6 +18,7 @@ from convexrough.arrays import Array
 from convexrough.errors import FileError, InputError, ProofError
 from convexrough.progress import Announce
 from convexrough.proof.arguments import Argument, Trial
+from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz, mindlin
 
@@ -33,8 +34,8 @@ class Sheared(Protocol):
     def stick_radii(self) -> Array: ...
 
 
-@dataclass(frozen=True, eq=False)
-class Proof:
+@dataclass(frozen=True, eq=False, repr=False)
+class Proof(Record):
     """Words for all asperities, with bounds on every load, gap, shear force, slip and loss.
 
     document : what the file holds (docs/theory/proof-file.md)

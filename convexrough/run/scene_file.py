@@ -15,6 +15,7 @@ from convexrough.errors import FileError, InputError, SceneFileError
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
+from convexrough.record import Record
 from convexrough.run.stages import Stages
 from convexrough.run.tables import read_summits, read_text
 from convexrough.run.toml_slips import explained
@@ -35,8 +36,8 @@ class UnitNames(NamedTuple):
     force: str = ""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class SceneFile(Stages):
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class SceneFile(Record, Stages):
     """What a scene file says: the shear stages, and the contact they start from.
 
     approach [length] or load [force] : what is prescribed; the other is None
