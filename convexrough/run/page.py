@@ -1,7 +1,7 @@
 """The slider page: states of first loading, found and judged here, inside one HTML file.
 
 The page steps through these states and shows their numbers as they are. Loops are made of them by
-Masing's rule (docs/theory/shear.md, "Any history"); nothing else is computed there.
+Masing's rule (docs/theory/shear.md, "Histories"); nothing else is computed there.
 """
 
 from __future__ import annotations

@@ -78,6 +78,33 @@ def _describe_shear(summary: Summary, length_unit: str, force_unit: str) -> list
         if len(steps) > 20:
             lines.append(f"(the last 20 of {len(steps)} steps; all are in history.csv)")
         lines += _numbers(["Q/(fP)", "displacement", "energy"], steps[-20:])
+    return lines + describe_varied(summary, length_unit, force_unit)
+
+
+def describe_varied(summary: Summary, length_unit: str, force_unit: str) -> list[str]:
+    """Lines on load paths, what they settle to, and shakedown."""
+    work = f"{force_unit} {length_unit}".strip()
+    lines = []
+    if path := summary.get("path"):
+        keys = ["load", "force", "displacement", "energy", "stuck", "partial_slip", "sliding"]
+        lines += ["", _titled("load path", f"forces {force_unit}", f"displacement {length_unit}",
+                              f"energy {work}")]  # fmt: skip
+        if len(path["load"]) > 20:
+            lines.append(f"(the last 20 of {len(path['load'])} points; all are in path.csv)")
+        rows = list(zip(*(path[key][-20:] for key in keys), strict=True))
+        lines += _numbers(["P", "Q", "displacement", "energy", "stuck", "partial", "slide"], rows)
+        lines.append(f"order of indentations: {path['order']}")
+    if steady := summary.get("steady"):
+        lines += ["", _titled("steady", f"level {force_unit}", f"energy {work}")]
+        keys = ["level", "energy", "energy_error", "partial_slip", "sliding", "intermittent"]
+        heading = ["stuck level", "energy", "error", "partial", "slide", "intermittent"]
+        lines += _numbers(heading, [[steady[key] for key in keys]])
+        lines.append(f"order of indentations: {steady['order']}")
+    if limit := summary.get("shakedown"):
+        lines += ["", f"shakedown  ({limit['kind']})"]
+        keys = ["factor", "lower", "upper", "gross"]
+        lines += _numbers(["factor", "proved above", "and below", "gross sliding"],
+                          [[limit[key] for key in keys]], digits=12)  # fmt: skip
     return lines
 
 
@@ -142,6 +169,12 @@ def warnings(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
         found.append("not certified: these loads come without any proof")
     elif normal["undecided"]:
         found.append(f"not certified: {normal['undecided']} of the asperities undecided")
+    for stage in ("path", "steady"):
+        if unsure := summary.get(stage, {}).get("undecided", 0):
+            found.append(f"not certified: {unsure} words in {stage} undecided")
+    for stage in ("path", "steady", "shakedown"):
+        if summary.get(stage, {}).get("order") in ("checked", "fails"):
+            found.append(f"not proved: the order of indentations, on which [{stage}] rests")
     for stage in ("shear", "cycle"):
         doubtful = sum(1 for row in summary.get(stage, ()) if row["undecided"])
         if doubtful:

@@ -181,6 +181,13 @@ def _draw(found: Findings, units: UnitNames) -> dict[str, Figure]:
         )
     if found.history is not None:
         figures |= plots.history_figures(found.history.history, **names)
+    varied = found.varying
+    if varied.path is not None:
+        figures |= plots.path_figures(varied.path, **names)
+    if varied.steady is not None:
+        figures |= plots.steady_figures(varied.steady, **names)
+    if varied.shakedown is not None:
+        figures |= plots.shakedown_figures(varied.shakedown, **names)
     return figures
 
 

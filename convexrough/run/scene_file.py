@@ -11,14 +11,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
+import numpy as np
+
 from convexrough.errors import FileError, InputError, SceneFileError
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
+from convexrough.paths.shapes import elliptic_path
 from convexrough.record import Record
 from convexrough.run.stages import Stages
 from convexrough.run.tables import read_summits, read_text
 from convexrough.run.toml_slips import explained
+from convexrough.run.varying import Limit, Points, Varying
 from convexrough.scene.asperities import Asperities, largest_tip_radius
 from convexrough.scene.material import Material
 from convexrough.scene.patterns import CUT_DEVIATIONS
@@ -110,12 +114,38 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
         shear=tuple(shear.fractions) if shear else None,
         cycle=(tuple(cycle.maximum), tuple(cycle.lowest)) if cycle else None,
         history=tuple(history.fractions) if history else None,
+        varying=_varying(tables),
         loop_points=cycle.loop_points if cycle else None,
         loop_asperities=_whose_loops(path, cycle, len(scene)) if cycle else None,
         solver=named(tables.solver.name),
         influence=cast("Kind | None", tables.solver.influence),
         units=UnitNames(units.length, units.force),
     )
+
+
+def _varying(tables: Document) -> Varying:
+    """The paths of a file, in its units."""
+    friction = tables.friction.coefficient if tables.friction else 0.0
+    found: dict[str, Points] = {}
+    for name in ("path", "steady"):
+        if (table := getattr(tables, name)) is None:
+            continue
+        if table.ellipse is not None:
+            loads, forces = elliptic_path(friction=friction, **table.ellipse.model_dump())
+        else:
+            loads, forces = np.array(table.loads), np.array(table.forces)
+        found[name] = Points(table.reference * loads, table.reference * forces)
+    limit = None
+    if (table := tables.shakedown) is not None:
+        amplitudes = table.load_amplitudes or [0.0] * len(table.force_amplitudes)
+        limit = Limit(
+            table.reference * table.loads,
+            table.reference * table.forces,
+            table.reference * np.array(amplitudes),
+            table.reference * np.array(table.force_amplitudes),
+            table.kind,
+        )
+    return Varying(**found, shakedown=limit)
 
 
 def digest(path: Path) -> str:

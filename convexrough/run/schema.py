@@ -69,6 +69,9 @@ InfluenceName = Annotated[str, _expected(f"one of: {', '.join(KINDS)}", KINDS.__
 SolverName = Annotated[str, _expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)]
 
 
+ShakedownKind = Annotated[Literal["exact", "elastic"], _expected('"exact" or "elastic"')]
+
+
 class Table(BaseModel):
     """A table: numbers are finite, no text or truth value stands for one, no other keys."""
 
@@ -164,6 +167,47 @@ class History(Table):
     fractions: Fractions
 
 
+class Ellipse(Table):
+    load: Positive
+    load_amplitude: Finite = 0.0
+    force: Finite = 0.0
+    force_amplitude: Finite
+    phase: Finite = 0.0
+    chords: Annotated[int, _expected("a whole number, at least 6", lambda value: value >= 6)] = 96
+
+
+class Path(Table):
+    loads: list[NonNegative] | None = None
+    forces: list[Finite] | None = None
+    ellipse: Ellipse | None = None
+    reference: Positive = 1.0
+
+    def mistakes_within(self) -> Iterator[str]:
+        points = (self.loads, self.forces)
+        if self.ellipse is not None:
+            if points != (None, None):
+                yield "ellipse: found beside loads or forces, expected one of the two ways"
+        elif None in points:
+            yield "loads, forces: missing, both are needed where there is no ellipse"
+        elif len(points[0] or ()) != len(points[1] or ()) or not points[0]:
+            found = f"{len(points[0] or ())} and {len(points[1] or ())} values"
+            yield f"loads, forces: found {found}, expected as many of both, at least one"
+
+
+class Shakedown(Table):
+    loads: Positive
+    forces: Finite = 0.0
+    load_amplitudes: list[Finite] | None = None
+    force_amplitudes: list[Finite]
+    kind: ShakedownKind = "exact"
+    reference: Positive = 1.0
+
+    def mistakes_within(self) -> Iterator[str]:
+        if self.load_amplitudes and len(self.load_amplitudes) != len(self.force_amplitudes):
+            found = len(self.load_amplitudes)
+            yield f"load_amplitudes: found {found} values, expected {len(self.force_amplitudes)}"
+
+
 class Solver(Table):
     name: SolverName = "newton"
     influence: InfluenceName | None = None
@@ -186,6 +230,9 @@ class Document:
     shear: Shear | None = None
     cycle: Cycle | None = None
     history: History | None = None
+    path: Path | None = None
+    steady: Path | None = None
+    shakedown: Shakedown | None = None
     solver: Solver = field(default_factory=Solver)
     units: Units = field(default_factory=Units)
 
@@ -199,11 +246,14 @@ _TABLES: dict[str, tuple[type[Table], ...]] = {
     "shear": (Shear,),
     "cycle": (Cycle,),
     "history": (History,),
+    "path": (Path,),
+    "steady": (Path,),
+    "shakedown": (Shakedown,),
     "solver": (Solver,),
     "units": (Units,),
 }
 _REQUIRED = ("sphere", "material", "asperities", "normal")
-_FRICTIONAL = ("shear", "cycle", "history")
+_FRICTIONAL = ("shear", "cycle", "history", "path", "steady", "shakedown")
 
 
 def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:

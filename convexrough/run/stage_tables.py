@@ -12,6 +12,7 @@ from convexrough.contact import Contact
 from convexrough.run.stages import Cycled, Findings, Followed, Sheared
 from convexrough.run.summary import SHEAR, counts
 from convexrough.run.tables import ASPERITY_COLUMNS
+from convexrough.run.varied import varied_tables
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 
@@ -26,6 +27,7 @@ def stage_tables(found: Findings) -> Iterator[tuple[str, Columns]]:
         yield "loop", _loop_columns(found.cycles)
     if found.history is not None:
         yield "history", _history_columns(found.history)
+    yield from varied_tables(found.varying, found.contact)
 
 
 def _asperity_columns(contact: Contact) -> Columns:

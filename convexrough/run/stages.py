@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.progress import Announce
+from convexrough.run.varying import Varied, Varying
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.shearing.cycle import Cycle, cycles, loops
 from convexrough.shearing.history import History, history
@@ -34,6 +35,7 @@ class Stages:
     shear   : shear forces, as fractions of f P
     cycle   : maxima and minima of steady cycles, as fractions of f P
     history : shear forces one after the other, as fractions of f P
+    varying : paths of load and shear, which do not start from the contact
     loop_points : of each loop, about; None for what is affordable
     loop_asperities : whose loops to keep: indices or "all"; None for one at each distance from the
         axis, of at most 12 distances
@@ -42,6 +44,7 @@ class Stages:
     shear: Fractions | None = None
     cycle: tuple[Fractions, Fractions] | None = None
     history: Fractions | None = None
+    varying: Varying = field(default_factory=Varying)
     loop_points: int | None = None
     loop_asperities: tuple[int, ...] | Literal["all"] | None = None
 
@@ -77,6 +80,7 @@ class Findings:
     shear: tuple[Sheared, ...] = ()
     cycles: tuple[Cycled, ...] = ()
     history: Followed | None = None
+    varying: Varied = field(default_factory=Varied)
 
 
 def compute(contact: Contact, stages: Stages, announce: Announce | None = None) -> Findings:
@@ -84,8 +88,9 @@ def compute(contact: Contact, stages: Stages, announce: Announce | None = None) 
 
     announce : told in a line how far long work has come
     """
+    varied = stages.varying.compute(contact, announce)
     if stages.shear is None and stages.cycle is None and stages.history is None:
-        return Findings(contact)
+        return Findings(contact, varying=varied)
     limit = checks.friction(contact.scene.friction) * contact.load
     maxima, minima = stages.cycle or ((), ())
     steady = cycles(contact, limit * np.array(maxima), limit * np.array(minima), announce=announce)
@@ -102,6 +107,7 @@ def compute(contact: Contact, stages: Stages, announce: Announce | None = None) 
         ),
         cycles=tuple(map(Cycled, maxima, minima, steady, drawn)),
         history=followed,
+        varying=varied,
     )
 
 

@@ -16,6 +16,7 @@ from convexrough.contact import Contact
 from convexrough.normal.certificate import Certificate
 from convexrough.run.plausibility import limits_of
 from convexrough.run.stages import Findings
+from convexrough.run.varied import varied_summary
 from convexrough.version import __version__
 
 Summary = dict[str, Any]
@@ -73,7 +74,7 @@ def summarise(found: Findings) -> Summary:
             "displacement": history.displacements.tolist(),
             "energy": history.energy.tolist(),
         }
-    return summary
+    return summary | varied_summary(found.varying)
 
 
 def certificate_summary(certificate: Certificate, loads: Array) -> Summary:
@@ -90,6 +91,7 @@ def comparison_summary(comparison: Comparison) -> Summary:
 def proved(summary: Summary) -> bool:
     """Every asperity has a proved word, in every stage."""
     stages = [summary["normal"], *summary.get("shear", ()), *summary.get("cycle", ())]
+    stages += [summary[name] for name in ("path", "steady") if name in summary]
     scope = summary["normal"]["certificate"]["scope"]
     return scope != "none" and not any(stage["undecided"] for stage in stages)
 

@@ -101,7 +101,7 @@ def _closed(
     way : (m,) (maximum - Q) / 2 on the way down [force]
 
     On a branch everything is that at its beginning -+ twice its first loading
-    (docs/theory/shear.md, "Any history").
+    (docs/theory/shear.md, "Histories").
     """
     held = np.searchsorted(problem.touching, chosen).clip(max=len(problem) - 1)
     loaded = problem.touching[held] == chosen

@@ -1,0 +1,75 @@
+"""The stages of a run in which the normal load varies: what is asked for, and found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Literal, NamedTuple
+
+from convexrough.arrays import Array
+from convexrough.contact import Contact
+from convexrough.errors import InputError
+from convexrough.paths.path import LoadPath, load_path
+from convexrough.paths.shakedown import Shakedown, shakedown
+from convexrough.paths.steady import Steady, steady
+from convexrough.progress import Announce
+
+
+class Points(NamedTuple):
+    """(m,) P and (m,) Q of the points of a path [force]."""
+
+    loads: Array
+    forces: Array
+
+
+class Limit(NamedTuple):
+    """A mean P and Q [force], and amplitudes (m,) to be scaled."""
+
+    loads: float
+    forces: float
+    load_amplitudes: Array
+    force_amplitudes: Array
+    kind: Literal["exact", "elastic"]
+
+
+class Varied(NamedTuple):
+    """What was found; None where it was not asked for."""
+
+    path: LoadPath | None = None
+    steady: Steady | None = None
+    shakedown: Shakedown | None = None
+
+
+class Varying(NamedTuple):
+    """What is asked for: a path from no load, a closed path, and how far a path may be scaled."""
+
+    path: Points | None = None
+    steady: Points | None = None
+    shakedown: Limit | None = None
+
+    def compute(self, contact: Contact, announce: Announce | None = None) -> Varied:
+        """All of it, on the scene of a contact and with its kind of coupling."""
+        scene, influence = contact.scene, contact.influence
+        path = closed = limit = None
+        if self.path is not None:
+            with _blamed_on("path"):
+                path = load_path(
+                    scene, **self.path._asdict(), influence=influence, announce=announce
+                )
+        if self.steady is not None:
+            with _blamed_on("steady"):
+                closed = steady(
+                    scene, **self.steady._asdict(), influence=influence, announce=announce
+                )
+        if self.shakedown is not None:
+            with _blamed_on("shakedown"):
+                limit = shakedown(scene, **self.shakedown._asdict(), influence=influence)
+        return Varied(path, closed, limit)
+
+
+@contextmanager
+def _blamed_on(table: str) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise error.within(f"[{table}]") from error
