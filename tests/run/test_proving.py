@@ -60,4 +60,4 @@ def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:
     assert ran.status == 3
     assert "warning: nothing is proved" in ran.err
     written = {path.name for path in (tmp_path / "crowded-results").iterdir()}
-    assert written == {"summary.json", "asperities.csv"}
+    assert written == {"summary.json", "asperities.csv", "files.json", "scene.toml"}
