@@ -1,6 +1,6 @@
 """The word audit: every word and bound of random and hostile scenes against ball arithmetic.
 
-    python tests/word_audit.py 10000        prints the tables of docs/reliability.md
+    PYTHONPATH=tests python tests/word_audit.py 3000        prints the tables of docs/reliability.md
 
 Each scene is drawn from a seed of its own, pressed through one operator under one control, sheared,
 cycled and sheared with vectors, and all that is said of it is compared with proved 60-digit states:
@@ -228,10 +228,10 @@ def report(tally: Tally) -> str:
         seen[1] += undecided
     for (kind, stage), (words, undecided) in sorted(merged.items()):
         lines.append(f"| {kind} | {stage} | {words:,} | {100 * undecided / words:.2f} % |")
-    lines += ["", "| operator | bound | least | median | 99 % |", "|---|---|---|---|---|"]
+    lines += ["", "| operator | bound | least | median |", "|---|---|---|---|"]
     for (operator, stage), ratios in sorted(tally.ratios.items()):
-        least, median, most = np.quantile(ratios, [0.0, 0.5, 0.99])
-        lines.append(f"| {operator} | {stage} | {least:.2g} | {median:.2g} | {most:.2g} |")
+        least, median = np.quantile(ratios, [0.0, 0.5])
+        lines.append(f"| {operator} | {stage} | {least:.2g} | {median:.2g} |")
     return "\n".join(lines)
 
 
