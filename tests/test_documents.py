@@ -29,7 +29,7 @@ DIRECTIVES = {"{toctree}", "{eval-rst}"}
 LONG = {"performance.md", "certificate.md", "convexity.md", "exact-cones.md", "friction.md"}
 LONG |= {"operators.md", "shear.md", "load-paths.md", "proof-file.md"}
 #: Pages of tables, to look things up in: every option, key and column is there.
-LONG |= {"verify.md", "results.md", "scene-file.md"}
+LONG |= {"verify.md", "results.md", "scene-file.md", "reliability.md"}
 
 
 class Block(NamedTuple):

@@ -44,6 +44,10 @@ class MemoryCurve:
     """A state: vertices (levels[k], heights[k]) from the origin, slopes[k] from k to k + 1.
 
     front : level L down to which the contact slipped last; None where all of it stuck last
+
+    >>> curve, _ = cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)
+    >>> float(curve.front), float(curve.heights[-1])
+    (0.75, 0.25)
     """
 
     levels: tuple[Fraction, ...] = (Fraction(0),)

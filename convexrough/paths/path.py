@@ -47,6 +47,10 @@ class LoadPath:
     curves         : the memory curve after each point; it and the fronts rest on order
     order          : whether indentations rise with the load, which errors and words rest on
     presses        : how many normal problems were solved
+
+    >>> path = cr.load_path(scene, loads=[contact.load], forces=[0.1 * contact.load])
+    >>> path.order, path.status.shape, path.presses
+    ('proved at the levels used', (1, 61), 1)
     """
 
     scene: Scene
@@ -90,6 +94,11 @@ def load_path(
 
     Raises InputError for an empty path, loads that are negative, shear beyond f P (where, and by
     how much) or left at a load of 0; SolverError where a normal problem is not solved.
+
+    >>> P = contact.load
+    >>> path = cr.load_path(scene, loads=[P / 2, P, P / 2], forces=[0.0, 0.3 * P, 0.1 * P])
+    >>> (path.displacements > 0).tolist(), path.presses
+    ([False, True, True], 4)
     """
     points = points_of(scene, loads, forces)
     curve = MemoryCurve()

@@ -43,6 +43,11 @@ class Shakedown:
         with what the path adds elastically
     mechanism : (n,) slips just beyond, the largest 1; (m, n, 2) of each vertex by "vector"
     order   : what "exact" rests on, at the levels used; None of the others
+
+    >>> Q = 0.1 * contact.load
+    >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
+    >>> limit.lower <= limit.factor <= limit.upper
+    True
     """
 
     scene: Scene
@@ -79,6 +84,13 @@ def shakedown(
         for all; q is (m, 2) for "vector". The other two kinds need p = 0.
 
     Raises InputError for bad values, |Q0| >= f P0, or a path on which nothing moves.
+
+    The rings of the paper's example: sliding ceases up to 0.3517 of f P.
+
+    >>> Q = 0.05 * contact.load
+    >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
+    >>> f"{limit.factor / 10:.4f}"
+    '0.3517'
     """
     f = checks.friction(scene.friction)
     P0 = checks.positive("loads", loads)
@@ -95,8 +107,9 @@ def shakedown(
         t0, t = Q0 / f, q / f
     if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
         raise InputError("forces", found=forces, expected=f"less than f P = {f * P0:g} in size")
-    if not (np.any(p) or np.any(q)):
-        raise InputError("force_amplitudes", found="none", expected="a path that moves")
+    if not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
+        expected = "a path that moves: at least two points, such as [Q, -Q]"
+        raise InputError("force_amplitudes", found="one point", expected=expected)
     if kind == "exact":
         return _exact(scene, P0, float(t0), p, t, Levels(scene, P0, influence))
     if np.any(p):

@@ -29,6 +29,12 @@ def elliptic_path(
     friction : f of the scene, which says where P + Q/f and P - Q/f are extreme
     chords : about as many; those extremes and the extremes of P are always corners, so that the
         loss is off by about chords^-2, and the permanently stuck level is exact
+
+    >>> loads, forces = cr.elliptic_path(
+    ...     load=1.0, load_amplitude=0.5, force_amplitude=0.1, friction=0.5, chords=8
+    ... )
+    >>> len(loads), float(loads.max())
+    (12, 1.5)
     """
     if not isinstance(chords, int) or chords < 6:
         raise InputError("chords", found=chords, expected="a whole number, at least 6")

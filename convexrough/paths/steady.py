@@ -44,6 +44,11 @@ class Steady:
     stick_radii    : [length] of the disc that sticks for ever
     order          : whether indentations rise with the load, which errors and words rest on
     presses        : how many normal problems were solved
+
+    >>> P = contact.load
+    >>> settled = cr.steady(scene, loads=[P, P], forces=[0.25 * P, -0.25 * P])
+    >>> f"{settled.energy / cr.cycle(contact, maximum=0.25 * P).energy:.6f}"
+    '1.000000'
     """
 
     scene: Scene
@@ -86,6 +91,11 @@ def steady(
     influence, announce : as in `load_path`
 
     Raises what `load_path` raises.
+
+    >>> P = contact.load
+    >>> settled = cr.steady(scene, loads=[P, P / 2], forces=[0.3 * P, -0.1 * P])
+    >>> f"{settled.level / P:.4f}", int((settled.status == "sliding").sum())
+    ('0.3500', 12)
     """
     points = points_of(scene, loads, forces)
     closed = [*points, points[0]]
