@@ -35,7 +35,8 @@ class Shakedown:
 
     kind    : "exact": partial slip, any path; sliding of whole asperities ceases. "elastic" and
         "vector": Melan's theorem for asperities that stick until they slide, at constant load
-    factor  : least of `factors`, or of the program;  lower, upper : proved bounds on it
+    factor  : least of `factors`, or of the program;  lower, upper : bounds on it, proved for
+        "exact" only: the others rest on elastic shares as they are computed
     factors : (n,) of each asperity that touches at the mean load, nan of others and where not
         looked for; one number for all by "vector"
     gross   : the factor at which all of them slide at once, beyond which there is no such path
