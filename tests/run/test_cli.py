@@ -397,9 +397,9 @@ LATTICE = 'pattern = "hexagonal"\nspacing = {}\ntip_radius = {}'
 )
 def test_bad_scenes(command: Any, tmp_path: Path, scene: str, expected: str) -> None:
     (tmp_path / "a.toml").write_text(scene)
-    began = time.perf_counter()
+    began = time.process_time()
     outcome = command("run", "a.toml")
-    assert time.perf_counter() - began < 10
+    assert time.process_time() - began < 10
     assert (outcome.status, outcome.out) == (2, "")
     assert expected in outcome.err
     for line in outcome.err.splitlines():

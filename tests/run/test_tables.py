@@ -312,10 +312,10 @@ def read_or_refused(folders: Any, content: bytes, name: str) -> None:
 @pytest.mark.parametrize("unit", [b"1", b"1,", b"1 ", b'"', b"x,", b"\xff", b"#"])
 def test_an_endless_line_is_refused_quickly(tmp_path: Path, unit: bytes) -> None:
     path = written(tmp_path, b"load\n" + unit * (100_000_000 // len(unit)))
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(cr.FileError, match="row 2: longer than 16,777,216 characters"):
         read_loads(path, small())
-    assert time.perf_counter() - began < 5.0
+    assert time.process_time() - began < 5.0
     path.unlink()
 
 
@@ -325,9 +325,9 @@ def test_many_rows_are_read_in_a_second_or_two(tmp_path: Path) -> None:
     scene = cr.Scene(1.0, cr.Asperities(points, 0.1), cr.Material(1.0, 0.3))
     loads = np.random.default_rng(0).uniform(size=len(points))
     path = write_loads(tmp_path / "a.csv", scene, loads, range(len(loads)))
-    began = time.perf_counter()
+    began = time.process_time()
     assert np.array_equal(read_loads(path, scene).values, loads)
-    assert time.perf_counter() - began < 5.0
+    assert time.process_time() - began < 5.0
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,7 @@ def test_any_text_is_explained(text: str) -> None:
 
 @pytest.mark.parametrize("unit", ["1", "a", " ", "1,", "a ", "= "])
 def test_a_long_line_takes_no_time(tmp_path: Path, unit: str) -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     lines = refused(tmp_path, "radius = x" + unit * 1_000_000)
-    assert time.perf_counter() - began < 10.0
+    assert time.process_time() - began < 10.0
     assert all(len(line) < 300 for line in lines)
