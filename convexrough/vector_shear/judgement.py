@@ -196,6 +196,7 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
         rises=np.array([rise_error]),
         sliding=sliding[None],
         partial=partial[None],
+        losses=np.array([np.inf]),  # vectors turn: no cycle is made of them
     )
 
 
