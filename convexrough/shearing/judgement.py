@@ -262,15 +262,13 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: Array) -
     partial = known.sure & (sticks | (ceilings - np.abs(available) > slip_errors))
     shifts = image.shifts + moved - distances
     near = Nearness(distance, shifts, moved, available, slip_errors, rise_errors, sliding, partial)
-    return Bounds(
-        proved=image.restored & np.isfinite(rise_errors),
-        increments=distances + known.image_distances(P, u),
-        slips=slip_errors,
-        rises=rise_errors,
-        sliding=sliding,
-        partial=partial,
-        losses=loss_errors(problem, known, given.states, near),
-    )
+    proved = image.restored & np.isfinite(rise_errors)
+    return _bounds(given, near, proved, distances + known.image_distances(P, u))
+
+
+def _bounds(given: _Given, near: Nearness, proved: NDArray[np.bool_], increments: Array) -> Bounds:
+    losses = loss_errors(given.problem, given.known, given.states, near)
+    return Bounds(proved, increments, near.errors, near.rises, near.sliding, near.partial, losses)
 
 
 def _by_exhaustion(given: _Given) -> Bounds:
@@ -307,12 +305,4 @@ def _by_exhaustion(given: _Given) -> Bounds:
     near = Nearness(
         unknown, each, each, given.available, slip_errors, rise_errors, sliding, partial
     )
-    return Bounds(
-        proved=complete | sliding.any(axis=1),
-        increments=errors,
-        slips=slip_errors,
-        rises=rise_errors,
-        sliding=sliding,
-        partial=partial,
-        losses=loss_errors(problem, known, states, near),
-    )
+    return _bounds(given, near, complete | sliding.any(axis=1), errors)

@@ -130,7 +130,7 @@ def _strays(problem: TangentialProblem) -> Indices:
 
 
 def _effects(problem: TangentialProblem, strays: Indices, most: Array) -> tuple[Array, float]:
-    """(n,) bounds on what loads of up to `most` elsewhere do to the loaded asperities; and b'A b."""
+    """(n,) most that loads of up to `most` elsewhere do to the loaded asperities; and b'A b."""
     if len(strays) == 0:
         return np.zeros(len(problem)), 0.0
     scene = problem.scene

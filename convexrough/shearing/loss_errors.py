@@ -88,7 +88,7 @@ def _by_loads(problem: TangentialProblem, known: LoadErrors, e: Array) -> Array:
     """(m,) what P* in place of P makes of them at the same t: (3/5) k |P*^(5/3) - P^(5/3)| e."""
     slope = np.where(known.sure, _ceilings_at_most(problem, known) * e, 0.0)
     together = known.distance * np.sqrt((slope**2 / known.stiffness).sum(axis=1))
-    return np.minimum((slope * known.errors).sum(axis=1), together)
+    return np.asarray(np.minimum((slope * known.errors).sum(axis=1), together))
 
 
 def _ceilings_at_most(problem: TangentialProblem, known: LoadErrors) -> Array:

@@ -1,4 +1,4 @@
-"""Proved bounds on the energy of cycles and histories, against 80 digits, and how sharp they are."""
+"""Proved bounds on the energy of cycles and histories, against 80 digits; and how sharp."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
