@@ -10,7 +10,7 @@ in exact arithmetic, so that a bound too small by a roundoff is found too.
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import multiprecision
 import numpy as np
@@ -28,6 +28,10 @@ KINDS = ("usual", "crowded", "ring", "grazing", "near", "units")
 
 #: Of f P: how far the contacts are sheared.
 FRACTIONS = (1e-12, 1e-6, 0.1, 0.4, 0.8, 0.999, 1 - 1e-9, 1 - 1e-13, 1.0)
+
+
+class Dragged(Exception):
+    """Others drag an asperity along further than the sphere moves: the theorem is not for this."""
 
 
 class Wrong(AssertionError):
@@ -160,30 +164,66 @@ def _audit_scene(seed: int, tally: Tally) -> None:
     _audit_shear(kind, operator, contact, exact, float(rng.choice(FRACTIONS)), tally)
 
 
+class Slid(NamedTuple):
+    """An exact state of first loading: balls, forces over f P as the theorem has them."""
+
+    forces: list[Any]
+    slips: list[Any]
+    rise: Any
+    loss: Any  # of the cycle of this amplitude
+
+
+def _slid(contact: cr.Contact, full: Any, force: Any) -> Slid | None:
+    """By Ciavarella and Jaeger's theorem: Q_i = f (P_i - p_i(P - Q / f)), slips f c_t g_i.
+
+    None beyond the limit of the true loads, where all slide and how far is not determined. Raises
+    Dragged where an asperity is, which the theorem is not for.
+    """
+    nu = arb(contact.scene.material.poisson_ratio)
+    travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
+    left = full.load - arb(force) / arb(FRICTION)
+    if not left > 0:
+        return None
+    found = cr.shear(contact, force=float(force)).forces
+    start = np.maximum(contact.loads - found / FRICTION, 0.0) + 1e-30 * contact.load
+    reduced = solve_exactly(contact.scene, load=left.mid(), start=start, digits=DIGITS)
+    forces = [FRICTION * (a - b) for a, b in zip(full.loads, reduced.loads, strict=True)]
+    if any(q < 0 for q in forces):
+        raise Dragged
+    slips = [
+        travel * gap if load > 0 else arb(0)
+        for gap, load in zip(reduced.gaps, full.loads, strict=True)
+    ]
+    rise = travel * (full.approach - reduced.approach)
+    return Slid(forces, slips, rise, _loss(contact.scene, full.loads, reduced.loads, slips))
+
+
+def _loss(scene: cr.Scene, loads: Any, left: Any, slips: Any) -> Any:
+    """Of the cycle: (24/5) c_t f^2 P ceiling e + 4 f P s, ceiling = (9 P^2 / (16 E*^2 R))^(1/3)."""
+    nu, E = arb(scene.material.poisson_ratio), arb(scene.material.contact_modulus)
+    loss, f, ct = arb(0), arb(FRICTION), (2 - nu) / (2 * (1 - nu))
+    tips = scene.asperities.tip_radii
+    for P, p, slip, tip in zip(loads, left, slips, tips, strict=True):
+        if P > 0:
+            t, s = 1 - p / P, (p / P).root(3) if p > 0 else arb(0)
+            e = 1 - s**5 - 5 * t / 6 * (1 + s**2)
+            R = 1 / (1 / arb(scene.sphere_radius) + 1 / arb(float(tip)))
+            ceiling = (9 * P**2 / (16 * E**2 * R)).root(3)
+            loss += 24 * ct * f**2 * P * ceiling * e / 5 + 4 * f * P * slip
+    return loss
+
+
 def _audit_shear(
     kind: str, operator: str, contact: cr.Contact, full: Any, fraction: float, tally: Tally
 ) -> None:
-    """Against Ciavarella and Jaeger's theorem: Q_i = f (P_i - p_i(P - Q / f)), slips f c_t g_i."""
     force = fraction * FRICTION * contact.load
-    state = cr.shear(contact, force=force)
     with ctx.workdps(DIGITS + 30):
-        nu = arb(contact.scene.material.poisson_ratio)
-        travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
-        left = full.load - arb(force) / arb(FRICTION)
-        if left > 0:
-            start = np.maximum(contact.loads - state.forces / FRICTION, 0.0) + 1e-30 * contact.load
-            reduced = solve_exactly(contact.scene, load=left.mid(), start=start, digits=DIGITS)
-            forces = [FRICTION * (a - b) for a, b in zip(full.loads, reduced.loads, strict=True)]
-            if any(q < 0 for q in forces):
-                return  # dragged along: the theorem is not for this
-            slips = [
-                travel * gap if load > 0 else arb(0)
-                for gap, load in zip(reduced.gaps, full.loads, strict=True)
-            ]
-            rise = travel * (full.approach - reduced.approach)
-        else:  # beyond the limit of the true loads: all slide, how far is not determined
-            forces, slips, rise = [FRICTION * p for p in full.loads], None, None
-    cycle = cr.cycle(contact, maximum=force)
+        try:
+            exact = _slid(contact, full, force)
+        except Dragged:
+            return
+    forces = exact.forces if exact else [FRICTION * p for p in full.loads]
+    state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
     vector = cr.shear_vector(_without_poisson(contact), force=force)
     for stage, words in (
         ("shear", state.status),
@@ -191,7 +231,7 @@ def _audit_shear(
         ("vector", vector.status),
     ):
         for i, (word, load) in enumerate(zip(words, full.loads, strict=True)):
-            slides = slips is None or slips[i] > 0
+            slides = exact is None or exact.slips[i] > 0
             require(word != "sliding" or (load > 0 and slides), f"{stage}: sliding of {i}")
             require(word != "partial" or (load > 0 and not slides), f"{stage}: partial of {i}")
             require(word != "open" or not load > 0, f"{stage}: open of {i}")
@@ -200,9 +240,35 @@ def _audit_shear(
     tally.compare(operator, "force", proof.force_errors, state.forces, forces)
     errors = vector.certificate.force_errors
     tally.compare(operator, "vector force", errors, vector.forces[:, 0], forces)
-    if slips is not None:
-        tally.compare(operator, "slip", proof.slip_errors, state.slips, slips)
-        tally.compare(operator, "rise", [proof.displacement_error], [state.displacement], [rise])
+    if exact:
+        tally.compare(operator, "slip", proof.slip_errors, state.slips, exact.slips)
+        rise, error = [state.displacement], [proof.displacement_error]
+        tally.compare(operator, "rise", error, rise, [exact.rise])
+        tally.compare(operator, "energy", [cycle.energy_error], [cycle.energy], [exact.loss])
+        if force < FRICTION * contact.load:
+            _audit_history(operator, contact, full, force, exact, tally)
+
+
+def _audit_history(
+    operator: str, contact: cr.Contact, full: Any, force: float, there: Slid, tally: Tally
+) -> None:
+    """To Q and back, and half of the way back and there again, which is forgotten."""
+    past = cr.history(contact, forces=[force, -0.25 * force, force, -force])
+    with ctx.workdps(DIGITS + 30):
+        try:
+            inner = _slid(contact, full, (arb(force) - arb(-0.25 * force)) / 2)
+        except Dragged:
+            return
+        assert inner is not None  # below the force that is
+        rises = [there.rise, there.rise - 2 * inner.rise, there.rise, -there.rise]
+        once, back = there.loss / 4, inner.loss / 2
+        losses = [once, once + back, once + 2 * back, once + 2 * back + there.loss / 2]
+        forces = [a - 2 * b for a, b in zip(there.forces, inner.forces, strict=True)]
+    tally.compare(operator, "past rise", past.displacement_errors, past.displacements, rises)
+    tally.compare(operator, "past energy", past.energy_errors, past.energy, losses)
+    one, other = (cr.shear(contact, force=Q).certificate for Q in (force, 0.625 * force))
+    errors = one.force_errors + 2 * other.force_errors + 1e-14 * abs(force)
+    tally.compare(operator, "past force", errors, past.forces[1], forces)
 
 
 def _without_poisson(contact: cr.Contact) -> cr.Contact:
