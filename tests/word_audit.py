@@ -16,6 +16,7 @@ import multiprecision
 import numpy as np
 from flint import arb, ctx
 from scenes import on_lattice, operators, scattered, solve_exactly
+from vector_oracle import solve_vectors
 
 import convexrough as cr
 
@@ -45,6 +46,7 @@ class Tally:
     scenes: int = 0
     refused: int = 0
     unsolved: int = 0  # by the oracle, which needs both signs of every gap
+    unsolved_vectors: int = 0  # states with the full tangential kernel
     words: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
     ratios: dict[tuple[str, str], list[float]] = field(default_factory=dict)
 
@@ -54,14 +56,17 @@ class Tally:
         seen[1] += int((words == "undecided").sum())
 
     def compare(self, operator: str, stage: str, bounds: Any, values: Any, exact: Any) -> None:
-        """Bound by bound; the ratio is that of the largest bound and the largest error."""
+        """Bound by bound, of numbers or vectors; the ratio is of the largest bound and error."""
         errors = []
         with ctx.workprec(BITS):
             for bound, value, true in zip(bounds, values, exact, strict=True):
-                error = abs(arb(float(value)) - true)
+                balls = [true] if isinstance(true, arb) else true
+                pairs = zip(np.atleast_1d(value), balls, strict=True)
+                off = [arb(float(v)) - each for v, each in pairs]
+                square = sum((each * each for each in off), arb(0))
                 if np.isfinite(bound):
-                    require(error <= arb(float(bound)), f"{stage} bound {bound} of {value}")
-                errors.append(float(error.mid()))
+                    require(square <= arb(float(bound)) ** 2, f"{stage} bound {bound} of {value}")
+                errors.append(float(square.mid().sqrt()))
         if len(errors) and np.isfinite(bounds).all() and max(errors) > 0:
             ratio = float(np.max(bounds)) / max(errors)
             self.ratios.setdefault((operator, stage), []).append(ratio)
@@ -222,9 +227,9 @@ def _audit_shear(
             exact = _slid(contact, full, force)
         except Dragged:
             return
-    forces = exact.forces if exact else [FRICTION * p for p in full.loads]
+        forces = exact.forces if exact else [FRICTION * p for p in full.loads]
     state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
-    vector = cr.shear_vector(_without_poisson(contact), force=force)
+    vector = cr.shear_vector(_with_poisson(contact, 0.0), force=force)
     for stage, words in (
         ("shear", state.status),
         ("cycle", cycle.status),
@@ -240,6 +245,7 @@ def _audit_shear(
     tally.compare(operator, "force", proof.force_errors, state.forces, forces)
     errors = vector.certificate.force_errors
     tally.compare(operator, "vector force", errors, vector.forces[:, 0], forces)
+    _audit_vectors(kind if fraction < 1 else "limit", operator, contact, full, force, tally)
     if exact:
         tally.compare(operator, "slip", proof.slip_errors, state.slips, exact.slips)
         rise, error = [state.displacement], [proof.displacement_error]
@@ -271,17 +277,58 @@ def _audit_history(
     tally.compare(operator, "past force", errors, past.forces[1], forces)
 
 
-def _without_poisson(contact: cr.Contact) -> cr.Contact:
+def _audit_vectors(
+    kind: str, operator: str, contact: cr.Contact, full: Any, force: float, tally: Tally
+) -> None:
+    """The full tangential kernel, any Poisson's ratio and direction, against its own oracle."""
+    rng = np.random.default_rng(int.from_bytes(np.float64(force).tobytes(), "little"))
+    angle = rng.uniform(0, 2 * np.pi)
+    size = min(force, FRICTION * contact.load)
+    pair = size * np.array([np.cos(angle), np.sin(angle)])
+    if np.hypot(*pair) > FRICTION * contact.load:
+        pair *= 1 - 1e-15
+    tilted = _with_poisson(contact, float(rng.uniform(0.0, 0.5)))
+    state = cr.shear_vector(tilted, force=pair)
+    tally.count(kind, operator, "tensor", state.status)
+    for word, load in zip(state.status, full.loads, strict=True):
+        require(word in ("open", "undecided") or load > 0, "tensor: a word for an open asperity")
+        require(word != "open" or not load > 0, "tensor: open of one that touches")
+    try:
+        true = solve_vectors(
+            tilted.scene, list(full.loads), pair, state.forces, state.displacement, DIGITS - 20
+        )
+    except multiprecision.NotProved:
+        tally.unsolved_vectors += 1
+        return
+    touching = [i for i, load in enumerate(full.loads) if load > 0]
+    for i, slides in zip(touching, true.sliding, strict=True):
+        require(state.status[i] != ("partial" if slides else "sliding"), f"tensor: word of {i}")
+    nu = arb(tilted.scene.material.poisson_ratio)
+    with ctx.workdps(DIGITS + 30):
+        travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
+        forces, slips, rise = FRICTION * true.forces, travel * true.slips, travel * true.rise
+    proof = state.certificate
+    errors = proof.force_errors[touching]
+    tally.compare(operator, "tensor force", errors, state.forces[touching], forces)
+    if np.isfinite(state.displacement).all():
+        errors = proof.slip_errors[touching]
+        tally.compare(operator, "tensor slip", errors, state.slips[touching], slips)
+        errors = [proof.displacement_error]
+        tally.compare(operator, "tensor rise", errors, [state.displacement], [rise])
+
+
+def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
     """At nu = 0 the tensor is the scalar kernel, and the theorem holds for vectors along x."""
     scene = contact.scene
-    material = cr.Material(scene.material.contact_modulus, 0.0)
+    material = cr.Material(scene.material.contact_modulus, nu)
     return replace(contact, scene=replace(scene, material=material))
 
 
 def report(tally: Tally) -> str:
     """Tables in Markdown."""
     lines = [
-        f"{tally.scenes:,} scenes, {tally.refused} refused, {tally.unsolved} beyond the oracle; "
+        f"{tally.scenes:,} scenes, {tally.refused} refused, {tally.unsolved} beyond the oracle, "
+        f"{tally.unsolved_vectors} of the vector states; "
         "no wrong word, no bound too small.",
         "",
         "| scenes | stage | words | undecided |",
