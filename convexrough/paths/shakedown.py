@@ -108,9 +108,10 @@ def shakedown(
         t0, t = Q0 / f, q / f
     if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
         raise InputError("forces", found=forces, expected=f"less than f P = {f * P0:g} in size")
-    if not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
+    if len(q) == 0 or not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
         expected = "a path that moves: at least two points, such as [Q, -Q]"
-        raise InputError("force_amplitudes", found="one point", expected=expected)
+        found = "one point" if len(q) else "none"
+        raise InputError("force_amplitudes", found=found, expected=expected)
     if kind == "exact":
         return _exact(scene, P0, float(t0), p, t, Levels(scene, P0, influence))
     if np.any(p):
