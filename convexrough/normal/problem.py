@@ -199,9 +199,9 @@ class NormalProblem:
     ) -> float:
         """Upper bound on Phi(P) less its minimum over 0 <= P <= box, from the loads alone.
 
-        docs/theory/exact-cones.md, "A dual bound that trusts no solver": with M = A + diag(shells),
-        positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2, convex on the box where
-        its convexity number is at most 1, any P gives a dual bound:
+        docs/theory/exact-cones-answers.md, "A dual bound that trusts no solver": with
+        M = A + diag(shells), positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2,
+        convex on the box where its convexity number is at most 1, any P gives a dual bound:
 
             min Phi >= -P'MP / 2 + sum min over 0 <= x <= box_i of [h_i(x) - (D - M P)_i x].
 

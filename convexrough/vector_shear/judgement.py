@@ -1,7 +1,7 @@
 """Judge vector friction states: bounds on forces and slips, and which asperities slide.
 
-The proof is that of docs/theory/friction.md, "Words that are proofs", step by step. Arrays are (n,)
-or (n, 2). In the letters of that page, forces over f and displacements over c_t f:
+The proof is that of docs/theory/friction-words.md, "Words that are proofs", step by step. Arrays
+are (n,) or (n, 2). In the letters of that page, forces over f and displacements over c_t f:
 
     loads P, errors b, ceilings kappa     forces q = Q, rise X, kernel B = C
     stiffness h of H, margin mu           available X - C Q
@@ -45,7 +45,7 @@ def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) ->
 
 
 def _by_convexity(problem: VectorProblem, known: LoadErrors, state: VectorState) -> Bounds | None:
-    """The steps of docs/theory/friction.md, "Words that are proofs"; None where they end.
+    """The steps of docs/theory/friction-words.md, "Words that are proofs"; None where they end.
 
     An asperity may touch that the problem leaves out, or the energy may not be convex, or no
     asperity is sure to stick.
@@ -200,10 +200,11 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
 
 
 def _by_exhaustion(problem: VectorProblem, known: LoadErrors, state: VectorState) -> Bounds:
-    """docs/theory/friction.md, "Close to gross sliding": sum (P_i - q_i.t) is at most `unused`.
+    """docs/theory/friction-limit.md, "Close to gross sliding".
 
-    So each q is within (2 P unused)^(1/2) of P t, all together in the same sense; then X.t is no
-    less than what it is at any asperity, and a sliding force that is turned costs friction.
+    The sum of P_i - q_i.t is at most `unused`. So each q is within (2 P unused)^(1/2) of P t, all
+    together in the same sense; then X.t is no less than what it is at any asperity, and a sliding
+    force that is turned costs friction.
     """
     P, ceilings, sure, n = problem.scalar.loads, problem.scalar.ceilings, known.sure, len(problem)
     total = float(np.hypot(*state.total))

@@ -60,7 +60,7 @@ class Shift(NamedTuple):
 
     shares : (n,) S_i, the shift over the least local stiffness; convex where all S_i <= 1
 
-    docs/theory/friction.md, "Convexity".
+    docs/theory/friction-convexity.md, "Convexity".
     """
 
     values: Array
@@ -111,7 +111,7 @@ class VectorProblem:
         """(n,) h_i = (2/3) ceiling_i / P_i = 1 / (2 E* a_i): the local Hessian is at least h_i I.
 
         Its eigenvalues, along q and across, are ceiling/P times deflection'(t) and deflection(t)/t:
-        docs/theory/friction.md, "Convexity".
+        docs/theory/friction-convexity.md, "Convexity".
         """
         h: Array = (2.0 / 3.0) * self.scalar.ceilings / self.scalar.loads
         return h
@@ -187,7 +187,8 @@ class VectorProblem:
     def shift(self) -> Shift:
         """A shift for the cones and the dual bound, confirmed by Cholesky.
 
-        By the neighbours' distances, (3) of docs/theory/friction.md, "Convexity": 2 / (2 - nu) of
+        By the neighbours' distances, (3) of docs/theory/friction-convexity.md, "Convexity":
+        2 / (2 - nu) of
 
             1 / (pi E* s_i) at nu = 0,    (9/4) (1 - 2 nu / 3) / (pi E* s_i) for 0 < nu <= 1/2.
 
@@ -237,8 +238,8 @@ class VectorProblem:
             least energy >= X'T - q'Mq / 2 + sum_i min over |x| <= P_i of [h_i(x) + (M q - X)_i x],
 
         and the energy less that is a sum of terms that are not negative. Infinite where a share
-        of the shift exceeds 1, or X is. docs/theory/friction.md, "The least energy from below",
-        and "Rounding" there.
+        of the shift exceeds 1, or X is. docs/theory/friction-cones.md,
+        "The least energy from below", and "Rounding" there.
         """
         shares = self.shift.shares + self._slack
         if shares.max() > 1 or not np.isfinite(state.rise).all():
@@ -300,7 +301,7 @@ class VectorProblem:
 
         With x = deflection(|q| / P) that is where  ceiling [x - (2/3) S force(x)] = slope, or 1: a
         convex, growing function of x, so Newton's method runs down to it from its tangent at 0.
-        docs/theory/friction.md, "The least energy from below".
+        docs/theory/friction-cones.md, "The least energy from below".
         """
         ceilings = self.scalar.ceilings
         slope = np.minimum(slope, ceilings * (1.0 - 2.0 / 3.0 * shares))
