@@ -39,6 +39,7 @@ def compare(scene: Path, as_json: bool) -> int:
             file.scene,
             approach=file.approach,
             load=file.load,
+            influence=file.influence,
             announce=lambda name: show(f"pressing on {len(file.scene)} asperities: {name}"),
         )
     summary = comparison_summary(comparison)

@@ -158,6 +158,7 @@ def _entry_summary(entry: Entry) -> Summary:
             "duality_gap": proof.duality_gap,
             "iterations": contact.iterations,
             "seconds": contact.seconds,
+            "influence": contact.influence,
         }
     return row
 
