@@ -75,6 +75,13 @@ class Coupling(Protocol):
         """
         ...
 
+    def clearances(self) -> Array:
+        """(m,) [length] lower bounds on the distance of each point to the nearest asperity.
+
+        Of an asperity itself, to the nearest of the others.
+        """
+        ...
+
 
 class Influence(Coupling, Protocol):
     """The coupling A among asperities.
@@ -126,6 +133,13 @@ class Influence(Coupling, Protocol):
 
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij over all pairs, for contact radii a (n,), 0 where open."""
+        ...
+
+    def packing(self, radii: Array) -> float:
+        """At least the largest t_i / (r_ij - t_j) over pairs with radii t (n,) that are not 0.
+
+        Infinite where that is not below 1: where two such spheres meet.
+        """
         ...
 
     def smoother(self, root: Array) -> Smoother | None:

@@ -18,6 +18,7 @@ from convexrough.influence.coupling import (
     Smoother,
     inverse_distances,
 )
+from convexrough.influence.packing import clearances, matrix_packing
 from convexrough.roundoff import ROUNDOFF
 
 
@@ -121,6 +122,12 @@ class DenseInfluence:
             return 0.0
         return float((np.add.outer(radii, radii) * self.matrix).max()) / self.scale
 
+    def packing(self, radii: Array) -> float:
+        return matrix_packing(self.matrix * ((1.0 + 2.0 * self.entry_error) / self.scale), radii)
+
+    def clearances(self) -> Array:
+        return self.separations()
+
     def smoother(self, root: Array) -> Smoother | None:
         return None
 
@@ -162,6 +169,9 @@ class DenseCoupling:
             total[block] = inverse**power @ strengths
         loss = (len(self.points) + 3) * ROUNDOFF + power * self._entry_error
         return total * (1.0 + 1.01 * loss)
+
+    def clearances(self) -> Array:
+        return clearances(self.points, self.targets, self.point_error)
 
     def _rows(self) -> Iterator[tuple[slice, Array]]:
         """1 / r in blocks of rows."""

@@ -8,6 +8,7 @@ lattice: Fourier transforms".
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -20,6 +21,7 @@ from convexrough.influence.convolution import Box, Kernel, neighbours
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
+from convexrough.influence.packing import beside, lattice_packing, point_packing
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import crowding, separations
@@ -73,6 +75,10 @@ class LatticeCoupling:
         total += self.box.bound_each(kernel, 2.0**-24) * float(np.linalg.norm(shares))
         stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
         return np.maximum(total, 0.0) * (largest * stretched)
+
+    def clearances(self) -> Array:
+        """Of points that are none of the asperities: any two sites are the spacing apart."""
+        return np.full(len(self.targets), self.spacing * self._least * (1.0 - 8 * ROUNDOFF))
 
     @property
     def _unit(self) -> float:
@@ -182,17 +188,27 @@ class LatticeInfluence(LatticeCoupling):
         field = np.full(self.box.shape, -np.inf)
         field.ravel()[self.sources] = radii
         most, worst = 2.0 * float(radii.max()), 0.0
-        for on_sites, i, j in neighbours(self.box):
-            distance = self.spacing * (on_sites - self.blur)  # at least that of the points
+        for distance, i, j in self._pairs():
             if most <= worst * distance:
                 break
-            here, there = field[i:], field[: len(field) - i]
-            if j >= 0:
-                pairs = here[:, j:] + there[:, : there.shape[1] - j]
-            else:
-                pairs = here[:, :j] + there[:, -j:]
-            worst = max(worst, float(pairs.max(initial=0.0)) / distance)
+            here, there = beside(field, i, j)
+            worst = max(worst, float((here + there).max(initial=0.0)) / distance)
         return worst
+
+    def packing(self, radii: Array) -> float:
+        if not self._filled:
+            return point_packing(self.points, radii, 3.0 * self.point_error)
+        field = np.zeros(self.box.shape)
+        field.ravel()[self.sources] = radii
+        return lattice_packing(field, self._pairs())
+
+    def clearances(self) -> Array:
+        return self.separations()
+
+    def _pairs(self) -> Iterator[tuple[float, int, int]]:
+        """`neighbours`, and no more than the distance of points that far apart."""
+        for on_sites, i, j in neighbours(self.box):
+            yield self.spacing * (on_sites - self.blur) * (1.0 - 8 * ROUNDOFF), i, j
 
     def smoother(self, root: Array) -> Smoother:
         box = self.box

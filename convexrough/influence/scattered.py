@@ -15,6 +15,7 @@ import numpy as np
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
+from convexrough.influence.packing import clearances, point_packing
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered_smoother import coarse_inverse
 from convexrough.influence.splitting import Splitting
@@ -102,6 +103,12 @@ class ScatteredInfluence:
     def crowding(self, radii: Array) -> float:
         return crowding(self.points, radii)
 
+    def packing(self, radii: Array) -> float:
+        return point_packing(self.points, radii, 3.0 * self.point_error)
+
+    def clearances(self) -> Array:
+        return self.separations()
+
     def smoother(self, root: Array) -> Smoother | None:
         return coarse_inverse(self.points, self.scale, root)
 
@@ -146,6 +153,11 @@ class ScatteredCoupling:
 
     def falloff(self, strengths: Array, power: int) -> Array:
         return self.joint.falloff(self._all(strengths), power)[self.sources :]
+
+    def clearances(self) -> Array:
+        points = self.joint.points
+        here, elsewhere = points[: self.sources], points[self.sources :]
+        return clearances(here, elsewhere, self.joint.point_error)
 
     def _all(self, values: Array) -> Array:
         everywhere = np.zeros(len(self.joint), dtype=values.dtype)

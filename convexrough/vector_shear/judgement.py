@@ -20,7 +20,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.convex.definite import proved_margin
-from convexrough.normal.judgement import SUM_ROUNDOFFS
+from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.judgement import (
     LIMIT_ROUNDOFFS,

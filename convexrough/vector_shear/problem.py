@@ -35,7 +35,7 @@ from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.convex.definite import is_definite
 from convexrough.errors import SolverError
-from convexrough.normal.judgement import SUM_ROUNDOFFS
+from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.sphere import mindlin
