@@ -140,8 +140,7 @@ def press(
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
-    contact = solve(problem, solver, start, announce)
-    return replace(contact, seconds=time.perf_counter() - began)
+    return _contact(problem, solver, start, announce, began)
 
 
 def solve(
@@ -151,8 +150,16 @@ def solve(
     announce: Announce | None = None,
 ) -> Contact:
     """`press` for a problem already assembled; its arguments are as there."""
-    began = time.perf_counter()
-    solver = solvers.named(solver)
+    return _contact(problem, solvers.named(solver), start, announce, time.perf_counter())
+
+
+def _contact(
+    problem: NormalProblem,
+    solver: Solver,
+    start: ArrayLike | None,
+    announce: Announce | None,
+    began: float,
+) -> Contact:
     scene = problem.scene
     force, length = problem.units.force, problem.units.length
     first = None

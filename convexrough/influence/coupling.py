@@ -7,6 +7,7 @@ Hertz's business.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple, Protocol
 
@@ -47,7 +48,8 @@ class Rounding(NamedTuple):
         By a factor of 10 beside that of sums, which is near the truth, and of 20 beside that of
         transforms, which is some thousand times the truth.
         """
-        return 0.1 * self.relative * float(np.linalg.norm(displacement)) + 0.05 * self.norm
+        size = math.sqrt(np.vdot(displacement, displacement))
+        return 0.1 * self.relative * size + 0.05 * self.norm
 
     @property
     def component(self) -> float:

@@ -67,7 +67,13 @@ class DenseInfluence:
 
     @classmethod
     def assemble(cls, points: Array, scale: float, point_error: float = 0.0) -> DenseInfluence:
-        matrix = dense_matrix(points, scale)
+        return cls.of(points, scale, dense_matrix(points, scale), point_error)
+
+    @classmethod
+    def of(
+        cls, points: Array, scale: float, matrix: Array, point_error: float = 0.0
+    ) -> DenseInfluence:
+        """Where the matrix (n, n) is known."""
         largest = float(matrix.max(initial=0.0))
         nearest = scale / largest if largest > 0 else np.inf
         return cls(points, scale, matrix, point_error, entry_error(point_error, nearest))
@@ -100,7 +106,7 @@ class DenseInfluence:
         return total * (1.0 + self._loss(power))
 
     def submatrix(self, which: Indices) -> Array:
-        return np.asarray(self.matrix[which[:, None], which])
+        return self.matrix.take(which, axis=0).take(which, axis=1)
 
     def among(self, which: Indices) -> DenseInfluence:
         matrix = self.submatrix(which)

@@ -29,6 +29,9 @@ from convexrough.scene.neighbours import crowding, separations
 #: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
 ENTRY_ROUNDOFFS = 24
 
+#: Numbers looked at together: what a cache holds.
+CHUNK = 2**14
+
 #: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree:
 #: a heuristic, which decides speed and how sharp shells are.
 FILLED = 0.2
@@ -102,19 +105,31 @@ class LatticeCoupling:
         return self._single if dtype == np.float32 else self._kernel.spectrum
 
     def _convolve(self, values: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        field = np.zeros(self.box.shape[0] * self.box.shape[1], dtype=values.dtype)
-        field[self.sources] = values
-        return self.box.convolve(field.reshape(self.box.shape), spectrum).ravel()[self.targets]
+        field = np.zeros((self.box.shape[0], self.box.padded[1]), dtype=values.dtype)
+        sources, targets = self._padded
+        field.ravel()[sources] = values
+        return self.box.convolve(field, spectrum).ravel()[targets]
+
+    @cached_property
+    def _padded(self) -> tuple[Indices, Indices]:
+        """`sources` and `targets` where each row of the box is as long as the transforms."""
+        (_, columns), (_, width) = self.box.shape, self.box.padded
+        sources = self.sources + self.sources // columns * (width - columns)
+        if self.targets is self.sources:
+            return sources, sources
+        return sources, self.targets + self.targets // columns * (width - columns)
 
 
 @dataclass(frozen=True, eq=False)
 class LatticeInfluence(LatticeCoupling):
     """The coupling among asperities on a lattice.
 
-    points : (n, 2) [length];  places : (n, 2) i and j of each
+    array  : (N, 2) [length] points;  members : (n,) of which these asperities are some
+    places : (n, 2) i and j of each
     """
 
-    points: Array
+    array: Array
+    members: Indices
     lattice: Lattice
     places: Sites
     point_error: float
@@ -131,36 +146,47 @@ class LatticeInfluence(LatticeCoupling):
         places = lattice.sites(points)
         if places is None:
             raise ValueError("points off the lattice")
-        return cls._of(points, lattice, places, scale, point_error)
+        return cls.of(points, np.arange(len(points)), lattice, places, scale, point_error)
 
     @classmethod
-    def _of(
-        cls, points: Array, lattice: Lattice, places: Sites, scale: float, point_error: float
+    def of(
+        cls,
+        array: Array,
+        members: Indices,
+        lattice: Lattice,
+        places: Sites,
+        scale: float,
+        point_error: float,
     ) -> LatticeInfluence:
+        """Where the places are known."""
         box, index = _boxed(lattice, places)
         off = 2.0 * float(np.sqrt(2.0)) * (lattice.blur + point_error)
         spacing = lattice.spacing
         both = scale, spacing, off / spacing
-        return cls(box, index, index, *both, points, lattice, places, point_error)
+        return cls(box, index, index, *both, array, members, lattice, places, point_error)
 
     def __len__(self) -> int:
-        return len(self.points)
+        return len(self.members)
+
+    @property
+    def points(self) -> Array:
+        """(n, 2) [length]"""
+        return self.array[self.members]
 
     @property
     def matrix(self) -> Array:
         return dense_matrix(self.points, self.scale)
 
     def submatrix(self, which: Indices) -> Array:
-        return dense_matrix(self.points[which], self.scale)
+        return dense_matrix(self.array[self.members[which]], self.scale)
 
     @property
     def entry_error(self) -> float:
         return entry_error(self.point_error, self.spacing * self._least)
 
     def among(self, which: Indices) -> LatticeInfluence:
-        return self._of(
-            self.points[which], self.lattice, self.places[which], self.scale, self.point_error
-        )
+        members, places = self.members[which], self.places[which]
+        return self.of(self.array, members, self.lattice, places, self.scale, self.point_error)
 
     def onto(self, points: Array) -> Coupling:
         places = self.lattice.sites(points)
@@ -217,9 +243,20 @@ class LatticeInfluence(LatticeCoupling):
 
 def _boxed(lattice: Lattice, places: Sites) -> tuple[Box, Indices]:
     """The smallest box, and where in it each place is."""
+    basis = lattice.basis / lattice.spacing
     if len(places) == 0:
-        return Box((1, 1), lattice.basis / lattice.spacing), np.zeros(0, dtype=np.intp)
-    low = places.min(axis=0)
-    rows, columns = (places.max(axis=0) - low + 1).tolist()
-    index = (places[:, 0] - low[0]) * columns + (places[:, 1] - low[1])
-    return Box((rows, columns), lattice.basis / lattice.spacing), index
+        return Box((1, 1), basis), np.zeros(0, dtype=np.intp)
+    low, high = places.min(axis=0), places.max(axis=0)
+    rows, columns = (high - low + 1).tolist()
+    index = (places[:, 0] - low[0]) * np.intp(columns) + (places[:, 1] - low[1])
+    return Box((rows, columns), basis, _extent(places, (low + high) / 2.0, basis)), index
+
+
+def _extent(places: Sites, middle: Array, basis: Array) -> float:
+    """No two places are further apart: twice the largest distance from the middle, and a little."""
+    (g11, g12), (_, g22) = basis @ basis.T
+    largest = 0.0
+    for start in range(0, len(places), CHUNK):
+        i, j = (places[start : start + CHUNK] - middle).T
+        largest = max(largest, float((i * (g11 * i + 2.0 * g12 * j) + g22 * (j * j)).max()))
+    return 2.0 * float(np.sqrt(largest)) * (1.0 + 1e-9)

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.scene.lattice import Lattice
-from convexrough.scene.neighbours import refuse_coincident
+from convexrough.scene.layout import Layout
 from convexrough.scene.patterns import (
     CUT_DEVIATIONS,
     checked_seed,
@@ -22,9 +22,6 @@ from convexrough.scene.patterns import (
     hexagonal_sites,
     square_sites,
 )
-
-#: Of more asperities than this, a lattice is looked for before the nearest neighbours of all.
-MANY = 5000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,28 +46,49 @@ class Asperities(Record):
     ) -> None:
         points = _points(positions)
         object.__setattr__(self, "positions", points)
-        n = len(points)
-        least = checks.SMALLEST
+        self._wear(tip_radii, heights)
+        self.layout  # noqa: B018, which refuses two at one place
+
+    def _wear(self, tip_radii: ArrayLike, heights: ArrayLike) -> None:
+        n, least = len(self), checks.SMALLEST
         radii = checks.array("tip_radii", tip_radii, length=n, sign="positive", smallest=least)
         object.__setattr__(self, "tip_radii", radii)
         tall = checks.array("heights", heights, length=n, smallest=least)
         object.__setattr__(self, "heights", tall)
-        if n <= MANY or self.lattice is None:
-            refuse_coincident(points)
+
+    def with_tips(self, tip_radii: ArrayLike, heights: ArrayLike = 0.0) -> Asperities:
+        """Other tips at the same positions; arguments as for `Asperities`.
+
+        What follows from the positions alone, such as their lattice and their distances, is found
+        once and shared: for many scenes on one array.
+
+        >>> rougher = asperities.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
+        >>> rougher.positions is asperities.positions
+        True
+        """
+        other = object.__new__(type(self))
+        object.__setattr__(other, "positions", self.positions)
+        object.__setattr__(other, "layout", self.layout)
+        other._wear(tip_radii, heights)
+        return other
 
     def __len__(self) -> int:
         return len(self.positions)
 
     @cached_property
+    def layout(self) -> Layout:
+        """What follows from the positions alone."""
+        return Layout(self.positions)
+
+    @property
     def lattice(self) -> Lattice | None:
         """What the summits lie on, each on a site of its own, if that is a lattice."""
-        return Lattice.through(self.positions)
+        return self.layout.lattice
 
-    @cached_property
+    @property
     def distances(self) -> Array:
         """(n,) [length] distance of each summit from the axis."""
-        x, y = self.positions.T
-        return frozen(np.hypot(x, y))
+        return self.layout.distances
 
     @classmethod
     def hexagonal(

@@ -43,6 +43,24 @@ def test_square_lattice() -> None:
     assert {tuple(p) for p in lattice.positions} >= {(0, 0), (4, 0), (-2, 2), (0, -4)}
 
 
+def test_scenes_on_one_array_share_what_follows_from_positions() -> None:
+    array = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    heights = 1e-6 * np.random.default_rng(2).standard_normal(len(array))
+    rough = array.with_tips(0.03, heights)
+    assert rough.layout is array.layout
+    assert (rough.tip_radii == 0.03).all()
+    assert (rough.heights == heights).all()
+    assert (array.heights == 0).all()
+    alone = cr.Asperities(array.positions, 0.03, heights)
+    shared, own = (
+        cr.press(cr.Scene(1.0, each, MATERIAL), approach=5e-5) for each in (rough, alone)
+    )
+    assert (shared.loads == own.loads).all()
+    assert (shared.certificate.load_errors == own.certificate.load_errors).all()
+    with pytest.raises(cr.InputError, match="tip_radii"):
+        array.with_tips([1.0, 2.0])
+
+
 def test_a_larger_region_keeps_what_was_there() -> None:
     options: dict[str, Any] = dict(
         spacing=1.0, tip_radius=2.0, height_std=0.1, tip_radius_cv=0.3, seed=3
