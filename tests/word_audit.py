@@ -10,12 +10,13 @@ in exact arithmetic, so that a bound too small by a roundoff is found too.
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import multiprecision
 import numpy as np
 from flint import arb, ctx
 from scenes import on_lattice, operators, scattered, solve_exactly
+from vector_oracle import solve_vectors
 
 import convexrough as cr
 
@@ -30,6 +31,10 @@ KINDS = ("usual", "crowded", "ring", "grazing", "near", "units")
 FRACTIONS = (1e-12, 1e-6, 0.1, 0.4, 0.8, 0.999, 1 - 1e-9, 1 - 1e-13, 1.0)
 
 
+class Dragged(Exception):
+    """Others drag an asperity along further than the sphere moves: the theorem is not for this."""
+
+
 class Wrong(AssertionError):
     """A word or a bound that is not true."""
 
@@ -41,6 +46,7 @@ class Tally:
     scenes: int = 0
     refused: int = 0
     unsolved: int = 0  # by the oracle, which needs both signs of every gap
+    unsolved_vectors: int = 0  # states with the full tangential kernel
     words: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
     ratios: dict[tuple[str, str], list[float]] = field(default_factory=dict)
 
@@ -50,14 +56,17 @@ class Tally:
         seen[1] += int((words == "undecided").sum())
 
     def compare(self, operator: str, stage: str, bounds: Any, values: Any, exact: Any) -> None:
-        """Bound by bound; the ratio is that of the largest bound and the largest error."""
+        """Bound by bound, of numbers or vectors; the ratio is of the largest bound and error."""
         errors = []
         with ctx.workprec(BITS):
             for bound, value, true in zip(bounds, values, exact, strict=True):
-                error = abs(arb(float(value)) - true)
+                balls = [true] if isinstance(true, arb) else true
+                pairs = zip(np.atleast_1d(value), balls, strict=True)
+                off = [arb(float(v)) - each for v, each in pairs]
+                square = sum((each * each for each in off), arb(0))
                 if np.isfinite(bound):
-                    require(error <= arb(float(bound)), f"{stage} bound {bound} of {value}")
-                errors.append(float(error.mid()))
+                    require(square <= arb(float(bound)) ** 2, f"{stage} bound {bound} of {value}")
+                errors.append(float(square.mid().sqrt()))
         if len(errors) and np.isfinite(bounds).all() and max(errors) > 0:
             ratio = float(np.max(bounds)) / max(errors)
             self.ratios.setdefault((operator, stage), []).append(ratio)
@@ -160,38 +169,74 @@ def _audit_scene(seed: int, tally: Tally) -> None:
     _audit_shear(kind, operator, contact, exact, float(rng.choice(FRACTIONS)), tally)
 
 
+class Slid(NamedTuple):
+    """An exact state of first loading: balls, forces over f P as the theorem has them."""
+
+    forces: list[Any]
+    slips: list[Any]
+    rise: Any
+    loss: Any  # of the cycle of this amplitude
+
+
+def _slid(contact: cr.Contact, full: Any, force: Any) -> Slid | None:
+    """By Ciavarella and Jaeger's theorem: Q_i = f (P_i - p_i(P - Q / f)), slips f c_t g_i.
+
+    None beyond the limit of the true loads, where all slide and how far is not determined. Raises
+    Dragged where an asperity is, which the theorem is not for.
+    """
+    nu = arb(contact.scene.material.poisson_ratio)
+    travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
+    left = full.load - arb(force) / arb(FRICTION)
+    if not left > 0:
+        return None
+    found = cr.shear(contact, force=float(force)).forces
+    start = np.maximum(contact.loads - found / FRICTION, 0.0) + 1e-30 * contact.load
+    reduced = solve_exactly(contact.scene, load=left.mid(), start=start, digits=DIGITS)
+    forces = [FRICTION * (a - b) for a, b in zip(full.loads, reduced.loads, strict=True)]
+    if any(q < 0 for q in forces):
+        raise Dragged
+    slips = [
+        travel * gap if load > 0 else arb(0)
+        for gap, load in zip(reduced.gaps, full.loads, strict=True)
+    ]
+    rise = travel * (full.approach - reduced.approach)
+    return Slid(forces, slips, rise, _loss(contact.scene, full.loads, reduced.loads, slips))
+
+
+def _loss(scene: cr.Scene, loads: Any, left: Any, slips: Any) -> Any:
+    """Of the cycle: (24/5) c_t f^2 P ceiling e + 4 f P s, ceiling = (9 P^2 / (16 E*^2 R))^(1/3)."""
+    nu, E = arb(scene.material.poisson_ratio), arb(scene.material.contact_modulus)
+    loss, f, ct = arb(0), arb(FRICTION), (2 - nu) / (2 * (1 - nu))
+    tips = scene.asperities.tip_radii
+    for P, p, slip, tip in zip(loads, left, slips, tips, strict=True):
+        if P > 0:
+            t, s = 1 - p / P, (p / P).root(3) if p > 0 else arb(0)
+            e = 1 - s**5 - 5 * t / 6 * (1 + s**2)
+            R = 1 / (1 / arb(scene.sphere_radius) + 1 / arb(float(tip)))
+            ceiling = (9 * P**2 / (16 * E**2 * R)).root(3)
+            loss += 24 * ct * f**2 * P * ceiling * e / 5 + 4 * f * P * slip
+    return loss
+
+
 def _audit_shear(
     kind: str, operator: str, contact: cr.Contact, full: Any, fraction: float, tally: Tally
 ) -> None:
-    """Against Ciavarella and Jaeger's theorem: Q_i = f (P_i - p_i(P - Q / f)), slips f c_t g_i."""
     force = fraction * FRICTION * contact.load
-    state = cr.shear(contact, force=force)
     with ctx.workdps(DIGITS + 30):
-        nu = arb(contact.scene.material.poisson_ratio)
-        travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
-        left = full.load - arb(force) / arb(FRICTION)
-        if left > 0:
-            start = np.maximum(contact.loads - state.forces / FRICTION, 0.0) + 1e-30 * contact.load
-            reduced = solve_exactly(contact.scene, load=left.mid(), start=start, digits=DIGITS)
-            forces = [FRICTION * (a - b) for a, b in zip(full.loads, reduced.loads, strict=True)]
-            if any(q < 0 for q in forces):
-                return  # dragged along: the theorem is not for this
-            slips = [
-                travel * gap if load > 0 else arb(0)
-                for gap, load in zip(reduced.gaps, full.loads, strict=True)
-            ]
-            rise = travel * (full.approach - reduced.approach)
-        else:  # beyond the limit of the true loads: all slide, how far is not determined
-            forces, slips, rise = [FRICTION * p for p in full.loads], None, None
-    cycle = cr.cycle(contact, maximum=force)
-    vector = cr.shear_vector(_without_poisson(contact), force=force)
+        try:
+            exact = _slid(contact, full, force)
+        except Dragged:
+            return
+        forces = exact.forces if exact else [FRICTION * p for p in full.loads]
+    state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
+    vector = cr.shear_vector(_with_poisson(contact, 0.0), force=force)
     for stage, words in (
         ("shear", state.status),
         ("cycle", cycle.status),
         ("vector", vector.status),
     ):
         for i, (word, load) in enumerate(zip(words, full.loads, strict=True)):
-            slides = slips is None or slips[i] > 0
+            slides = exact is None or exact.slips[i] > 0
             require(word != "sliding" or (load > 0 and slides), f"{stage}: sliding of {i}")
             require(word != "partial" or (load > 0 and not slides), f"{stage}: partial of {i}")
             require(word != "open" or not load > 0, f"{stage}: open of {i}")
@@ -200,22 +245,90 @@ def _audit_shear(
     tally.compare(operator, "force", proof.force_errors, state.forces, forces)
     errors = vector.certificate.force_errors
     tally.compare(operator, "vector force", errors, vector.forces[:, 0], forces)
-    if slips is not None:
-        tally.compare(operator, "slip", proof.slip_errors, state.slips, slips)
-        tally.compare(operator, "rise", [proof.displacement_error], [state.displacement], [rise])
+    _audit_vectors(kind if fraction < 1 else "limit", operator, contact, full, force, tally)
+    if exact:
+        tally.compare(operator, "slip", proof.slip_errors, state.slips, exact.slips)
+        rise, error = [state.displacement], [proof.displacement_error]
+        tally.compare(operator, "rise", error, rise, [exact.rise])
+        tally.compare(operator, "energy", [cycle.energy_error], [cycle.energy], [exact.loss])
+        if force < FRICTION * contact.load:
+            _audit_history(operator, contact, full, force, exact, tally)
 
 
-def _without_poisson(contact: cr.Contact) -> cr.Contact:
+def _audit_history(
+    operator: str, contact: cr.Contact, full: Any, force: float, there: Slid, tally: Tally
+) -> None:
+    """To Q and back, and half of the way back and there again, which is forgotten."""
+    past = cr.history(contact, forces=[force, -0.25 * force, force, -force])
+    with ctx.workdps(DIGITS + 30):
+        try:
+            inner = _slid(contact, full, (arb(force) - arb(-0.25 * force)) / 2)
+        except Dragged:
+            return
+        assert inner is not None  # below the force that is
+        rises = [there.rise, there.rise - 2 * inner.rise, there.rise, -there.rise]
+        once, back = there.loss / 4, inner.loss / 2
+        losses = [once, once + back, once + 2 * back, once + 2 * back + there.loss / 2]
+        forces = [a - 2 * b for a, b in zip(there.forces, inner.forces, strict=True)]
+    tally.compare(operator, "past rise", past.displacement_errors, past.displacements, rises)
+    tally.compare(operator, "past energy", past.energy_errors, past.energy, losses)
+    one, other = (cr.shear(contact, force=Q).certificate for Q in (force, 0.625 * force))
+    errors = one.force_errors + 2 * other.force_errors + 1e-14 * abs(force)
+    tally.compare(operator, "past force", errors, past.forces[1], forces)
+
+
+def _audit_vectors(
+    kind: str, operator: str, contact: cr.Contact, full: Any, force: float, tally: Tally
+) -> None:
+    """The full tangential kernel, any Poisson's ratio and direction, against its own oracle."""
+    rng = np.random.default_rng(int.from_bytes(np.float64(force).tobytes(), "little"))
+    angle = rng.uniform(0, 2 * np.pi)
+    size = min(force, FRICTION * contact.load)
+    pair = size * np.array([np.cos(angle), np.sin(angle)])
+    if np.hypot(*pair) > FRICTION * contact.load:
+        pair *= 1 - 1e-15
+    tilted = _with_poisson(contact, float(rng.uniform(0.0, 0.5)))
+    state = cr.shear_vector(tilted, force=pair)
+    tally.count(kind, operator, "tensor", state.status)
+    for word, load in zip(state.status, full.loads, strict=True):
+        require(word in ("open", "undecided") or load > 0, "tensor: a word for an open asperity")
+        require(word != "open" or not load > 0, "tensor: open of one that touches")
+    try:
+        true = solve_vectors(
+            tilted.scene, list(full.loads), pair, state.forces, state.displacement, DIGITS - 20
+        )
+    except multiprecision.NotProved:
+        tally.unsolved_vectors += 1
+        return
+    touching = [i for i, load in enumerate(full.loads) if load > 0]
+    for i, slides in zip(touching, true.sliding, strict=True):
+        require(state.status[i] != ("partial" if slides else "sliding"), f"tensor: word of {i}")
+    nu = arb(tilted.scene.material.poisson_ratio)
+    with ctx.workdps(DIGITS + 30):
+        travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
+        forces, slips, rise = FRICTION * true.forces, travel * true.slips, travel * true.rise
+    proof = state.certificate
+    errors = proof.force_errors[touching]
+    tally.compare(operator, "tensor force", errors, state.forces[touching], forces)
+    if np.isfinite(state.displacement).all():
+        errors = proof.slip_errors[touching]
+        tally.compare(operator, "tensor slip", errors, state.slips[touching], slips)
+        errors = [proof.displacement_error]
+        tally.compare(operator, "tensor rise", errors, [state.displacement], [rise])
+
+
+def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
     """At nu = 0 the tensor is the scalar kernel, and the theorem holds for vectors along x."""
     scene = contact.scene
-    material = cr.Material(scene.material.contact_modulus, 0.0)
+    material = cr.Material(scene.material.contact_modulus, nu)
     return replace(contact, scene=replace(scene, material=material))
 
 
 def report(tally: Tally) -> str:
     """Tables in Markdown."""
     lines = [
-        f"{tally.scenes:,} scenes, {tally.refused} refused, {tally.unsolved} beyond the oracle; "
+        f"{tally.scenes:,} scenes, {tally.refused} refused, {tally.unsolved} beyond the oracle, "
+        f"{tally.unsolved_vectors} of the vector states; "
         "no wrong word, no bound too small.",
         "",
         "| scenes | stage | words | undecided |",

@@ -85,6 +85,7 @@ def _cycle_columns(rows: tuple[Cycled, ...]) -> Columns:
         "partial_slip_energy": np.array([each.partial_slip_energies.sum() for each in cycles]),
         "sliding_energy": np.array([each.sliding_energies.sum() for each in cycles]),
         "sliding": np.array([counts(each.status, SHEAR)["sliding"] for each in cycles]),
+        "energy_error": np.array([each.energy_error for each in cycles]),
     }
 
 
@@ -116,4 +117,5 @@ def _history_columns(followed: Followed) -> Columns:
         "force": past.applied,
         "displacement": past.displacements,
         "energy": past.energy,
+        "energy_error": past.energy_errors,
     }

@@ -55,6 +55,7 @@ def summarise(found: Findings) -> Summary:
                 "maximum": maximum,
                 "minimum": minimum,
                 "energy": cycle.energy,
+                "energy_error": cycle.energy_error,
                 "energy_normalised": cycle.energy_normalised,
                 "smooth_normalised": cycle.smooth_normalised,
                 "balance_defect": cycle.balance_defect,
@@ -73,6 +74,7 @@ def summarise(found: Findings) -> Summary:
             "fraction": list(fractions),
             "displacement": history.displacements.tolist(),
             "energy": history.energy.tolist(),
+            "energy_error": history.energy_errors.tolist(),
         }
     return summary | varied_summary(found.varying)
 

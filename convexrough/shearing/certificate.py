@@ -142,6 +142,7 @@ def _judged(problem: TangentialProblem, given: Array, totals: Array) -> Bounds:
         rises=least(bounds.rises, np.abs(states.rises - states.rises[0])),
         sliding=either(bounds.sliding),
         partial=either(bounds.partial),
+        losses=np.array([np.inf]),  # nobody asks for a loss of given forces
     )
 
 

@@ -38,6 +38,7 @@ class Cycle(Table, Drawn):
 
     maximum, minimum       : [force]
     energy                 : lost per cycle, both bodies [force length]: asperity by asperity
+    energy_error           : proved bound on |energy - solution|, infinite without proof
     partial_slip_energies  : [force length] of each asperity's partial slip
     sliding_energies       : [force length] of each asperity's gross slip
     balance_defect         : relative difference to the energy from the trapezoid error
@@ -70,6 +71,7 @@ class Cycle(Table, Drawn):
     displacement_error: float
     sliding: NDArray[np.bool_]
     partial: NDArray[np.bool_]
+    energy_error: float
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
@@ -221,6 +223,7 @@ def cycles(
             displacement_error=each.rise_error * problem.travel_unit,
             sliding=each.sliding,
             partial=each.partial,
+            energy_error=each.energy_error,
         )
         for i, each in enumerate(losses[place] for place in back)
     ]
@@ -238,6 +241,7 @@ class _Loss(NamedTuple):
     defect: float
     sliding: NDArray[np.bool_]
     partial: NDArray[np.bool_]
+    energy_error: float
 
 
 def _losses(loading: FirstLoading, states: States, bounds: Bounds) -> Iterator[_Loss]:
@@ -247,6 +251,7 @@ def _losses(loading: FirstLoading, states: States, bounds: Bounds) -> Iterator[_
     energies = slip.sum(axis=1) + slide.sum(axis=1)
     others = unit * loading.trapezoid_error(states)
     defects = np.abs(others - energies) / np.where(energies > 0, energies, 1.0)
+    errors = loading.energy_errors(bounds.losses)
     for i, total in enumerate(states.totals):
         yield _Loss(
             float(total),
@@ -258,9 +263,10 @@ def _losses(loading: FirstLoading, states: States, bounds: Bounds) -> Iterator[_
             float(defects[i]),
             frozen(problem.to_scene(bounds.sliding[i])),
             frozen(problem.to_scene(bounds.partial[i])),
+            float(errors[i]),
         )
 
 
 def _empty(contact: Contact, maximum: float, minimum: float) -> Cycle:
     zero, no = frozen(np.zeros(len(contact.scene))), frozen(np.zeros(len(contact.scene), bool))
-    return Cycle(contact, maximum, minimum, 0.0, zero, zero, 0.0, 0.0, 0.0, 0.0, 0.0, no, no)
+    return Cycle(contact, maximum, minimum, 0.0, zero, zero, 0.0, 0.0, 0.0, 0.0, 0.0, no, no, 0.0)

@@ -15,6 +15,7 @@ import numpy as np
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.progress import Announce
+from convexrough.roundoff import SAFETY
 from convexrough.shearing.judgement import Bounds, judge_in_turn
 from convexrough.shearing.many_states import by_matrices
 from convexrough.shearing.normal_map import States
@@ -55,6 +56,11 @@ class FirstLoading:
     def sliding(self, states: States) -> Array:
         """(m, n) share of w(T) lost in sliding: P slip / 2."""
         return 0.5 * self.problem.loads * np.abs(states.slips)
+
+    def energy_errors(self, errors: Array) -> Array:
+        """[force length] from bounds on w, in whose units too small a number may vanish."""
+        least = len(self.problem) * np.finfo(float).smallest_subnormal
+        return np.asarray(self.energy_unit * errors * (1 + SAFETY) + least)
 
     def trapezoid_error(self, states: States) -> Array:
         """(m,) w(T) = T rise / 2 - Psi, from the totals and not asperity by asperity.

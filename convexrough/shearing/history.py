@@ -14,7 +14,7 @@ from convexrough.contact import Contact
 from convexrough.drawn import Drawn
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
-from convexrough.roundoff import SAFETY
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.masing import remember
 from convexrough.shearing.normal_map import States
@@ -31,6 +31,7 @@ class History(Table, Drawn):
     asperity_displacements : (m, n) X_i + slip_i [length]
     slips         : (m, n) gross slip [length]
     energy        : (m,) lost since the beginning [force length]
+    energy_errors : (m,) [force length] proved bounds on |energy - solution|, likewise
 
     >>> past = cr.history(contact, forces=contact.load * np.array([0.4, -0.4, 0.4]))
     >>> past.forces.shape, bool((np.diff(past.energy) > 0).all())
@@ -38,7 +39,7 @@ class History(Table, Drawn):
     """
 
     _along: ClassVar[Along] = {
-        ("step",): ("applied", "displacements", "displacement_errors", "energy"),
+        ("step",): ("applied", "displacements", "displacement_errors", "energy", "energy_errors"),
         ("step", "asperity"): ("forces", "asperity_displacements", "slips"),
     }
 
@@ -50,6 +51,7 @@ class History(Table, Drawn):
     asperity_displacements: Array
     slips: Array
     energy: Array
+    energy_errors: Array
 
 
 def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = None) -> History:
@@ -67,21 +69,22 @@ def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = 
     if contact.load == 0.0 or len(applied) == 0:
         none = frozen(np.zeros((len(applied), len(contact.scene))))
         zero = frozen(np.zeros(len(applied)))
-        return History(contact, applied, zero, zero, none, none, none, zero)
+        return History(contact, applied, zero, zero, none, none, none, zero, zero)
     loading = FirstLoading(contact)
     problem = loading.problem
     steps = remember(applied / problem.force_unit)
     totals = [step.total for step in steps]
     costs = [total for step in steps for _, total in step.lost]
     states, back = loading.states(np.array(totals + costs), announce)
-    bounds, w = _judged(loading, states, announce)
+    bounds, w, w_errors = _judged(loading, states, announce)
+    spent = _Spent(w, w_errors)
 
     m, n = len(steps), len(contact.scene)
-    rises, errors, energy = np.empty(m), np.empty(m), np.empty(m)
+    rises, errors, energy, energy_errors = (np.empty(m) for _ in range(4))
     looked_up = (states.increments, states.deflections, states.slips)
     units = (problem.force_unit, problem.travel_unit, problem.travel_unit)
     results = [np.zeros((m, n)) for _ in looked_up]
-    touching, spent, lost = problem.touching, iter(back[m:]), 0.0
+    touching, costing = problem.touching, iter(back[m:])
     for i, step in enumerate(steps):
         at, base, started = back[i], step.base, step.base >= 0
         for result, field, unit in zip(results, looked_up, units, strict=True):
@@ -91,8 +94,9 @@ def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = 
         rises[i] = (rises[base] if started else 0.0) + step.scale * states.rises[at]
         moved = abs(step.scale) * bounds[at] if step.scale else 0.0
         errors[i] = (errors[base] if started else 0.0) + moved
-        lost += sum(factor * w[next(spent)] for factor, _ in step.lost)
-        energy[i] = lost
+        for factor, _ in step.lost:
+            spent.add(factor, next(costing))
+        energy[i], energy_errors[i] = spent.energy, spent.error
     increments, deflections, slips = results
     return History(
         contact=contact,
@@ -103,15 +107,45 @@ def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = 
         asperity_displacements=frozen(deflections),
         slips=frozen(slips),
         energy=frozen(energy * loading.energy_unit),
+        energy_errors=frozen(loading.energy_errors(energy_errors)),
     )
+
+
+class _Spent:
+    """sum factor * w, and what it can be off by: states that are spent and had back cost nothing.
+
+    w, errors : (m,) of the states of first loading, and bounds on |w - w*|
+    """
+
+    def __init__(self, w: Array, errors: Array) -> None:
+        self.w, self.proved = w, np.isfinite(errors)
+        self.errors = np.where(self.proved, errors, 0.0)
+        self.counts = np.zeros(len(w))  # sums of quarters, exact
+        self.energy = self.doubt = self.rounding = 0.0
+        self.unproved = 0.0  # the sum of |counts| of those not proved
+
+    def add(self, factor: float, state: int) -> None:
+        """Loss of `factor` cycles."""
+        before, after = self.counts[state], self.counts[state] + factor
+        self.counts[state] = after
+        self.energy += factor * self.w[state]
+        self.doubt += (abs(after) - abs(before)) * self.errors[state]
+        self.unproved += (abs(after) - abs(before)) * (not self.proved[state])
+        self.rounding += 4 * ROUNDOFF * (abs(self.energy) + self.w[state] + self.doubt)
+
+    @property
+    def error(self) -> float:
+        """Bound on |energy - solution|."""
+        return np.inf if self.unproved else (self.doubt + self.rounding) * (1 + SAFETY)
 
 
 def _judged(
     loading: FirstLoading, states: States, announce: Announce | None
-) -> tuple[Array, Array]:
-    """(m,) bounds on the rises of states, and w(T): what they cost."""
-    bounds, w = [], []
+) -> tuple[Array, Array, Array]:
+    """(m,) bounds on the rises of states; w(T), what they cost; and bounds on |w - w*|."""
+    bounds, w, w_errors = [], [], []
     for part, proved in loading.judged(states, announce):
         bounds.append(proved.rises)
         w.append((loading.partial_slip(part) + loading.sliding(part)).sum(axis=1))
-    return np.concatenate(bounds), np.concatenate(w)
+        w_errors.append(proved.losses)
+    return np.concatenate(bounds), np.concatenate(w), np.concatenate(w_errors)

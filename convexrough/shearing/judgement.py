@@ -26,6 +26,7 @@ from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.energy import TangentialEnergy
 from convexrough.shearing.load_errors import LoadErrors, couple_above
+from convexrough.shearing.loss_errors import Nearness, loss_errors
 from convexrough.shearing.normal_map import States
 from convexrough.shearing.problem import TangentialProblem
 
@@ -53,13 +54,14 @@ class Bounds(NamedTuple):
     rises: Array  # (m,)
     sliding: NDArray[np.bool_]  # (m, n)
     partial: NDArray[np.bool_]  # (m, n) proved not to slide
+    losses: Array  # (m,) |w - w*|, of what a cycle of this amplitude costs
 
     @classmethod
     def unproved(cls, m: int, n: int) -> Bounds:
         """Nothing is known of m states of n asperities."""
         unknown, no = np.full((m, n), np.inf), np.zeros((m, n), dtype=bool)
         nowhere, unproved = np.full(m, np.inf), np.zeros(m, dtype=bool)
-        return cls(unproved, unknown, unknown.copy(), nowhere, no, no.copy())
+        return cls(unproved, unknown, unknown.copy(), nowhere, no, no.copy(), nowhere.copy())
 
 
 def judge_states(problem: TangentialProblem, states: States) -> Bounds:
@@ -256,14 +258,17 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: Array) -
     at_each = np.where(sticks, np.abs(available - own) + uncertainty + change, np.inf)
     rise_errors = at_each.min(axis=1)
     slip_errors = uncertainty + rise_errors[:, None] + ceilings * known.relative
-    return Bounds(
-        proved=image.restored & np.isfinite(rise_errors),
-        increments=distances + known.image_distances(P, u),
-        slips=slip_errors,
-        rises=rise_errors,
-        sliding=known.sure & (np.abs(available) - ceilings > slip_errors),
-        partial=known.sure & (sticks | (ceilings - np.abs(available) > slip_errors)),
-    )
+    sliding = known.sure & (np.abs(available) - ceilings > slip_errors)
+    partial = known.sure & (sticks | (ceilings - np.abs(available) > slip_errors))
+    shifts = image.shifts + moved - distances
+    near = Nearness(distance, shifts, moved, available, slip_errors, rise_errors, sliding, partial)
+    proved = image.restored & np.isfinite(rise_errors)
+    return _bounds(given, near, proved, distances + known.image_distances(P, u))
+
+
+def _bounds(given: _Given, near: Nearness, proved: NDArray[np.bool_], increments: Array) -> Bounds:
+    losses = loss_errors(given.problem, given.known, given.states, near)
+    return Bounds(proved, increments, near.errors, near.rises, near.sliding, near.partial, losses)
 
 
 def _by_exhaustion(given: _Given) -> Bounds:
@@ -293,11 +298,11 @@ def _by_exhaustion(given: _Given) -> Bounds:
     rise_errors = np.maximum(above, below)
     # Where all but one are sure to slide, and not all can, that one does not.
     alone = complete & (unused[:, 0] > doubt) & (sliding.sum(axis=1) == len(P) - 1)
-    return Bounds(
-        proved=complete | sliding.any(axis=1),
-        increments=errors,
-        slips=uncertainty + rise_errors[:, None],
-        rises=rise_errors,
-        sliding=sliding,
-        partial=~sliding & alone[:, None],
+    partial = ~sliding & alone[:, None]
+    slip_errors = uncertainty + rise_errors[:, None]
+    each = errors + np.abs(u) * (known.relative + SHARE_ROUNDOFFS * ROUNDOFF)  # u* from t P*
+    unknown = np.full(len(u), np.inf)
+    near = Nearness(
+        unknown, each, each, given.available, slip_errors, rise_errors, sliding, partial
     )
+    return _bounds(given, near, complete | sliding.any(axis=1), errors)

@@ -39,6 +39,7 @@ class LoadErrors(NamedTuple):
     relative: Array  # (n,) b / P of those, 0 of the others
     stray: float  # most that asperities with no load here, but not proved open, carry in all
     stray_effect: Array  # (n,) most that this moves each of the others
+    stray_among: float  # b'A b of their bounds
     loose_effect: Array  # (n,) most that those not sure move each, wherever |u| <= P leaves them
     stiffness: Array  # (n,) h, the least local part of the Hessian; infinite where not sure
     convexity_number: float  # theta
@@ -59,7 +60,7 @@ class LoadErrors(NamedTuple):
         sure &= errors < 0.1 * P
         strays = _strays(problem)
         most = certificate.load_errors[strays] / problem.units.force
-        effect = _effect(problem, strays, most)
+        effect, among = _effects(problem, strays, most)
         h = np.where(sure, 2.0 / 3.0 * problem.ceilings / (P + errors), np.inf)
         loose = np.where(sure, 0.0, 2.0 * P + errors)
         by_component = float(np.sqrt(np.sum(np.where(sure, h, 0.0) * errors**2)))
@@ -69,6 +70,7 @@ class LoadErrors(NamedTuple):
             relative=np.where(sure, errors / P, 0.0),
             stray=float(most.sum()),
             stray_effect=effect,
+            stray_among=among,
             loose_effect=couple_above(problem, loose) if loose.any() else loose,
             stiffness=h,
             convexity_number=_convexity_number(problem, h),
@@ -128,14 +130,15 @@ def _strays(problem: TangentialProblem) -> Indices:
     return np.flatnonzero(possible)
 
 
-def _effect(problem: TangentialProblem, strays: Indices, most: Array) -> Array:
-    """(n,) bounds on what loads of up to `most` elsewhere do to the loaded asperities."""
+def _effects(problem: TangentialProblem, strays: Indices, most: Array) -> tuple[Array, float]:
+    """(n,) most that loads of up to `most` elsewhere do to the loaded asperities; and b'A b."""
     if len(strays) == 0:
-        return np.zeros(len(problem))
+        return np.zeros(len(problem)), 0.0
     scene = problem.scene
     apart = couple(scene, strays, problem.influence.scale, problem.influence.name)
     coupling = apart.onto(scene.contact_points[problem.touching])
-    return _above(coupling.apply(most), coupling, most)
+    among = float(most @ _above(apart.apply(most), apart, most)) * (1 + SAFETY)
+    return _above(coupling.apply(most), coupling, most), among
 
 
 def _distance(problem: TangentialProblem, errors: Array, stray_effect: Array) -> float:

@@ -40,17 +40,20 @@ def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) ->
     if problem.scalar.certificate.scope == "none":
         return Bounds.unproved(1, len(problem))
     known = LoadErrors.of(problem.scalar)
-    bounds = None if gross else _by_convexity(problem, known, state)
-    return bounds or _by_exhaustion(problem, known, state)
+    margin = 0.0 if gross else _margin(problem, known)
+    bounds = None if gross else _by_convexity(problem, known, state, margin)
+    return bounds or _by_exhaustion(problem, known, state, margin)
 
 
-def _by_convexity(problem: VectorProblem, known: LoadErrors, state: VectorState) -> Bounds | None:
+def _by_convexity(
+    problem: VectorProblem, known: LoadErrors, state: VectorState, margin: float
+) -> Bounds | None:
     """The steps of docs/theory/friction-words.md, "Words that are proofs"; None where they end.
 
     An asperity may touch that the problem leaves out, or the energy may not be convex, or no
     asperity is sure to stick.
     """
-    if known.stray > 0 or (margin := _margin(problem, known)) == 0.0:
+    if known.stray > 0 or margin == 0.0:
         return None
     given = _mapped(problem, known, state)
     image = _image(given)
@@ -196,10 +199,13 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
         rises=np.array([rise_error]),
         sliding=sliding[None],
         partial=partial[None],
+        losses=np.array([np.inf]),  # vectors turn: no cycle is made of them
     )
 
 
-def _by_exhaustion(problem: VectorProblem, known: LoadErrors, state: VectorState) -> Bounds:
+def _by_exhaustion(
+    problem: VectorProblem, known: LoadErrors, state: VectorState, margin: float
+) -> Bounds:
     """docs/theory/friction-limit.md, "Close to gross sliding".
 
     The sum of P_i - q_i.t is at most `unused`. So each q is within (2 P unused)^(1/2) of P t, all
@@ -235,8 +241,36 @@ def _by_exhaustion(problem: VectorProblem, known: LoadErrors, state: VectorState
     spread = np.sqrt(weights @ (side - mean) ** 2) - np.sqrt(weights @ blur**2)
     longest = highest + float(np.hypot(*np.ptp(coupled, axis=0))) + float(blur.max())
     sliding = sure & (pushed | (spread * (1 - SAFETY) > np.sqrt(2.0 * unused) * longest))
-    proved = np.array([bool(sliding.any()) or (known.stray == 0 and bool(sure.all()))])
-    return unproved._replace(proved=proved, increments=errors[None], sliding=sliding[None])
+    complete = known.stray == 0 and bool(sure.all())
+    proved = np.array([bool(sliding.any()) or complete])
+    partial = ~sliding & complete & (sliding.sum() == n - 1)
+    if partial.any():  # all but one slide, and that one does not if not all do
+        partial &= _one_sticks(problem, known, side - mean, unused, margin)
+    return unproved._replace(
+        proved=proved, increments=errors[None], sliding=sliding[None], partial=partial[None]
+    )
+
+
+def _one_sticks(
+    problem: VectorProblem, known: LoadErrors, side: Array, unused: float, margin: float
+) -> bool:
+    """Whether not all asperities slide: docs/theory/friction-limit.md, "The last one".
+
+    side   : (n,) how much B P t differs across t;  unused : sum P* - T at most
+    margin : I + H^-1/2 B H^-1/2 is at least that
+    """
+    P, least = problem.scalar.loads, problem.scalar.loads - known.errors
+    A = problem.scalar.influence.matrix
+    if margin == 0.0 or not unused < least.min():
+        return False
+    blur = problem.bias * (A @ known.errors + A.max(axis=1) * unused)
+    blur += (problem.product_error + 16 * ROUNDOFF) * (1.0 + problem.bias) * (A @ P)
+    ceilings = problem.scalar.ceilings * (1.0 - known.relative)
+    differ = (P + known.errors) @ ((np.abs(side) + blur) ** 2 / ceilings)
+    turned = differ / ((1.0 + 2.0 * margin) / 3.0) ** 2 / ceilings.min() * (1 + SAFETY)
+    doubt = 2.0 * (known.errors.sum() + known.stray)
+    doubt += 2.0 * LIMIT_ROUNDOFFS * len(P) * ROUNDOFF * P.sum()
+    return bool(unused - doubt > turned)  # sum P* - T at least
 
 
 def _margin(problem: VectorProblem, known: LoadErrors) -> float:

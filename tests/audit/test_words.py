@@ -26,6 +26,20 @@ def test_every_word_and_bound(pytestconfig: pytest.Config) -> None:
     assert report(tally).count("|") > 100
 
 
+@pytest.mark.parametrize("kind", ["energy_error", "energy"])
+def test_the_audit_finds_wrong_energies(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    cycle = cr.cycle
+
+    def lying(*arguments: Any, **options: Any) -> cr.Cycle:
+        found = cycle(*arguments, **options)
+        spoiled = 1e-6 * found.energy_error if kind == "energy_error" else found.energy * 1.001
+        return replace(found, **{kind: spoiled})
+
+    monkeypatch.setattr(cr, "cycle", lying)
+    with pytest.raises(Wrong, match="energy bound"):
+        audit(range(24))
+
+
 @pytest.mark.parametrize("kind", ["word", "load", "approach"])
 def test_the_audit_finds_what_is_wrong(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     press = cr.press

@@ -7,6 +7,7 @@ import pytest
 from friction_scenes import FRICTION, lengths, pressed
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import scattered
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
@@ -182,3 +183,32 @@ def test_an_uncertified_contact_gets_no_word() -> None:
         assert (state.status[loaded] == "undecided").all()
         assert state.certificate.scope == "none"
         assert not state.certificate.holds
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize("fraction", [1 - 1e-6, 1 - 1e-9, 1 - 1e-11])
+def test_the_last_one_is_proved_to_stick(count: int, fraction: float) -> None:
+    """Without Poisson's ratio nothing turns, so that below f P not all slide."""
+    scene, approach = scattered(count, count, 0.5, 0.1)
+    material = cr.Material(scene.material.contact_modulus, 0.0)
+    contact = cr.press(replace(scene, friction=0.5, material=material), approach=approach)
+    state = shear_vector(contact, force=fraction * FRICTION * contact.load * np.array([0.6, 0.8]))
+    assert (state.status == "partial").sum() == 1
+    assert (state.status == "sliding").sum() == (contact.loads > 0).sum() - 1
+
+
+@pytest.mark.parametrize("nu", [0.02, 0.1, 0.3, 0.5])
+def test_the_last_one_is_not_said_to_stick_where_all_slide(nu: float) -> None:
+    """With it forces turn, and all slide a little below f P: nobody may be said to stick there."""
+    all_slide = 0
+    for seed in range(6):
+        scene, approach = scattered(seed, 2 + seed % 3, 0.6, 0.3)
+        material = cr.Material(scene.material.contact_modulus, nu)
+        contact = cr.press(replace(scene, friction=0.5, material=material), approach=approach)
+        for missing in 10.0 ** np.arange(-12, -2, 0.5):
+            force = (1 - missing) * FRICTION * contact.load
+            state = shear_vector(contact, force=force * np.array([0.6, 0.8]))
+            slides = lengths(state.slips) > 0
+            all_slide += bool(slides[contact.loads > 0].all())
+            assert not (state.status[slides] == "partial").any()
+    assert all_slide > 20

@@ -1,0 +1,198 @@
+"""A proved multiprecision friction state with the full tangential kernel: the test oracle.
+
+Loads P_i > 0 are given as balls, float64 inputs are exact numbers. Forces over f and displacements
+over c_t f, with bias = nu / (2 - nu) and d the unit vector between two asperities, solve
+
+    F = ( eta_i + sum_j A_ij [(1 - bias) I + 2 bias d d'] q_j - X,    sum_j q_j - T ) = 0,
+
+where q_i is along eta_i and of the length P_i [1 - (1 - min(|eta_i| / kappa_i, 1))^(3/2)]: what an
+asperity must take up, its slip included, is eta (docs/theory/friction.md, "Newton's method").
+Newton finds the point; an interval Newton step proves it, as in `multiprecision`, which this
+shares the arithmetic of. It is the only one where the energy is convex, which is not tested here.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import arb, ctx
+from multiprecision import (
+    GUARD_DIGITS,
+    HALVINGS,
+    NEWTON_STEPS,
+    Balls,
+    NotProved,
+    _contact_points,
+    _exact,
+    _influence,
+    _mid,
+    _solve,
+)
+
+import convexrough as cr
+
+
+@dataclass(frozen=True)
+class VectorReference:
+    """A proved state of the loaded asperities; every ball contains the true value.
+
+    forces : (n, 2) over f [force];  slips : (n, 2) over c_t f [length]
+    rise   : (2,) X over c_t f [length]
+    sliding : (n,)
+    """
+
+    forces: Balls
+    slips: Balls
+    rise: Balls
+    sliding: list[bool]
+
+
+@dataclass(frozen=True)
+class VectorMap:
+    """F and its derivative; the unknowns are eta_x, eta_y of each asperity, then X."""
+
+    loads: Balls
+    ceilings: Balls
+    kernel: Balls  # (2n, 2n)
+    total: Balls  # (2,) T
+    unit: Any  # a length over a force, so that every row of F is a length
+
+    def force(self, i: int, eta: Balls) -> tuple[Balls, Balls]:
+        """q_i (2,) and its derivative (2, 2)."""
+        length = (eta @ eta).sqrt()
+        if not length > 0:
+            raise NotProved("a displacement may be zero")
+        share = length / self.ceilings[i]
+        if share > 1:
+            size, slope = self.loads[i], arb(0)
+        elif share < 1:
+            root = (1 - share).sqrt()
+            size = self.loads[i] * (1 - root**3)
+            slope = arb(3) / 2 * self.loads[i] / self.ceilings[i] * root
+        else:
+            raise NotProved("an asperity slides or sticks, by less than its ball")
+        along = np.outer(eta, eta) / (length * length)
+        across = np.array([[arb(1), arb(0)], [arb(0), arb(1)]]) - along
+        return size / length * eta, slope * along + size / length * across
+
+    def evaluate(self, x: Balls) -> tuple[Balls, Balls]:
+        """F and its derivative."""
+        n = len(self.loads)
+        eta, rise = x[:-2], x[-2:]
+        pairs = [self.force(i, eta[2 * i : 2 * i + 2]) for i in range(n)]
+        q = np.concatenate([force for force, _ in pairs])
+        stiff = np.full((2 * n, 2 * n), arb(0))
+        for i, (_, slope) in enumerate(pairs):
+            stiff[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = slope
+        missing = q.reshape(-1, 2).sum(axis=0) - self.total
+        value = np.concatenate((eta + self.kernel @ q - np.tile(rise, n), self.unit * missing))
+        jacobian = np.full((2 * n + 2, 2 * n + 2), arb(0))
+        jacobian[:-2, :-2] = self.kernel @ stiff
+        for k in range(2 * n):
+            jacobian[k, k] += 1
+            jacobian[k, 2 * n + k % 2] = arb(-1)
+            jacobian[2 * n + k % 2, :-2] += self.unit * stiff[k]
+        return value, jacobian
+
+
+def solve_vectors(
+    scene: cr.Scene, loads: list[Any], force: Any, start: Any, rise: Any, digits: int = 50
+) -> VectorReference:
+    """The friction state of the asperities with loads > 0, under the force (2,), to `digits`.
+
+    start : (n, 2) forces [force] near the solution;  rise : (2,) displacement near it
+    """
+    with ctx.workdps(digits + GUARD_DIGITS):
+        problem, x = _problem(scene, loads, force, start, rise)
+        size = max(float(abs(value)) for value in x)
+        x = _newton(problem, x, tolerance=arb(size) * arb(10) ** (-digits - GUARD_DIGITS // 2))
+        box = np.array([arb(each, arb(size) * arb(10) ** (-digits)) for each in x])
+        inside = x - _solve(problem.evaluate(box)[1], problem.evaluate(x)[0])
+        if not all(whole.contains_interior(part) for whole, part in zip(box, inside, strict=True)):
+            raise NotProved("the interval Newton step leaves its box")
+        return _state(problem, inside)
+
+
+def _problem(
+    scene: cr.Scene, loads: list[Any], force: Any, start: Any, rise: Any
+) -> tuple[VectorMap, Balls]:
+    touching = [i for i, load in enumerate(loads) if load > 0]
+    P = np.array([loads[i] for i in touching])
+    E, nu = arb(scene.material.contact_modulus), arb(scene.material.poisson_ratio)
+    tips, radius = _exact(scene.asperities.tip_radii[touching]), arb(scene.sphere_radius)
+    points, _ = _contact_points(
+        _exact(scene.asperities.positions[touching]), tips, radius, scene.geometry
+    )
+    relative = 1 / (1 / radius + 1 / tips)
+    ceilings = np.array(
+        [(9 * p * p / (16 * E * E * R)).root(3) for p, R in zip(P, relative, strict=True)]
+    )
+    friction = arb(scene.friction)
+    travel = friction * (2 - nu) / (2 * (1 - nu))
+    kernel = _kernel(points, _influence(points, E), nu / (2 - nu))
+    total = np.array([arb(float(each)) for each in force]) / friction
+    q = _exact(np.asarray(start)[touching].reshape(-1)) / friction
+    X = _exact(rise) / travel if np.isfinite(rise).all() else _near_the_limit(P, kernel, total)
+    eta = np.tile(X, len(P)) - kernel @ q
+    unit = (X @ X).sqrt() / (total @ total).sqrt()
+    return VectorMap(P, ceilings, kernel, total, _mid(unit)), _mid(np.concatenate((eta, X)))
+
+
+def _near_the_limit(P: Balls, kernel: Balls, total: Balls) -> Balls:
+    """X from what is missing of the total, where all slide: the last formula of friction.md."""
+    size = (total @ total).sqrt()
+    along, missing = total / size, P.sum() - size
+    if not missing > 0:
+        raise NotProved("the force is not below what friction can bear")
+    across = np.array([-along[1], along[0]])
+    side = (kernel @ np.outer(P, along).reshape(-1)).reshape(-1, 2) @ across
+    spread = (P * (side - (P * side).sum() / P.sum()) ** 2).sum()
+    return along * (spread / (2 * missing)).sqrt()
+
+
+def _kernel(points: Balls, influence: Balls, bias: Any) -> Balls:
+    """(2n, 2n) A_ij [(1 - bias) I + 2 bias d d']."""
+    n = len(points)
+    kernel = np.full((2 * n, 2 * n), arb(0))
+    for i in range(n):
+        for j in range(n):
+            if i != j:
+                d = points[i] - points[j]
+                block = 2 * bias * np.outer(d, d) / (d @ d)
+                block[0, 0] += 1 - bias
+                block[1, 1] += 1 - bias
+                kernel[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = influence[i, j] * block
+    return kernel
+
+
+def _newton(problem: VectorMap, x: Balls, *, tolerance: Any) -> Balls:
+    """Damped steps that shrink the sum of |F|."""
+    value, jacobian = (_mid(each) for each in problem.evaluate(x))
+    for _ in range(NEWTON_STEPS):
+        size = np.abs(value).sum()
+        if size <= tolerance:
+            return x
+        step = _solve(jacobian, value, "approx")
+        for share in (arb(1) / 2**halvings for halvings in range(HALVINGS)):
+            trial = _mid(x - share * step)
+            after = [_mid(each) for each in problem.evaluate(trial)]
+            if np.abs(after[0]).sum() <= (1 - share / 1000) * size:
+                break
+        else:
+            raise NotProved("no part of Newton's step shrinks the residual")
+        x, (value, jacobian) = trial, after
+    raise NotProved("Newton did not arrive")
+
+
+def _state(problem: VectorMap, x: Balls) -> VectorReference:
+    eta = x[:-2].reshape(-1, 2)
+    forces = np.array([problem.force(i, each)[0] for i, each in enumerate(eta)])
+    lengths = [(each @ each).sqrt() for each in eta]
+    sliding = [bool(a > k) for a, k in zip(lengths, problem.ceilings, strict=True)]
+    slips = np.array(
+        [
+            each * (1 - k / a) if slides else each * 0
+            for each, a, k, slides in zip(eta, lengths, problem.ceilings, sliding, strict=True)
+        ]
+    )
+    return VectorReference(forces, slips, x[-2:], sliding)
