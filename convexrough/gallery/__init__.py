@@ -1,0 +1,8 @@
+"""Hard scenes by name, each with its answer to 50 digits, for anybody's solver.
+
+`convexrough gallery --export DIR` writes them as files of qpsolvers, Clarabel and CBF.
+"""
+
+from convexrough.gallery.cases import HardCase, Judged, case, names
+
+__all__ = ["HardCase", "Judged", "case", "names"]
