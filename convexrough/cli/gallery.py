@@ -36,12 +36,12 @@ def gallery(
     cases = [wing.case(name) for name in wanted]
     lines = []
     if listed or export is None:
-        heading = ["case", "family", "asperities", "touching", "what is hard"]
+        heading = ["case", "family", "what is hard", "asperities", "touching"]
         rows = [
-            [case.name, case.family, str(len(case)), str(case.touching.sum()), case.why]
+            [case.name, case.family, case.why, str(len(case)), str(case.touching.sum())]
             for case in cases
         ]
-        lines = aligned([heading, *rows], left=2)
+        lines = aligned([heading, *rows], left=3)
     summary = {case.name: {"family": case.family, "why": case.why} for case in cases}
     if export is not None:
         claim_folder(export, force=force)

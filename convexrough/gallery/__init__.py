@@ -3,6 +3,7 @@
 `convexrough gallery --export DIR` writes them as files of qpsolvers, Clarabel and CBF.
 """
 
+from convexrough.gallery.any_size import Manufactured, manufactured
 from convexrough.gallery.cases import HardCase, Judged, case, names
 
-__all__ = ["HardCase", "Judged", "case", "names"]
+__all__ = ["HardCase", "Judged", "Manufactured", "case", "manufactured", "names"]

@@ -42,6 +42,14 @@ def _rough(geometry: str) -> Recipe:
     return Recipe("heights", why, scene, approach=APPROACH)
 
 
+def _many() -> Recipe:
+    """On a flatter sphere, so that most of them touch."""
+    heights = [1e-5 * height for height in roughness(169, 9)]
+    scene = placed(hexagon(7), TIP_RADIUS / 2, heights, sphere_radius=10.0)
+    why = "169 asperities with random heights: the low ones are open amid the others"
+    return Recipe("heights", why, scene, approach=APPROACH)
+
+
 def _collinear() -> Recipe:
     points = [(SPACING * (i - 6), 0.0) for i in range(13)]
     why = "all on one line: no lattice in the plane, no hull"
@@ -87,6 +95,7 @@ RECIPES: Recipes = {
     "heights-ten-approaches": _tall,
     "heights-random": lambda: _rough(""),
     "heights-random-closest": lambda: _rough("closest"),
+    "heights-random-169": _many,
     "collinear": _collinear,
     "clustered": _clustered,
     "vacancies": _vacancies,

@@ -7,19 +7,19 @@ from typing import Any
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.errors import ConvexroughError, InputError
+from convexrough.errors import ConvexroughError
 from convexrough.gallery.cases import HardCase
 from convexrough.gallery.formats import cbf, clarabel_json, qpsolvers_npz
 from convexrough.normal.certificate import certify
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.bristles import BristleProgram
-from convexrough.solvers.cone_boxes import Boxes
+from convexrough.solvers.bristles import LARGEST_S, BristleProgram
+from convexrough.solvers.cone_boxes import Boxes, TooDenseError
 from convexrough.solvers.conic import LiftedProgram
 from convexrough.solvers.programs import ConeProgram
 
-#: A bristle program has at most so many variables, as its file is dense, and so many bristles of
-#: each asperity: heuristics, for files below a megabyte.
-MOST_VARIABLES, MOST_BRISTLES = 520, 64
+#: Bristles of each asperity; fewer where a program would have more variables than this, as its file
+#: is dense. Heuristics, for files that are read in no time.
+BRISTLES, FEWEST_BRISTLES, VARIABLES = 64, 8, 520
 
 #: Cone programs of at most so many asperities are written as CBF, too.
 SMALL = 20
@@ -62,11 +62,13 @@ def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
 
 def _cones(case: HardCase, problem: NormalProblem, own: Array) -> tuple[About, dict[str, bytes]]:
     """Four cones an asperity where the answer is in their boxes, else five."""
+    theta = problem.shells / problem.stiffness(own)
     boxes = Boxes.choose(problem)
-    if _beyond(boxes, own):
+    if (beyond := boxes.cut & (own[boxes.members] >= boxes.loads)).any():
         boxes = Boxes.choose(problem, five=True)
-    if _beyond(boxes, own):
-        raise InputError("contact radii", found="beyond (pi/2) s", expected="the convex range")
+        beyond = boxes.cut & (own[boxes.members] >= boxes.loads)
+    if beyond.any():
+        raise boxes.too_dense(problem, "cones", np.where(beyond, theta[boxes.members], 0.0))
     program = LiftedProgram.accept(problem, boxes).apply()
     about = {
         "form": f"second-order cones, {5 if boxes.five else 4} an asperity",
@@ -80,15 +82,12 @@ def _cones(case: HardCase, problem: NormalProblem, own: Array) -> tuple[About, d
     return dict.fromkeys(files, about), files
 
 
-def _beyond(boxes: Boxes, own: Array) -> bool:
-    return bool((boxes.cut & (own[boxes.members] >= boxes.loads)).any())
-
-
 def _bristles(case: HardCase, problem: NormalProblem, own: Array) -> tuple[About, dict[str, bytes]]:
-    m = min(MOST_BRISTLES, MOST_VARIABLES // len(problem) - 1)
+    m = int(np.clip(VARIABLES // len(problem) - 1, FEWEST_BRISTLES, BRISTLES))
     reduction = BristleProgram.accept(problem, m, "bristles")
-    if (reduction.cut & (own >= reduction.box)).any():
-        raise InputError("contact radii", found="beyond (pi/2) s", expected="the convex range")
+    if len(beyond := np.flatnonzero(reduction.cut & (own >= reduction.box))):
+        ratios = problem.shells[beyond] / problem.stiffness(own[beyond], beyond)
+        raise TooDenseError("bristles", problem.candidates[beyond], ratios, LARGEST_S)
     program = reduction.apply()
     about = {
         "form": f"quadratic, {m} bristles an asperity",

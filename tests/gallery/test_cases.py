@@ -8,14 +8,15 @@ from functools import cache
 from typing import Any
 
 import gallery_answers
+import multiprecision
 import numpy as np
 import pytest
 from gallery_answers import true_words
-from scenes import operators
+from scenes import operators, solve_exactly
 
 import convexrough as cr
 from convexrough import gallery, solvers
-from convexrough.gallery import answers, cases, grazing
+from convexrough.gallery import answers, any_size, cases, grazing
 
 NAMES = gallery.names()
 
@@ -250,6 +251,34 @@ def test_what_cannot_be_judged() -> None:
         dragged.judge_shear(np.zeros(4))
 
 
+@pytest.mark.parametrize("count", [1, 2, 61, 700, 20_000])
+def test_manufactured_contacts_of_any_size(count: int) -> None:
+    made = gallery.manufactured(count)
+    proof = cr.certify(made.scene, made.loads, approach=made.approach)
+    assert len(made.scene) == count
+    assert np.array_equal(proof.status, np.where(made.loads > 0, "contact", "open"))
+    assert proof.load_errors.max() < 1e-8 * made.loads.max()
+    again = gallery.manufactured(count)
+    assert np.array_equal(again.loads, made.loads)
+    assert not np.array_equal(gallery.manufactured(count, seed=1).loads, made.loads)
+
+
+def test_a_manufactured_contact_is_its_answer() -> None:
+    """To rounding: against ball arithmetic."""
+    made = gallery.manufactured(61)
+    exact = solve_exactly(made.scene, approach=made.approach, start=made.loads)
+    off = multiprecision.errors(made.loads, exact.loads)
+    assert np.abs(off).max() < 1e-14 * made.loads.max()
+    assert np.array_equal(made.loads > 0, [load > 0 for load in exact.loads])
+    assert np.abs(multiprecision.errors(made.gaps, exact.gaps)).max() < 1e-14
+
+
+@pytest.mark.parametrize("count", [0, -1, 2.0, True])
+def test_counts_that_are_none(count: Any) -> None:
+    with pytest.raises(cr.InputError, match="a positive whole number"):
+        gallery.manufactured(count)
+
+
 def test_names() -> None:
     assert len(NAMES) == len(set(NAMES)) > 50
     assert gallery.names("few") == ("one", "one-under-load", "two-equal")
@@ -276,4 +305,7 @@ def test_an_answer_is_that_of_its_scene(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_examples_in_docstrings() -> None:
-    assert doctest.testmod(cases, extraglobs={"cr": cr}).attempted > 2
+    for module in (cases, any_size):
+        found = doctest.testmod(module, extraglobs={"cr": cr})
+        assert found.attempted > 2
+        assert found.failed == 0
