@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from convexrough import compare as compare
     from convexrough import fields as fields
+    from convexrough import gallery as gallery
     from convexrough import plots as plots
     from convexrough import solvers as solvers
     from convexrough import testing as testing
@@ -78,7 +79,7 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 #: Modules that are public whole; those not in `__all__` draw, or are for tests.
-_MODULES = ("compare", "fields", "plots", "solvers", "testing")
+_MODULES = ("compare", "fields", "gallery", "plots", "solvers", "testing")
 
 __all__ = [
     "Asperities",

@@ -15,6 +15,7 @@ from click.shell_completion import shell_complete
 
 from convexrough.cli.bench import bench
 from convexrough.cli.compare import compare
+from convexrough.cli.gallery import gallery
 from convexrough.cli.paper import paper
 from convexrough.cli.proof import check
 from convexrough.cli.run import new, run
@@ -44,7 +45,7 @@ def program() -> None:
     """
 
 
-for command in (run, verify, check, compare, new, paper, bench):
+for command in (run, verify, check, compare, new, paper, bench, gallery):
     program.add_command(command)
 
 
