@@ -41,6 +41,9 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
             return DenseInfluence.of(points, scale, scale * inverse, error)
         return DenseInfluence.assemble(points, scale, error)
     if kind != "scattered" and scene.lattice is not None:
+        if scene.geometry == "summit" and (sites := scene.asperities.layout.sites) is not None:
+            all_points = scene.contact_points
+            return LatticeInfluence.of(all_points, which, scene.lattice, sites[which], scale, error)
         return LatticeInfluence.assemble(points, scene.lattice, scale, error)
     if kind == "lattice":
         raise InputError(

@@ -94,7 +94,7 @@ class NormalProblem:
 
         # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
         prescribed = ceiling + scene.offsets + errors + 6 * ROUNDOFF * abs(ceiling)
-        candidates = (prescribed > 0).nonzero()[0]
+        candidates = scene.asperities.layout.sorted(prescribed > 0)
         top = float(prescribed.max(initial=0.0)) or 1.0
         units = Units.of(top, _middle(coefficients))
 

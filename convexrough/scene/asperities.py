@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,17 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.layout import Layout
 from convexrough.scene.patterns import (
     CUT_DEVIATIONS,
+    HEXAGONAL,
+    SQUARE,
+    Pattern,
     checked_seed,
     cut_normal,
-    hexagonal_sites,
-    square_sites,
 )
 
 
@@ -67,11 +67,15 @@ class Asperities(Record):
         >>> rougher.positions is asperities.positions
         True
         """
-        other = object.__new__(type(self))
-        object.__setattr__(other, "positions", self.positions)
-        object.__setattr__(other, "layout", self.layout)
-        other._wear(tip_radii, heights)
-        return other
+        return self._on(self.layout, tip_radii, heights)
+
+    @classmethod
+    def _on(cls, layout: Layout, tip_radii: ArrayLike, heights: ArrayLike) -> Asperities:
+        asperities = object.__new__(cls)
+        object.__setattr__(asperities, "positions", layout.points)
+        object.__setattr__(asperities, "layout", layout)
+        asperities._wear(tip_radii, heights)
+        return asperities
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -116,7 +120,7 @@ class Asperities(Record):
         radii, as they were.
         """
         rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(hexagonal_sites, 2 / np.sqrt(3), spacing, tip_radius, within, *rough)
+        return cls._lattice(HEXAGONAL, spacing, tip_radius, within, *rough)
 
     @classmethod
     def square(
@@ -131,13 +135,12 @@ class Asperities(Record):
     ) -> Asperities:
         """A square lattice, one asperity on the axis; arguments as for `hexagonal`."""
         rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(square_sites, 1.0, spacing, tip_radius, within, *rough)
+        return cls._lattice(SQUARE, spacing, tip_radius, within, *rough)
 
     @classmethod
     def _lattice(
         cls,
-        sites: Callable[[float], tuple[Array, Indices]],
-        density: float,
+        pattern: Pattern,
         spacing: float,
         tip_radius: ArrayLike,
         within: float,
@@ -149,12 +152,10 @@ class Asperities(Record):
         within = checks.non_negative("within", within)
         height_std = checks.non_negative("height_std", height_std)
         tip_radius_cv = checks.non_negative("tip_radius_cv", tip_radius_cv)
-        checks.fits_in_memory("spacing", np.pi * density * (within / spacing) ** 2 + 1, 300)
+        checks.fits_in_memory("spacing", np.pi * pattern.density * (within / spacing) ** 2 + 1, 300)
 
-        unit, norms = sites((within / spacing) ** 2 * (1 + 1e-12))
-        angles = np.arctan2(unit[:, 1], unit[:, 0]) % (2 * np.pi)
-        unit = unit[np.lexsort((angles, norms))]
-        n = len(unit)
+        layout = Layout.of(pattern, spacing, (within / spacing) ** 2 * (1 + 1e-12))
+        n = len(layout.points)
         radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
         heights = np.zeros(n)
         if height_std > 0 or tip_radius_cv > 0:
@@ -162,7 +163,7 @@ class Asperities(Record):
             heights = height_std * cut_normal(n, seed, stream=0)
             width = np.sqrt(np.log1p(tip_radius_cv**2))
             radii = radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
-        return cls(spacing * unit, radii, heights)
+        return cls._on(layout, radii, heights)
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:

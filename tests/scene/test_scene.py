@@ -14,6 +14,7 @@ from scipy.optimize import minimize
 
 import convexrough as cr
 from convexrough.scene.asperities import largest_tip_radius
+from convexrough.scene.layout import Layout
 from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import reach
 
@@ -41,6 +42,20 @@ def test_square_lattice() -> None:
     lattice = cr.Asperities.square(spacing=2.0, tip_radius=1, within=4.0)
     assert len(lattice) == 13
     assert {tuple(p) for p in lattice.positions} >= {(0, 0), (4, 0), (-2, 2), (0, -4)}
+
+
+@pytest.mark.parametrize("pattern", [cr.Asperities.hexagonal, cr.Asperities.square])
+@pytest.mark.parametrize("within", [1.0, 3.0, 20.0])
+def test_what_is_made_on_a_lattice_need_not_be_looked_for(pattern: Any, within: float) -> None:
+    made = pattern(spacing=0.7, tip_radius=1.0, within=within).layout
+    lattice, sites = made.lattice, made.sites
+    assert (lattice.sites(made.points) == sites).all()
+    off = np.abs(made.points.astype(np.longdouble) - sites @ lattice.basis.astype(np.longdouble))
+    assert off.max() <= lattice.blur / 4
+    assert lattice.spacing == pytest.approx(0.7, rel=1e-15)
+    assert (made.order == np.lexsort(sites.T[::-1])).all()
+    found = Layout(made.points)
+    assert len(made.points) < 7 or (found.order is not None and found.sites is not None)
 
 
 def test_scenes_on_one_array_share_what_follows_from_positions() -> None:
