@@ -27,7 +27,7 @@ COMMAND = re.compile(r"^\$ (.*?)(?:\s+# exit status (\d))?$", re.M)
 DIRECTIVES = {"{toctree}", "{eval-rst}"}
 #: Longer than a page should be: tables a command wrote, derivations that belong together.
 LONG = {"performance.md", "certificate.md", "convexity.md", "exact-cones.md", "friction.md"}
-LONG |= {"operators.md", "shear.md", "load-paths.md", "proof-file.md"}
+LONG |= {"operators.md", "shear.md", "proof-file.md"}
 #: Pages of tables, to look things up in: every option, key and column is there.
 LONG |= {"verify.md", "results.md", "scene-file.md", "reliability.md"}
 

@@ -50,7 +50,7 @@ def _by_convexity(problem: VectorProblem, known: LoadErrors, state: VectorState)
     An asperity may touch that the problem leaves out, or the energy may not be convex, or no
     asperity is sure to stick.
     """
-    if known.stray > 0 or (margin := _margin(problem, known)) == 0.0:
+    if known.stray > 0 or (margin := margin_of(problem, known)) == 0.0:
         return None
     given = _mapped(problem, known, state)
     image = _image(given)
@@ -238,7 +238,7 @@ def _by_exhaustion(problem: VectorProblem, known: LoadErrors, state: VectorState
     return unproved._replace(proved=proved, increments=errors[None], sliding=sliding[None])
 
 
-def _margin(problem: VectorProblem, known: LoadErrors) -> float:
+def margin_of(problem: VectorProblem, known: LoadErrors) -> float:
     """A proved lower bound on the least eigenvalue of I + H^-1/2 B H^-1/2; 0 where none is found.
 
     With H on loads no smaller than the true ones, so that a little more is proved than is said.
