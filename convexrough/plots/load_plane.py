@@ -57,8 +57,10 @@ def draw_curve(axes: Axes, curve: MemoryCurve, force_unit: str) -> None:
     if curve.front is not None:
         front = float(curve.front) / unit
         axes.axvline(front, color=UNSURE, lw=0.9, ls=DASHED)
-        axes.annotate("front", (front, 1.0), (3, -8), xycoords=axes.get_xaxis_transform(),
-                      textcoords="offset points", fontsize=TICK, color=UNSURE)  # fmt: skip
+        side = -1 if front > 0.5 else 1
+        axes.annotate("front", (front, 0.04), (3 * side, 0), xycoords=axes.get_xaxis_transform(),
+                      textcoords="offset points", fontsize=TICK, color=UNSURE,
+                      ha="left" if side > 0 else "right")  # fmt: skip
     _name(axes, unit, force_unit)
 
 

@@ -17,6 +17,7 @@ from convexrough.plots.style import (
     CROWDED,
     DASHED,
     DENSE,
+    FAINT,
     LABEL,
     SINGLE,
     SMOOTH,
@@ -75,12 +76,14 @@ def draw_factors(axes: Axes, found: Shakedown, length_unit: str) -> None:
         axes.scatter(x, y, fc="none", ec=UNSURE, lw=1.4, **look)
         ringed = "\nringed: the first to slide on" if first.any() else ""
     frame_map(axes, edge)
+    label(axes, f"$x$ {length_unit}".strip(), f"$y$ {length_unit}".strip())
+    axes.set_title(f"{found.kind}: {found.factor:.5g}{ringed}", fontsize=TICK, loc="left")
+    if not high > low:
+        return
     bar = axes.figure.colorbar(mapped, ax=axes, shrink=0.8)
     what = "slip in the mechanism [1]" if vector else "factor up to which sliding ceases"
     bar.set_label(what, fontsize=LABEL)
     bar.ax.tick_params(labelsize=TICK)
-    label(axes, f"$x$ {length_unit}".strip(), f"$y$ {length_unit}".strip())
-    axes.set_title(f"{found.kind}: {found.factor:.5g}{ringed}", fontsize=TICK, loc="left")
 
 
 def _onsets(found: Shakedown) -> Array:
@@ -101,7 +104,7 @@ def _fall(found: Shakedown, along: Array, across: Array) -> Array:
 
 
 def _map(found: Shakedown, onsets: Array) -> Figure:
-    """How many of those whose onset is known slide for ever; grey: gross sliding, or pulled off."""
+    """How many of those whose onset is known slide for ever; hatched: all slide, or pulled off."""
     figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
     axes = figure.subplots()
     f = found.scene.friction or 1.0
@@ -121,7 +124,7 @@ def _map(found: Shakedown, onsets: Array) -> Figure:
     shown = np.ma.masked_where(~borne, sliding)
     look: dict[str, Any] = {"cmap": COLOURS, "vmin": 0, "vmax": len(onsets), "rasterized": True}
     filled = axes.pcolormesh(part, part, shown, **look)
-    axes.set_facecolor("0.85")
+    axes.patch.set(hatch="////", edgecolor=FAINT, facecolor="white")
     limit = np.where(borne, sliding > 0, np.nan).astype(float)
     if np.nanmin(limit) < np.nanmax(limit):
         axes.contour(x, y, limit, [0.5], colors=UNSURE, linewidths=1.4)
@@ -137,6 +140,6 @@ def _map(found: Shakedown, onsets: Array) -> Figure:
     across_label = "load amplitude / $P_0$" if varies else "mean shear $Q_0\\,/\\,(fP_0)$"
     label(axes, across_label, "shear amplitude / $(fP_0)$")
     axes.set_title(
-        "grey: gross sliding\nline: the limit; dot: of this path", fontsize=TICK, loc="left"
+        "hatched: gross sliding\nline: the limit; dot: of this path", fontsize=TICK, loc="left"
     )
     return figure

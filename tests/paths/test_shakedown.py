@@ -12,7 +12,8 @@ from scenes import solve_exactly
 import convexrough as cr
 from convexrough.arrays import Array
 from convexrough.paths import melan
-from convexrough.solvers.programs import RawAnswer
+from convexrough.solvers.programs import ConeProgram, RawAnswer, run_clarabel
+from convexrough.vector_shear.problem import VectorProblem
 
 P, RADIUS = LARGEST["paper"], 0.5 * LARGEST["paper"]
 SWING = RADIUS * np.array([1.0, -1.0])
@@ -157,6 +158,81 @@ def test_a_path_that_follows_never_slides() -> None:
         PAPER, loads=P, load_amplitudes=[0.1 * P, 0.0], force_amplitudes=[0.02 * P, 0.0]
     )
     assert found.factor == np.inf
+
+
+class Stuck:
+    """Asperities that stick until they slide, at constant load: |q_i| <= P_i, step by step.
+
+    Each step is Moreau's: the least (1/2) d'K d over forces q = before + d within friction that add
+    up. Its multipliers are the slips. Vectors, n of them, in the order x_1, y_1, ...
+    """
+
+    def __init__(self, stiffness: Array, limits: Array) -> None:
+        self.K, self.P, self.q = stiffness, limits, np.zeros(2 * len(limits))
+        self.slip = np.zeros(len(limits))
+
+    def go(self, total: Array) -> None:
+        from scipy.sparse import csc_matrix, vstack
+
+        n, scale = len(self.P), np.abs(self.K).max()
+        balance = np.tile(np.eye(2), n)
+        rows = np.zeros((3 * n, 2 * n))
+        rows[3 * np.arange(n) + 1, 2 * np.arange(n)] = -1.0
+        rows[3 * np.arange(n) + 2, 2 * np.arange(n) + 1] = -1.0
+        constant = np.zeros(3 * n)
+        constant[::3] = self.P
+        unit = self.P.max()
+        program = ConeProgram(
+            csc_matrix(np.triu(self.K) / scale),
+            -self.K @ (self.q / unit) / scale,
+            csc_matrix(vstack([csc_matrix(balance), csc_matrix(rows)])),
+            np.append(total, constant) / unit,
+            2,
+        )
+        raw = run_clarabel(program, "stuck", 1e-11)
+        self.q = raw.x * unit
+        self.slip = raw.multipliers[2::3] * unit * scale
+
+
+@pytest.mark.parametrize("kind", ["elastic", "vector"])
+def test_cycles_below_and_above_melans_limit(kind: str) -> None:
+    """From a first loading that slides: slip dies out 1 % below, and goes on 1 % above.
+
+    Vectors turn towards the state at rest slowly: the slip of a cycle halves in some ten of them.
+    """
+    contact = cr.press(PAPER, load=P)
+    problem = VectorProblem.of(contact)
+    n = len(problem)
+    mean = np.array([0.3, 0.1 if kind == "vector" else 0.0]) * P
+    swing = np.array([[1.0, 0.0], [-1.0, 0.0]]) * P
+    if kind == "vector":
+        limit = cr.shakedown(
+            PAPER, loads=P, forces=0.5 * mean, force_amplitudes=0.5 * swing, kind="vector"
+        )
+        kernel = problem.kernel
+    else:
+        limit = cr.shakedown(
+            PAPER, loads=P, forces=0.5 * mean[0], force_amplitudes=0.5 * swing[:, 0], kind="elastic"
+        )
+        kernel = np.kron(problem.scalar.influence.matrix, np.eye(2))
+    K = kernel + np.diag(np.repeat(problem.stiffness, 2))
+    unit = problem.scalar.units.force
+    slid = {}
+    for part in (0.99, 1.01):
+        state = Stuck(K, problem.scalar.loads)
+        slips = []
+        for _ in range(40):
+            cycle = 0.0
+            for turn in swing:
+                state.go((mean + part * limit.factor * turn) / unit)
+                cycle += float(np.abs(state.slip).max())
+            slips.append(cycle)
+        slid[part] = slips
+    assert n == 37
+    assert slid[0.99][0] > 1e-3 * slid[1.01][-1]  # something slides at first
+    assert slid[0.99][-1] < 0.03 * slid[1.01][-1]
+    assert slid[0.99][-1] < 0.5 * slid[0.99][19] + 1e-9 * slid[1.01][-1]
+    assert slid[1.01][-1] == pytest.approx(slid[1.01][-2], rel=0.05)
 
 
 def exact_shares(scene: cr.Scene, load: float, vector: bool) -> tuple[list[arb], list[list[arb]]]:
