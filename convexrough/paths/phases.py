@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.drawn import Drawn
+from convexrough.errors import InputError
 from convexrough.influence import Kind
 from convexrough.paths.order import Order
 from convexrough.paths.shapes import elliptic_path
@@ -95,6 +96,9 @@ def phase_losses(
     """
     f = checks.friction(scene.friction)
     turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
+    for what, values in (("phases", turns), ("factors", sizes)):
+        if len(values) == 0:
+            raise InputError(what, found="none", expected="at least one")
     alone = _smooth_sphere(scene)
 
     def settled(on: Scene, size: float, phase: float) -> Steady:

@@ -8,7 +8,7 @@ for ever once L* falls below its onset sigma_i: docs/theory/shakedown.md, "The e
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -132,18 +132,17 @@ def shakedown(
         raise InputError("kind", found=repr(kind), expected='"exact", "elastic" or "vector"')
     if kind == "vector":
         Q0, q = _vectors("forces", forces, 1)[0], _vectors("force_amplitudes", force_amplitudes, 2)
-        p = checks.array("load_amplitudes", load_amplitudes, length=len(q))
-        t0, t = Q0 / f, q / f
     else:
-        Q0 = checks.finite("forces", float(np.asarray(forces)))
-        q = np.atleast_1d(checks.array("force_amplitudes", np.atleast_1d(force_amplitudes)))
-        p = checks.array("load_amplitudes", load_amplitudes, length=len(q))
-        t0, t = Q0 / f, q / f
+        Q0 = checks.finite("forces", cast("float", forces))
+        q = checks.array("force_amplitudes", np.atleast_1d(np.asarray(force_amplitudes)))
+    p = _alike("load_amplitudes", load_amplitudes, len(q))
+    t0, t = Q0 / f, q / f
     if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
         raise InputError("forces", found=forces, expected=f"less than f P = {f * P0:g} in size")
-    if not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
+    if len(q) == 0 or not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
         expected = "a path that moves: at least two points, such as [Q, -Q]"
-        raise InputError("force_amplitudes", found="one point", expected=expected)
+        given = "one point" if len(q) else "none"
+        raise InputError("force_amplitudes", found=given, expected=expected)
     if kind == "exact":
         found = _exact(scene, P0, float(t0), p, t, Levels(scene, P0, influence))
     elif np.any(p):
@@ -265,10 +264,24 @@ def _vector(contact: Contact, t0: Array, t: Array) -> _Found:
 
 def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
     """(m, 2) of forces in the plane; one of them, or a number along x, if one is expected."""
-    given = np.asarray(values, dtype=np.float64)
+    try:
+        given = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(what, found=repr(values)[:60], expected="numbers") from error
     if given.ndim == 0 and dimensions == 1:
         given = np.array([float(given), 0.0])
     if given.ndim != dimensions or given.shape[-1] != 2 or not np.isfinite(given).all():
         shape = "two finite numbers" if dimensions == 1 else "finite numbers of shape (m, 2)"
         raise InputError(what, found=f"shape {given.shape}", expected=shape)
     return np.atleast_2d(given)
+
+
+def _alike(what: str, values: ArrayLike, count: int) -> Array:
+    """(count,) of amplitudes; a number stands for as many of it."""
+    given = checks.array(what, np.atleast_1d(np.asarray(values)))
+    if np.ndim(values) == 0:
+        return frozen(np.full(count, float(given[0])))
+    if len(given) != count:
+        expected = f"{count}, as many as of force_amplitudes"
+        raise InputError(what, found=f"{len(given)} values", expected=expected)
+    return given

@@ -38,7 +38,7 @@ class PathEntry(Record):
     outcome : "answered"; "refused": the scene is not one for this way; or "failed"
     message : why, where it did not answer; else ""
     path    : its answer; None without one
-    force_disagreement : of all Q_i with the general step, over f times the largest P_i of the path
+    force_disagreement : of all Q_i with the first that answered, over f times the largest P_i
     displacement_disagreement : of X, over the largest |X|
     seconds : [s] with the normal solutions
 
@@ -114,7 +114,7 @@ def compare_paths(
     loads, forces, start, influence : as in `load_path`
     announce : told the name of each way before it starts
 
-    Raises what `load_path` raises, and SolverError where the general step, the reference, fails.
+    Raises InputError as `load_path`, and SolverError where none of them answers.
 
     >>> P = contact.load
     >>> found = cr.compare_paths(scene, loads=[P, P / 2], forces=[0.3 * P, 0.0])
@@ -127,12 +127,15 @@ def compare_paths(
     def enter(way: Way, found: Callable[[], LoadPath]) -> None:
         if announce is not None:
             announce(way)
-        entries.append(_entry(way, found, entries[0].path if entries else None))
+        answered = [each.path for each in entries if each.path is not None]
+        entries.append(_entry(way, found, answered[0] if answered else None))
 
     enter("general step", lambda: walk(*given, steps=1))
     enter("memory curve", lambda: walk(*given))
     enter("conic step", lambda: walk(*given, steps=1, stepper=ConicStepper))
-    path = next(each.path for each in entries if each.path is not None)
+    path = next((each.path for each in entries if each.path is not None), None)
+    if path is None:
+        raise SolverError(entries[0].message, solver="compare_paths", advice="use load_path")
     return PathComparison(scene, path.loads, path.applied, path.order, tuple(entries))
 
 
@@ -141,8 +144,6 @@ def _entry(way: Way, found: Callable[[], LoadPath], reference: LoadPath | None) 
     try:
         path = found()
     except SolverError as error:
-        if reference is None:
-            raise
         return PathEntry(way, "failed", str(error))
     seconds = perf_counter() - began
     if way == "memory curve" and path.order == "fails":

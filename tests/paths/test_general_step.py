@@ -56,7 +56,7 @@ def test_random_paths(drawn: tuple[cr.Scene, float], seed: int) -> None:
     path = cr.load_path(scene, loads=P, forces=Q)
     if path.order == "fails":
         return
-    agree(path, cr.load_path(scene, loads=P, forces=Q, steps=1), 1e-11)
+    agree(path, cr.load_path(scene, loads=P, forces=Q, steps=1), 1e-12)
 
 
 def test_work_of_the_steps_is_the_loss() -> None:

@@ -341,6 +341,19 @@ def test_a_contact_that_is_not_proved_proves_no_limit(kind: str) -> None:
     assert found.factor > 0
 
 
+@pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
+def test_one_asperity_slides_on_only_as_all_do(kind: str) -> None:
+    alone = cr.Asperities([[0.0, 0.0]], 1.0)
+    scene = cr.Scene(1.0, alone, cr.Material(1.0, 0.3), friction=0.5)
+    swing = np.array([1e-7, -1e-7])
+    amplitudes = np.column_stack((swing, 0 * swing)) if kind == "vector" else swing
+    found = cr.shakedown(scene, loads=1e-6, force_amplitudes=amplitudes, kind=kind)  # type: ignore[arg-type]
+    assert found.factor == pytest.approx(5.0)
+    assert found.gross == pytest.approx(5.0)
+    assert found.proved
+    assert found.gap < 1e-10
+
+
 def test_the_mechanism_closes_exactly() -> None:
     swing = np.column_stack((SWING, 0.3 * SWING))
     contact = cr.press(PAPER, load=P)
@@ -353,6 +366,15 @@ def test_the_mechanism_closes_exactly() -> None:
 def test_bad_input() -> None:
     with pytest.raises(cr.InputError, match="force_amplitudes"):
         cr.shakedown(PAPER, loads=P, force_amplitudes=[0.0, 0.0])
+    with pytest.raises(cr.InputError, match="force_amplitudes: found none"):
+        cr.shakedown(PAPER, loads=P, force_amplitudes=[])
+    with pytest.raises(cr.InputError, match=r"force_amplitudes\[0\].*finite"):
+        cr.shakedown(PAPER, loads=P, force_amplitudes=[np.nan, 1.0])
+    with pytest.raises(cr.InputError, match="load_amplitudes: found 3 values, expected 2, as"):
+        cr.shakedown(PAPER, loads=P, load_amplitudes=[1e-9, 0, 0], force_amplitudes=SWING)
+    for wrong in ([["a", 0.0]], [[np.inf, 0.0]], np.zeros((0, 2))):
+        with pytest.raises(cr.InputError, match="force_amplitudes"):
+            cr.shakedown(PAPER, loads=P, force_amplitudes=wrong, kind="vector")
     with pytest.raises(cr.InputError, match="kind"):
         cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="plastic")  # type: ignore[arg-type]
     with pytest.raises(cr.InputError, match=r"load_amplitudes.*only .exact."):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from path_scenes import ONE, PAPER, TWO, path_of, shaded
+from path_scenes import LARGEST, ONE, PAPER, TWO, path_of, shaded
 from scenes import random_scenes
 
 import convexrough as cr
@@ -119,6 +119,15 @@ def test_the_pieces_cover_all_that_friction_bears() -> None:
     assert ends.min() == pytest.approx(-1.0)
     assert ends.max() == pytest.approx(1.0)
     assert isinstance(pieces[0], Piece)
+
+
+def test_gross_sliding_is_left_to_the_curve() -> None:
+    """At Q = f P Newton's method has nothing that sticks to hold on to."""
+    P = LARGEST["paper"]
+    found = cr.compare_paths(PAPER, loads=[P, P], forces=[0.1 * P, 0.5 * P])
+    assert found.entries[0].outcome == "failed"
+    assert found.entries[1].outcome == "answered"
+    assert found.entries[1].force_disagreement == 0.0
 
 
 def test_bad_input() -> None:
