@@ -31,8 +31,10 @@ if TYPE_CHECKING:
     from convexrough.normal.certificate import Certificate, certify
     from convexrough.paths.memory import MemoryCurve
     from convexrough.paths.path import LoadPath, load_path
+    from convexrough.paths.phases import PhaseLosses, phase_losses
     from convexrough.paths.shakedown import Shakedown, shakedown
     from convexrough.paths.shapes import elliptic_path
+    from convexrough.paths.side_by_side import PathComparison, PathEntry, compare_paths
     from convexrough.paths.steady import Steady, steady
     from convexrough.run.scene_file import SceneFile, read_scene
     from convexrough.scene.asperities import Asperities
@@ -57,7 +59,9 @@ _HOMES = {
     "normal.certificate": ("Certificate", "certify"),
     "paths.memory": ("MemoryCurve",),
     "paths.path": ("LoadPath", "load_path"),
+    "paths.phases": ("PhaseLosses", "phase_losses"),
     "paths.shakedown": ("Shakedown", "shakedown"),
+    "paths.side_by_side": ("PathComparison", "PathEntry", "compare_paths"),
     "paths.shapes": ("elliptic_path",),
     "paths.steady": ("Steady", "steady"),
     "run.scene_file": ("SceneFile", "read_scene"),
@@ -96,6 +100,9 @@ __all__ = [
     "Loop",
     "Material",
     "MemoryCurve",
+    "PathComparison",
+    "PathEntry",
+    "PhaseLosses",
     "ProofError",
     "Scene",
     "SceneFile",
@@ -110,6 +117,7 @@ __all__ = [
     "__version__",
     "certify",
     "certify_shear",
+    "compare_paths",
     "cycle",
     "cycles",
     "elliptic_path",
@@ -117,6 +125,7 @@ __all__ = [
     "load_path",
     "loops",
     "onset_of_sliding",
+    "phase_losses",
     "press",
     "read_scene",
     "shakedown",

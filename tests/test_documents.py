@@ -26,7 +26,7 @@ COMMAND = re.compile(r"^\$ (.*?)(?:\s+# exit status (\d))?$", re.M)
 #: Directives of the site, which the site's own build checks.
 DIRECTIVES = {"{toctree}", "{eval-rst}"}
 #: Longer than a page should be: tables a command wrote, derivations that belong together.
-LONG = {"performance.md", "certificate.md", "operators.md", "shear.md", "load-paths.md"}
+LONG = {"performance.md", "certificate.md", "operators.md", "shear.md"}
 #: Pages of tables, to look things up in: every option, key and column is there.
 LONG |= {"results.md", "scene-file.md", "reliability.md"}
 

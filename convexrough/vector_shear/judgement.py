@@ -40,7 +40,7 @@ def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) ->
     if problem.scalar.certificate.scope == "none":
         return Bounds.unproved(1, len(problem))
     known = LoadErrors.of(problem.scalar)
-    margin = 0.0 if gross else _margin(problem, known)
+    margin = 0.0 if gross else margin_of(problem, known)
     bounds = None if gross else _by_convexity(problem, known, state, margin)
     return bounds or _by_exhaustion(problem, known, state, margin)
 
@@ -273,7 +273,7 @@ def _one_sticks(
     return bool(unused - doubt > turned)  # sum P* - T at least
 
 
-def _margin(problem: VectorProblem, known: LoadErrors) -> float:
+def margin_of(problem: VectorProblem, known: LoadErrors) -> float:
     """A proved lower bound on the least eigenvalue of I + H^-1/2 B H^-1/2; 0 where none is found.
 
     With H on loads no smaller than the true ones, so that a little more is proved than is said.
