@@ -27,6 +27,9 @@ if TYPE_CHECKING:
         ProofError,
         SolverError,
     )
+    from convexrough.gradients.change import ContactChange, Direction, ShearChange
+    from convexrough.gradients.gradient import Gradient
+    from convexrough.gradients.states import onset_gradient
     from convexrough.normal.certificate import Certificate, certify
     from convexrough.paths.memory import MemoryCurve
     from convexrough.paths.path import LoadPath, load_path
@@ -53,6 +56,9 @@ if TYPE_CHECKING:
 _HOMES = {
     "contact": ("Contact", "press"),
     "errors": ("ConvexroughError", "FileError", "InputError", "ProofError", "SolverError"),
+    "gradients.change": ("ContactChange", "Direction", "ShearChange"),
+    "gradients.gradient": ("Gradient",),
+    "gradients.states": ("onset_gradient",),
     "normal.certificate": ("Certificate", "certify"),
     "paths.memory": ("MemoryCurve",),
     "paths.path": ("LoadPath", "load_path"),
@@ -84,11 +90,14 @@ __all__ = [
     "Asperities",
     "Certificate",
     "Contact",
+    "ContactChange",
     "ConvexroughError",
     "Cycle",
+    "Direction",
     "FileError",
     "FrictionConic",
     "FrictionNewton",
+    "Gradient",
     "History",
     "InputError",
     "LoadPath",
@@ -100,6 +109,7 @@ __all__ = [
     "SceneFile",
     "Shakedown",
     "ShearCertificate",
+    "ShearChange",
     "ShearState",
     "SmoothSphere",
     "SolverError",
@@ -115,6 +125,7 @@ __all__ = [
     "history",
     "load_path",
     "loops",
+    "onset_gradient",
     "onset_of_sliding",
     "press",
     "read_scene",

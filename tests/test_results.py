@@ -54,6 +54,10 @@ def results() -> dict[str, Any]:
         cr.smooth(scene, load=contact.load),
         cr.read_scene(NEW_SCENE),
         contact.proof(),
+        cycle.gradient(),
+        contact.change(cr.Direction(heights=1e-8)),
+        state.change(cr.Direction(heights=1e-8)),
+        cr.Direction(heights=1e-8),
     )
     return {type(each).__name__: each for each in found}
 
@@ -69,7 +73,7 @@ def test_every_kind_is_here() -> None:
     paths = {"LoadPath", "MemoryCurve", "Shakedown", "Steady"}  # tables of files only, so far
     assert public - settings - paths <= set(NAMES)
     assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "History",
-                          "Verdict", "Comparison"}  # fmt: skip
+                          "Gradient", "Verdict", "Comparison"}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -9,6 +9,7 @@ of dense scenes are pixels inside a vector file: save that with a `dpi` too.
 
 from convexrough.plots.axes import plot
 from convexrough.plots.cycle import cycle_figures
+from convexrough.plots.gradient import gradient_figures
 from convexrough.plots.history import history_figures
 from convexrough.plots.path import path_figures, shakedown_figures, steady_figures
 from convexrough.plots.press import press_figures
@@ -16,6 +17,7 @@ from convexrough.plots.shear import shear_figures
 
 __all__ = [
     "cycle_figures",
+    "gradient_figures",
     "history_figures",
     "path_figures",
     "plot",

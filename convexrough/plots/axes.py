@@ -12,7 +12,9 @@ from convexrough.arrays import Array
 from convexrough.compare import Comparison
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.gradients.gradient import Gradient
 from convexrough.plots.cycle import few_ticks, smooth_loop
+from convexrough.plots.gradient import draw_gradient
 from convexrough.plots.history import between_steps
 from convexrough.plots.notebook import Figure
 from convexrough.plots.press import draw_pressure, draw_pressure_bar
@@ -43,8 +45,8 @@ def plot(
     """Draw the main picture of a result, and return the axes it is in.
 
     result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
-        Cycle: its loop, History: its path, Q against X; Verdict: map of who is not as claimed;
-        Comparison: what each solver took
+        Cycle: its loop, History: its path, Q against X; Gradient: map of who matters; Verdict:
+        map of who is not as claimed; Comparison: what each solver took
     axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
     length_unit, force_unit : only said, never converted
 
@@ -112,6 +114,11 @@ def _(past: History, axes: Axes, length_unit: str, force_unit: str) -> None:
     scale = ShearScale.of(past.contact, length_unit, force_unit)
     x, q, _ = between_steps(past)[1:]
     return _against(axes, scale, x, q, color=ROUGH)
+
+
+@_draw.register
+def _(gradient: Gradient, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_gradient(axes, gradient, Scale.of(gradient.contact, length_unit, force_unit))
 
 
 @_draw.register
