@@ -28,6 +28,9 @@ if TYPE_CHECKING:
         ProofError,
         SolverError,
     )
+    from convexrough.gradients.change import ContactChange, Direction, ShearChange
+    from convexrough.gradients.gradient import Gradient
+    from convexrough.gradients.states import onset_gradient
     from convexrough.normal.certificate import Certificate, certify
     from convexrough.paths.memory import MemoryCurve
     from convexrough.paths.path import LoadPath, load_path
@@ -56,6 +59,9 @@ if TYPE_CHECKING:
 _HOMES = {
     "contact": ("Contact", "press"),
     "errors": ("ConvexroughError", "FileError", "InputError", "ProofError", "SolverError"),
+    "gradients.change": ("ContactChange", "Direction", "ShearChange"),
+    "gradients.gradient": ("Gradient",),
+    "gradients.states": ("onset_gradient",),
     "normal.certificate": ("Certificate", "certify"),
     "paths.memory": ("MemoryCurve",),
     "paths.path": ("LoadPath", "load_path"),
@@ -89,11 +95,14 @@ __all__ = [
     "Asperities",
     "Certificate",
     "Contact",
+    "ContactChange",
     "ConvexroughError",
     "Cycle",
+    "Direction",
     "FileError",
     "FrictionConic",
     "FrictionNewton",
+    "Gradient",
     "History",
     "InputError",
     "LoadPath",
@@ -108,6 +117,7 @@ __all__ = [
     "SceneFile",
     "Shakedown",
     "ShearCertificate",
+    "ShearChange",
     "ShearState",
     "SmoothSphere",
     "SolverError",
@@ -124,6 +134,7 @@ __all__ = [
     "history",
     "load_path",
     "loops",
+    "onset_gradient",
     "onset_of_sliding",
     "phase_losses",
     "press",

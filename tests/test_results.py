@@ -69,6 +69,10 @@ def results() -> dict[str, Any]:
         cr.compare_paths(scene, loads=[contact.load] * 2, forces=[Q, -Q]),
         cr.compare_paths(scene, loads=[contact.load], forces=[Q]).entries[0],
         cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)[0],
+        cycle.gradient(),
+        contact.change(cr.Direction(heights=1e-8)),
+        state.change(cr.Direction(heights=1e-8)),
+        cr.Direction(heights=1e-8),
     )
     return {type(each).__name__: each for each in found}
 
@@ -85,6 +89,7 @@ def test_every_kind_is_here() -> None:
     assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "History",
                           "Verdict", "Comparison", "LoadPath", "Steady", "Shakedown",
                           "MemoryCurve", "PhaseLosses", "PathComparison"}  # fmt: skip
+                          "Gradient", "Verdict", "Comparison"}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)

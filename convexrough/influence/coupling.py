@@ -129,6 +129,13 @@ class Influence(Coupling, Protocol):
         """The displacements that these asperities cause elsewhere; 0 from a point to itself."""
         ...
 
+    def slopes(self, loads: Array) -> Array:
+        """(n, 2) [1 / length] how A P changes at each asperity as its point is moved.
+
+        -scale sum_j (c_i - c_j) P_j / r_ij^3; nothing is proved of its rounding.
+        """
+        ...
+
     def separations(self) -> Array:
         """(n,) [length] lower bounds on the distance of each asperity to its nearest neighbour."""
         ...
@@ -172,5 +179,13 @@ def inverse_distances(points: Array, others: Array) -> Array:
     squares = squared_distances(points, others)
     with np.errstate(divide="ignore"):
         inverse: Array = 1.0 / np.sqrt(squares)
+    inverse[squares == 0] = 0.0
+    return inverse
+
+
+def cubed(squares: Array) -> Array:
+    """1 / r^3 of squared distances, and 0 where two points are one."""
+    with np.errstate(divide="ignore"):
+        inverse: Array = squares**-1.5
     inverse[squares == 0] = 0.0
     return inverse

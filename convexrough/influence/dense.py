@@ -16,7 +16,9 @@ from convexrough.influence.coupling import (
     Kind,
     Rounding,
     Smoother,
+    cubed,
     inverse_distances,
+    squared_distances,
 )
 from convexrough.influence.packing import clearances, matrix_packing
 from convexrough.roundoff import ROUNDOFF
@@ -43,6 +45,19 @@ def entry_error(point_error: float, nearest: float) -> float:
     x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
     moved = x / (1.0 - x) if x < 1 else np.inf
     return 1.01 * (ENTRY_ROUNDOFFS * ROUNDOFF + moved)
+
+
+def by_pairs(points: Array, values: Array) -> Array:
+    """(n, 2) sum_j (c_i - c_j) v_j / r_ij^3, pair by pair: the odd sums of `slopes`."""
+    total = np.empty_like(points)
+    rows = max(1, 2**22 // max(1, len(points)))
+    for start in range(0, len(points), rows):
+        some = points[start : start + rows]
+        weights = cubed(squared_distances(some, points)) * values
+        for k in (0, 1):
+            apart = np.subtract.outer(some[:, k], points[:, k])
+            total[start : start + rows, k] = (weights * apart).sum(axis=1)
+    return total
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +131,9 @@ class DenseInfluence:
 
     def onto(self, points: Array) -> DenseCoupling:
         return DenseCoupling(self.points, points, self.scale, self.point_error)
+
+    def slopes(self, loads: Array) -> Array:
+        return -self.scale * by_pairs(self.points, loads)
 
     def separations(self) -> Array:
         if len(self) < 2:

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel, neighbours
-from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
+from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
 from convexrough.influence.packing import beside, lattice_packing, point_packing
+from convexrough.influence.slopes import Spectra, odd_spectra
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import crowding, separations
@@ -200,6 +201,14 @@ class LatticeInfluence(LatticeCoupling):
     def _filled(self) -> bool:
         """Whether a neighbouring site is mostly taken."""
         return len(self) > FILLED * self.box.shape[0] * self.box.shape[1]
+
+    def slopes(self, loads: Array) -> Array:
+        each = [self._convolve(loads, spectrum) for spectrum in self._odd]
+        return -self.scale / self.spacing**2 * np.stack(each, axis=1)
+
+    @cached_property
+    def _odd(self) -> Spectra:
+        return odd_spectra(self.box, cubed)
 
     def separations(self) -> Array:
         if not self._filled:

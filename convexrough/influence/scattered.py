@@ -18,6 +18,7 @@ from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.packing import clearances, point_packing
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered_smoother import coarse_inverse
+from convexrough.influence.slopes import Spectra, by_mesh, mesh_spectra
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
@@ -96,6 +97,13 @@ class ScatteredInfluence:
             return DenseCoupling(self.points, points, self.scale, self.point_error)
         together = np.concatenate((self.points, points))
         return ScatteredCoupling(replace(self, points=together), len(self))
+
+    def slopes(self, loads: Array) -> Array:
+        return -self.scale * by_mesh(self._double, self._odd, loads)
+
+    @cached_property
+    def _odd(self) -> Spectra | None:
+        return mesh_spectra(self._double)
 
     def separations(self) -> Array:
         return separations(self.points, self.point_error)

@@ -13,6 +13,7 @@ from convexrough.arrays import Array
 from convexrough.compare import Comparison
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.gradients.gradient import Gradient
 from convexrough.paths.memory import MemoryCurve
 from convexrough.paths.path import LoadPath
 from convexrough.paths.phases import PhaseLosses
@@ -21,6 +22,7 @@ from convexrough.paths.side_by_side import PathComparison
 from convexrough.paths.steady import Steady
 from convexrough.plots.closed_path import draw_losses
 from convexrough.plots.cycle import few_ticks, smooth_loop
+from convexrough.plots.gradient import draw_gradient
 from convexrough.plots.history import between_steps
 from convexrough.plots.load_plane import draw_closed, draw_curve, draw_path
 from convexrough.plots.notebook import Figure
@@ -53,10 +55,10 @@ def plot(
     """Draw the main picture of a result, and return the axes it is in.
 
     result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
-        Cycle: its loop, History: its path, Q against X; Verdict: map of who is not as claimed;
-        Comparison: what each solver took; LoadPath, MemoryCurve, Steady: the plane of loads;
-        PhaseLosses: loss against phase; Shakedown: map of the factors; PathComparison: what each
-        way took
+        Cycle: its loop, History: its path, Q against X; Gradient: map of who matters; Verdict:
+        map of who is not as claimed; Comparison: what each solver took; LoadPath, MemoryCurve,
+        Steady: the plane of loads; PhaseLosses: loss against phase; Shakedown: map of the factors;
+        PathComparison: what each way took
     axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
     length_unit, force_unit : only said, never converted
 
@@ -124,6 +126,11 @@ def _(past: History, axes: Axes, length_unit: str, force_unit: str) -> None:
     scale = ShearScale.of(past.contact, length_unit, force_unit)
     x, q, _ = between_steps(past)[1:]
     return _against(axes, scale, x, q, color=ROUGH)
+
+
+@_draw.register
+def _(gradient: Gradient, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_gradient(axes, gradient, Scale.of(gradient.contact, length_unit, force_unit))
 
 
 @_draw.register
