@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import struct
+import zipfile
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -13,13 +17,19 @@ from convexrough.errors import FileError
 
 Columns = dict[str, list[Any]]
 
+#: What the readers of arrays raise besides OSError, in files that are not what they are named.
+SPOILED = (
+    *(ValueError, TypeError, EOFError, SyntaxError, KeyError, OverflowError, RuntimeError),
+    *(zipfile.BadZipFile, zlib.error, struct.error, TokenError),
+)
+
 
 def read_arrays(path: Path, known: Sequence[str]) -> Columns:
     """Columns by name; by number, from "1", where they have none.
 
     known : names that may be wanted, in lower case; of others only those as long as these are kept
 
-    Raises FileError where what reads Parquet is not installed, and whatever the readers raise.
+    Raises FileError where what reads Parquet is not installed, OSError, and SPOILED.
     """
     columns = _parquet(path) if path.suffix.lower() == ".parquet" else _arrays(path)
     wanted = [name for name in columns if name.lower() in known] or list(columns)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.paths.shapes import elliptic_path
 from convexrough.record import Record
 from convexrough.run.stages import Stages
-from convexrough.run.tables import read_summits, read_text
+from convexrough.run.tables import few, read_summits, read_text
 from convexrough.run.toml_slips import explained
 from convexrough.run.varying import Limit, Phases, Points, Varying
 from convexrough.scene.asperities import Asperities, largest_tip_radius
@@ -31,6 +32,19 @@ from convexrough.solvers import Solver, named
 
 if TYPE_CHECKING:
     from convexrough.run.schema import Cycle, Document, Lattice
+
+
+#: Mistakes of a scene file that are shown, more than anybody makes; the rest are counted.
+MOST_MISTAKES = 50
+
+
+#: Bytes of a scene file; many asperities go into a file of their own.
+MOST_BYTES = 2**25
+
+#: Parts of a dotted key: tomllib takes time and memory with their square.
+MOST_PARTS = 100
+
+_DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
 
 class UnitNames(NamedTuple):
@@ -93,10 +107,10 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
     from convexrough.run.schema import validate
 
     path = Path(path)
-    text = read_text(path)
+    text = read_text(path, MOST_BYTES)
     tables, mistakes = validate(_parse(path, text))
     if tables is None:
-        raise SceneFileError(str(path), mistakes)
+        raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
     shear, cycle, history, units = tables.shear, tables.cycle, tables.history, tables.units
     scene, highest = _scene(path, tables)
     layout, sources = tables.asperities, [path]
@@ -181,6 +195,9 @@ def _whose_loops(path: Path, table: Cycle, count: int) -> tuple[int, ...] | Lite
 
 
 def _parse(path: Path, text: str) -> dict[str, object]:
+    if key := _DOTTED.search(text):
+        line = text.count("\n", 0, key.start()) + 1
+        raise FileError(f"{path}: line {line}: a key of more than {MOST_PARTS} parts")
     try:
         contents = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError: also a number of 5000 digits

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import FileError, InputError, TableError
-from convexrough.run.array_table import read_arrays
+from convexrough.run.array_table import SPOILED, read_arrays
 from convexrough.run.text_table import bare, read_text_table, unit
 from convexrough.scene.asperities import Asperities
 
@@ -49,10 +49,13 @@ MOST_SHOWN = 60
 LOOKS_LIKE = 0.75
 
 
-def read_text(path: Path) -> str:
-    """The whole of a UTF-8 file, with or without a byte-order mark."""
-    with _reading(path):
-        return path.read_text(encoding="utf-8-sig")
+def read_text(path: Path, most: int) -> str:
+    """The whole of a UTF-8 file of up to `most` bytes, with or without a byte-order mark."""
+    with _reading(path), path.open("rb") as file:
+        contents = file.read(most + 1)
+        if len(contents) > most:
+            raise FileError(f"{path}: more than {most / 2**20:g} MiB")
+        return TextIOWrapper(BytesIO(contents), encoding="utf-8-sig").read()
 
 
 class Table(NamedTuple):
@@ -115,7 +118,7 @@ def read_table(
     if not source.rows and not mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
-        raise TableError(str(path), _few([*mistakes, *source.mistakes]))
+        raise TableError(str(path), few([*mistakes, *source.mistakes]))
     read: dict[str, NDArray[Any]] = {}
     for name, place in places.items():
         cells = source.columns[place]
@@ -124,7 +127,7 @@ def read_table(
         else:
             read[name] = _numbers(name, cells, source, mistakes)
     if mistakes := [*mistakes, *source.mistakes]:
-        raise TableError(str(path), _few(mistakes))
+        raise TableError(str(path), few(mistakes))
     names = source.header or [""] * len(source.columns)
     units = {name: unit(names[place]) for name, place in places.items()}
     units = {name: each for name, each in units.items() if each}
@@ -273,9 +276,10 @@ def _cut(text: str) -> str:
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 
-def _few(mistakes: list[str]) -> list[str]:
-    if (more := len(mistakes) - MOST_MISTAKES) > 0:
-        return [*mistakes[:MOST_MISTAKES], f"and {more:,} more mistakes"]
+def few(mistakes: list[str], most: int = MOST_MISTAKES) -> list[str]:
+    """The first mistakes, and how many there are besides."""
+    if (more := len(mistakes) - most) > 0:
+        return [*mistakes[:most], f"and {more:,} more mistakes"]
     return mistakes
 
 
@@ -292,5 +296,5 @@ def _reading(path: Path) -> Iterator[None]:
         raise FileError(f"{path}: not text: {error}") from error
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, TypeError, EOFError, MemoryError, zipfile.BadZipFile) as error:
+    except (*SPOILED, MemoryError) as error:
         raise FileError(f"{path}: not an {path.suffix} file: {error}") from error

@@ -20,13 +20,16 @@ from convexrough.errors import FileError
 #: Characters of a line; a longer one is no table.
 LONGEST = 2**24
 
+#: Characters of a number, and of a column's name with its unit; longer ones are neither.
+LONGEST_NUMBER, LONGEST_NAME = 400, 400
+
 #: Lines from which separator and decimal mark are chosen.
 SAMPLE = 200
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
 _SURROGATE = re.compile("[\udc80-\udcff]")
 _WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])]|\s/\s*(?P<per>\S+))")
-_UNIT_APART = re.compile(r"\s+(?=[\[(])")
+_UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
 _BINARY = {
     b"PK\x03\x04": "an archive or an Excel workbook; save it as CSV",
     b"MATLAB": "a MAT-file; writematrix saves CSV",
@@ -57,6 +60,8 @@ class Style(NamedTuple):
 
     def number(self, cell: str) -> float | None:
         """What a cell says, with E or Fortran's D exponent; None where that is no number."""
+        if len(cell) > LONGEST_NUMBER:
+            return None
         text = cell.replace("\N{MINUS SIGN}", "-")
         if self.decimal == ",":
             text = text.replace(",", ".") if "." not in text else ""
@@ -89,14 +94,18 @@ class TextTable(NamedTuple):
 
 def bare(name: str) -> str:
     """The name of a column without its unit."""
-    found = _WITH_UNIT.fullmatch(name)
+    found = _with_unit(name)
     return found["name"] if found else name
 
 
 def unit(name: str) -> str:
     """The unit that the name of a column has in brackets or after a slash, or ""."""
-    found = _WITH_UNIT.fullmatch(name)
+    found = _with_unit(name)
     return (found["unit"] or found["per"] or "").strip() if found else ""
+
+
+def _with_unit(name: str) -> re.Match[str] | None:
+    return _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
 
 
 def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:

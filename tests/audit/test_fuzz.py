@@ -1,0 +1,38 @@
+"""Spoiled files of every kind: an answer or a clear error, in time and in the memory they warrant.
+
+300 mutants by default, 3,000 with --full. Each batch is a process of its own under limits of memory
+and processor time (`fuzz`).
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BATCH = 150
+FUZZ = Path(__file__).parent.parent / "fuzz.py"
+
+
+def batch(first: int) -> list[dict[str, object]]:
+    """What falls among these, and at the end how many had each status."""
+    package = FUZZ.parent.parent
+    path = os.pathsep.join([str(package), str(FUZZ.parent)])
+    done = subprocess.run(
+        [sys.executable, str(FUZZ), str(first), str(first + BATCH)],
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True, text=True, check=False, timeout=1200,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-2000:]
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def test_mutants(pytestconfig: pytest.Config) -> None:
+    batches = 20 if pytestconfig.getoption("--full") else 2
+    for number in range(batches):
+        *faults, counts = batch(number * BATCH)
+        assert faults == []
+        assert sum(counts.values()) == BATCH
+        assert {"status 0", "status 2"} <= set(counts)
