@@ -17,7 +17,7 @@ import numpy as np
 from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.normal.judgement import SUM_ROUNDOFFS
+from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.load_errors import LoadErrors, couple_above
 from convexrough.shearing.problem import TangentialProblem
