@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from convexrough import compare as compare
     from convexrough import fields as fields
+    from convexrough import gallery as gallery
     from convexrough import plots as plots
     from convexrough import solvers as solvers
     from convexrough import testing as testing
@@ -27,11 +28,16 @@ if TYPE_CHECKING:
         ProofError,
         SolverError,
     )
+    from convexrough.gradients.change import ContactChange, Direction, ShearChange
+    from convexrough.gradients.gradient import Gradient
+    from convexrough.gradients.states import onset_gradient
     from convexrough.normal.certificate import Certificate, certify
     from convexrough.paths.memory import MemoryCurve
     from convexrough.paths.path import LoadPath, load_path
+    from convexrough.paths.phases import PhaseLosses, phase_losses
     from convexrough.paths.shakedown import Shakedown, shakedown
     from convexrough.paths.shapes import elliptic_path
+    from convexrough.paths.side_by_side import PathComparison, PathEntry, compare_paths
     from convexrough.paths.steady import Steady, steady
     from convexrough.run.scene_file import SceneFile, read_scene
     from convexrough.scene.asperities import Asperities
@@ -53,10 +59,15 @@ if TYPE_CHECKING:
 _HOMES = {
     "contact": ("Contact", "press"),
     "errors": ("ConvexroughError", "FileError", "InputError", "ProofError", "SolverError"),
+    "gradients.change": ("ContactChange", "Direction", "ShearChange"),
+    "gradients.gradient": ("Gradient",),
+    "gradients.states": ("onset_gradient",),
     "normal.certificate": ("Certificate", "certify"),
     "paths.memory": ("MemoryCurve",),
     "paths.path": ("LoadPath", "load_path"),
+    "paths.phases": ("PhaseLosses", "phase_losses"),
     "paths.shakedown": ("Shakedown", "shakedown"),
+    "paths.side_by_side": ("PathComparison", "PathEntry", "compare_paths"),
     "paths.shapes": ("elliptic_path",),
     "paths.steady": ("Steady", "steady"),
     "run.scene_file": ("SceneFile", "read_scene"),
@@ -78,28 +89,35 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 #: Modules that are public whole; those not in `__all__` draw, or are for tests.
-_MODULES = ("compare", "fields", "plots", "solvers", "testing")
+_MODULES = ("compare", "fields", "gallery", "plots", "solvers", "testing")
 
 __all__ = [
     "Asperities",
     "Certificate",
     "Contact",
+    "ContactChange",
     "ConvexroughError",
     "Cycle",
+    "Direction",
     "FileError",
     "FrictionConic",
     "FrictionNewton",
+    "Gradient",
     "History",
     "InputError",
     "LoadPath",
     "Loop",
     "Material",
     "MemoryCurve",
+    "PathComparison",
+    "PathEntry",
+    "PhaseLosses",
     "ProofError",
     "Scene",
     "SceneFile",
     "Shakedown",
     "ShearCertificate",
+    "ShearChange",
     "ShearState",
     "SmoothSphere",
     "SolverError",
@@ -109,13 +127,16 @@ __all__ = [
     "__version__",
     "certify",
     "certify_shear",
+    "compare_paths",
     "cycle",
     "cycles",
     "elliptic_path",
     "history",
     "load_path",
     "loops",
+    "onset_gradient",
     "onset_of_sliding",
+    "phase_losses",
     "press",
     "read_scene",
     "shakedown",

@@ -7,7 +7,8 @@ radii a_i, with loads P_i = 4 E* a_i^3 / (3 R_i), 1 / R_i = 1 / R + 1 / rho_i an
 
 The file states a scene, radii near its solution, a box of radii, why the energy is convex on that
 box, and what it claims. Its numbers are float64 in hexadecimal: exact rationals. Numbers computed
-here are rational, too, or enclosed between rationals. docs/theory/proof-file.md derives (1) - (10).
+here are rational, too, or enclosed between rationals. Pages
+docs/theory/proof-file-pressing.md and docs/theory/proof-file-friction.md derive (1) - (10).
 
 Exit status: 0 all that is claimed is proved; 1 refused, with the reason; 2 unreadable.
 """

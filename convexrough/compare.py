@@ -9,9 +9,10 @@ different loads, need not hold each other, and each may hold a solution of its o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from itertools import combinations
 from typing import Literal, NamedTuple
@@ -24,6 +25,7 @@ from convexrough.contact import Contact, press
 from convexrough.drawn import Drawn
 from convexrough.errors import ConvexroughError, InputError, SolverError
 from convexrough.frames import Variables
+from convexrough.influence import Kind
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
 from convexrough.progress import Announce
@@ -118,6 +120,7 @@ def compare(
     approach: float | None = None,
     load: float | None = None,
     solvers: Sequence[solvers.Solver] | None = None,
+    influence: Kind | None = None,
     announce: Announce | None = None,
 ) -> Comparison:
     """Press on the scene with every solver.
@@ -125,6 +128,7 @@ def compare(
     approach [length] or load [force] : what is prescribed, exactly one
     solvers  : settings objects; the default is `every_solver()`. Newton's method is the reference
         and always the first
+    influence : how to couple the asperities, as for `press`
     announce : told the name of each solver before it starts
 
     Raises InputError where the reference refuses the scene or what is prescribed. What happens to
@@ -137,7 +141,8 @@ def compare(
         if announce is not None:
             announce(solver.name)
         known = entries[0].contact if entries else None
-        entries.append(_enter(solver, scene, approach, load, known))
+        pressed = partial(press, scene, approach=approach, load=load, influence=influence)
+        entries.append(_enter(solver, pressed, known))
     answers = [entry.contact for entry in entries if entry.contact is not None]
     pairs = combinations([Answer.of(contact) for contact in answers], 2)
     return Comparison(
@@ -172,16 +177,12 @@ _REFERENCE = solvers.Newton()
 
 
 def _enter(
-    solver: solvers.Solver,
-    scene: Scene,
-    approach: float | None,
-    load: float | None,
-    reference: Contact | None,
+    solver: solvers.Solver, press_with: Callable[..., Contact], reference: Contact | None
 ) -> Entry:
     _load_code_of(solver)
     memory = MemoryRise()
     try:
-        contact = press(scene, approach=approach, load=load, solver=solver)
+        contact = press_with(solver=solver)
     except SolverError as error:
         return Entry(solver.name, "failed", str(error))
     except InputError as error:

@@ -29,6 +29,9 @@ from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
 
 if TYPE_CHECKING:
+    from convexrough.gradients.adjoint import Holding
+    from convexrough.gradients.change import ContactChange, Direction
+    from convexrough.gradients.gradient import Gradient
     from convexrough.proof import Proof, Sheared
 
 
@@ -104,6 +107,52 @@ class Contact(Keeper, Table, Drawn):
             announce=announce,
         )
 
+    def gradient(
+        self,
+        *,
+        loads: ArrayLike | None = None,
+        gaps: ArrayLike | None = None,
+        approach: float | None = None,
+        load: float | None = None,
+        holding: Holding | None = None,
+        tolerance: float = 1e-9,
+    ) -> Gradient:
+        """Derivatives of a weighted sum of results with respect to the scene: one linear system.
+
+        loads, gaps    : (n,) weights on them;  approach, load : weights on the approach and the
+            total load. At least one is needed
+        holding        : "load" or "approach": which of the two is held; default what was prescribed
+        tolerance      : of linear systems that are not solved by matrices, relative
+
+        Raises InputError where no asperity is loaded, and SolverError where the state has no
+        derivative because the energy is not convex there.
+
+        >>> print(f"{contact.gradient(load=1.0, holding='approach').approach:.5g}")
+        0.012145
+        """
+        from convexrough.gradients.states import contact_gradient  # a floor above: when asked
+
+        return contact_gradient(
+            self,
+            loads=loads,
+            gaps=gaps,
+            approach=approach,
+            load=load,
+            holding=holding,
+            tolerance=tolerance,
+        )
+
+    def change(self, direction: Direction, *, tolerance: float = 1e-9) -> ContactChange:
+        """How loads, gaps and the approach change, to first order, when the scene does.
+
+        direction : of what, by how much;  tolerance : as in `gradient`
+
+        Raises InputError and SolverError as `gradient`.
+        """
+        from convexrough.gradients.change import contact_change  # a floor above: when asked
+
+        return contact_change(self, direction, tolerance=tolerance)
+
     @property
     def mean_pressures(self) -> Array:
         """(n,) [force / length^2] load over contact area, 0 where open."""
@@ -140,8 +189,7 @@ def press(
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
-    contact = solve(problem, solver, start, announce)
-    return replace(contact, seconds=time.perf_counter() - began)
+    return _contact(problem, solver, start, announce, began)
 
 
 def solve(
@@ -151,8 +199,16 @@ def solve(
     announce: Announce | None = None,
 ) -> Contact:
     """`press` for a problem already assembled; its arguments are as there."""
-    began = time.perf_counter()
-    solver = solvers.named(solver)
+    return _contact(problem, solvers.named(solver), start, announce, time.perf_counter())
+
+
+def _contact(
+    problem: NormalProblem,
+    solver: Solver,
+    start: ArrayLike | None,
+    announce: Announce | None,
+    began: float,
+) -> Contact:
     scene = problem.scene
     force, length = problem.units.force, problem.units.length
     first = None

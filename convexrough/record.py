@@ -119,7 +119,7 @@ class Table(Record):
 def in_words(value: Any) -> str:
     """A value in one line: of an array its size and range, or how many there are of each word.
 
-    Of a mapping its keys.
+    Of a mapping its keys, of a tuple of records how many.
     """
     if isinstance(value, Record):
         return value._headline()
@@ -127,6 +127,8 @@ def in_words(value: Any) -> str:
         return _of_array(value)
     if isinstance(value, float):
         return f"{value:.6g}"
+    if isinstance(value, tuple) and value and all(isinstance(each, Record) for each in value):
+        return f"{len(value):,} of {type(value[0]).__name__}"
     text = ", ".join(map(str, value)) if isinstance(value, Mapping) else str(value)
     text = " ".join(text.split())
     return text if len(text) <= LINE else f"{text[: LINE - 3]}..."
@@ -136,7 +138,7 @@ def _of_array(values: NDArray[Any]) -> str:
     if values.size == 0:
         return "none"
     if values.dtype.kind == "U":
-        return ", ".join(_counted(values))
+        return ", ".join(_counted(values.ravel()))
     if values.dtype.kind == "b":
         return f"{np.count_nonzero(values):,} of {values.size:,}"
     if values.size <= FEW:

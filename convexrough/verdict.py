@@ -69,14 +69,6 @@ class Verdict(Claim, Table, Drawn):
         return frozen(self.loads > self.floor)
 
     @cached_property
-    def status(self) -> NDArray[np.str_]:
-        """(n,) the proved words: "contact", "open" or "undecided"."""
-        words = self.certificate.status
-        if self.solution is None:
-            return words
-        return frozen(np.where(words == "undecided", self.solution.status, words))
-
-    @cached_property
     def wrongly_open(self) -> Indices:
         """(m,) claimed open, and proved to touch."""
         return frozen(np.flatnonzero(~self.claimed & (self.status == "contact")))
@@ -95,18 +87,10 @@ class Verdict(Claim, Table, Drawn):
         }
 
     @property
-    def decided_alone(self) -> bool:
-        """Every word follows from the loads alone."""
-        return self.certificate.holds
-
-    @cached_property
-    def errors(self) -> Array:
-        """(n,) [force] proved bounds on |load - solution|; infinite where nothing is proved."""
+    def errors_alone(self) -> Array:
+        """(n,) [force] the certificate's, and what counts as 0."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
-        errors = self.certificate.load_errors + ignored
-        if (nearby := self.nearby()) is not None:
-            errors = np.minimum(errors, np.abs(self.loads - nearby[0]) + nearby[1])
-        return frozen(errors)
+        return frozen(self.certificate.load_errors + ignored)
 
     def nearby(self) -> tuple[Array, Array] | None:
         """The solution's loads and bounds."""

@@ -3,12 +3,14 @@
 An asperity slides in every cycle once the level that sticks for ever falls below the load at which
 it first touched. Melan's theorem, for asperities that stick elastically until they slide, puts the
 limit lower: the share of a light contact is that of its whole area, while in truth its edge gives
-way first. `python examples/limits_of_shakedown.py`
+way first. Run by hand it also draws maps, shakedown.png and shakedown_map.png.
+`python examples/limits_of_shakedown.py`
 """
 
 import numpy as np
 
 import convexrough as cr
+from convexrough import plots
 
 Pairs = list[tuple[str, float, float]]
 
@@ -38,6 +40,9 @@ def compare() -> Pairs:
     sigma = P * (1 - exact.factor)
     tangent = contact.loads[last] / ((ahead - behind) / (2 * step))
 
+    # An ellipse about 0.9 P takes L* down by its factor times the root of 0.1^2 + 0.2^2.
+    ellipse = (1 - sigma / (0.9 * P)) / np.hypot(0.1, 0.2)
+
     # A cycle 1 % above the limit: ring A slides by what is missing; below, none does.
     above = cr.steady(scene, loads=[P, P], forces=1.01 * exact.factor * swing)
     below = cr.steady(scene, loads=[P, P], forces=0.99 * exact.factor * swing)
@@ -48,9 +53,23 @@ def compare() -> Pairs:
         ("vector friction at nu = 0", vector.factor, elastic.factor),
         ("sliding 1 % above", float((above.status == "sliding").sum()), 6),
         ("sliding 1 % below", float((below.status == "sliding").sum()), 0),
+        ("ellipse, factor of ring A", over_both_amplitudes().factor, ellipse),
     ]
+
+
+def over_both_amplitudes() -> cr.Shakedown:
+    """The same array where load and shear swing, a quarter of a cycle apart."""
+    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.0), friction=FRICTION)
+    P = 0.9 * cr.press(scene, approach=5e-5).load
+    p, q = cr.elliptic_path(
+        load=0.0, load_amplitude=0.1 * P, force_amplitude=0.2 * FRICTION * P, friction=FRICTION
+    )
+    return cr.shakedown(scene, loads=P, load_amplitudes=p, force_amplitudes=q)
 
 
 if __name__ == "__main__":
     for name, computed, reference in compare():
         print(f"{name:<46} {computed:14.9g} {reference:14.9g}")
+    for stem, figure in plots.shakedown_figures(over_both_amplitudes()).items():
+        figure.savefig(f"{stem}.png", dpi=200)

@@ -3,12 +3,14 @@
 One smooth sphere first, against the increments of Mindlin and Deresiewicz as Thornton and Yin write
 them, integrated. Then the rough contact: shear in phase with the normal load, and a quarter of a
 cycle behind. A straight line that follows the load costs nothing, a steeper one what a divided
-difference of the energy says. `python examples/normal_and_shear_together.py`
+difference of the energy says. In the end the loss at every phase, with the smooth sphere's beside
+it, which is drawn to phase_losses.png. `python examples/normal_and_shear_together.py`
 """
 
 import numpy as np
 
 import convexrough as cr
+from convexrough import plots
 
 Pairs = list[tuple[str, float, float]]
 
@@ -68,11 +70,50 @@ def rough() -> Pairs:
     ]
 
 
+def against_phase() -> cr.PhaseLosses:
+    """The same cycle at every phase, of three sizes, and the smooth sphere's beside it."""
+    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION)
+    P = cr.press(scene, approach=4e-5).load
+    return cr.phase_losses(
+        scene,
+        load=P,
+        load_amplitude=0.2 * P,
+        force_amplitude=FRICTION * 0.4 * P,
+        phases=np.linspace(0, np.pi, 7),
+        factors=[0.5, 1.0],
+        chords=8,
+    )
+
+
+def phases() -> Pairs:
+    """Phase matters more than roughness: in step a cycle costs a fraction of what it can cost."""
+    losses = against_phase()
+    P, p, t = losses.load, losses.load_amplitude, losses.force_amplitude / FRICTION
+
+    def mean(low: float, high: float) -> float:  # of D0 = (3 L / 4)^(2/3), V = (3/5) L D0
+        ends = np.array([low, high])
+        return float(np.diff(0.6 * ends * (0.75 * ends) ** (2 / 3))[0] / (high - low))
+
+    bracket = mean(P - t, P + p) + mean(P - t, P - p) - mean(P - p, P + p)
+    in_step = 4 * RATIO * FRICTION**2 * t * (bracket - (0.75 * (P - t)) ** (2 / 3))
+    whole = losses.factors == 1.0
+    reach = [np.hypot(0.2, 0.4), (np.sqrt(0.2 + 0.08) + np.sqrt(0.2 - 0.08)) / 2]
+    return [
+        ("smooth sphere in step, loss / closed form", losses.smooth[whole][3] / in_step, 1.0),
+        ("quarter behind, stuck level / P", losses.levels[whole][0] / P, 1 - reach[0]),
+        ("30 degrees, stuck level / P", losses.levels[whole][1] / P, 1 - reach[1]),
+        ("costs more in step than 30 degrees off", float(losses.energy[10] > losses.energy[8]), 0),
+    ]
+
+
 def compare() -> Pairs:
     """(quantity, computed, reference)."""
-    return one_sphere() + rough()
+    return one_sphere() + rough() + phases()
 
 
 if __name__ == "__main__":
     for name, computed, reference in compare():
         print(f"{name:<46} {computed:14.9g} {reference:14.9g}")
+    figure = plots.phase_figures(against_phase())["phase_losses"]
+    figure.savefig("phase_losses.png", dpi=200)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from scenes import paper, rough
+from scenes import MATERIAL, paper, rough
 
 import convexrough as cr
 from convexrough.arrays import Array
@@ -26,3 +26,12 @@ def path_of(name: str, points: list[tuple[float, float]]) -> tuple[cr.Scene, Arr
 def follow(name: str, points: list[tuple[float, float]]) -> cr.LoadPath:
     scene, loads, forces = path_of(name, points)
     return cr.load_path(scene, loads=loads, forces=forces)
+
+
+def shaded() -> cr.Scene:
+    """A small low asperity between five crowded ones: pressed far, it loses load again."""
+    turn = 2 * np.pi * np.arange(5) / 5
+    around = np.column_stack((np.cos(turn), np.sin(turn)))
+    points = np.vstack(([0.0, 0.0], around))
+    asperities = cr.Asperities(points, np.r_[0.05, np.ones(5)], np.r_[-0.06, np.zeros(5)])
+    return cr.Scene(1e6, asperities, MATERIAL, friction=0.5)

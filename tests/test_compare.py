@@ -325,6 +325,13 @@ def test_command_in_json(command: Any, tmp_path: Path) -> None:
         assert row["iterations"] > 0
 
 
+def test_command_couples_as_the_scene_file_asks(command: Any, tmp_path: Path) -> None:
+    more = '[solver]\ninfluence = "scattered"\n'
+    (tmp_path / "a.toml").write_text(scene_text(more=more))
+    ran = command("compare", "a.toml", "--json")
+    assert {row["influence"] for row in json.loads(ran.out)["compare"]} == {"scattered"}
+
+
 def fail(*_: Any, **__: Any) -> None:
     raise cr.SolverError("bristles: stopped")
 

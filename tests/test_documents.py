@@ -26,10 +26,9 @@ COMMAND = re.compile(r"^\$ (.*?)(?:\s+# exit status (\d))?$", re.M)
 #: Directives of the site, which the site's own build checks.
 DIRECTIVES = {"{toctree}", "{eval-rst}"}
 #: Longer than a page should be: tables a command wrote, derivations that belong together.
-LONG = {"performance.md", "certificate.md", "convexity.md", "exact-cones.md", "friction.md"}
-LONG |= {"operators.md", "shear.md", "load-paths.md", "proof-file.md"}
+LONG = {"performance.md", "certificate.md", "operators.md", "shear.md"}
 #: Pages of tables, to look things up in: every option, key and column is there.
-LONG |= {"verify.md", "results.md", "scene-file.md", "reliability.md"}
+LONG |= {"results.md", "scene-file.md", "reliability.md"}
 
 
 class Block(NamedTuple):

@@ -54,6 +54,25 @@ def results() -> dict[str, Any]:
         cr.smooth(scene, load=contact.load),
         cr.read_scene(NEW_SCENE),
         contact.proof(),
+        cr.load_path(scene, loads=contact.load * np.array([1.0, 0.7]), forces=[Q, -Q / 2]),
+        cr.steady(scene, loads=[contact.load, contact.load / 2], forces=[Q, -Q / 2]),
+        cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q]),
+        cr.phase_losses(
+            scene,
+            load=contact.load,
+            load_amplitude=Q,
+            force_amplitude=Q / 2,
+            phases=[0.0, 1.0],
+            factors=[0.5, 1.0],
+            chords=6,
+        ),
+        cr.compare_paths(scene, loads=[contact.load] * 2, forces=[Q, -Q]),
+        cr.compare_paths(scene, loads=[contact.load], forces=[Q]).entries[0],
+        cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)[0],
+        cycle.gradient(),
+        contact.change(cr.Direction(heights=1e-8)),
+        state.change(cr.Direction(heights=1e-8)),
+        cr.Direction(heights=1e-8),
     )
     return {type(each).__name__: each for each in found}
 
@@ -66,10 +85,11 @@ DRAWN = tuple(name for name in NAMES if hasattr(results()[name], "plot"))
 def test_every_kind_is_here() -> None:
     public = {name for name in cr.__all__ if dataclasses.is_dataclass(getattr(cr, name))}
     settings = {"FrictionConic", "FrictionNewton", "Material"}
-    paths = {"LoadPath", "MemoryCurve", "Shakedown", "Steady"}  # tables of files only, so far
-    assert public - settings - paths <= set(NAMES)
+    assert public - settings <= set(NAMES)
     assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "History",
-                          "Verdict", "Comparison"}  # fmt: skip
+                          "Verdict", "Comparison", "LoadPath", "Steady", "Shakedown",
+                          "MemoryCurve", "PhaseLosses", "PathComparison",
+                          "Gradient"}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -188,8 +208,9 @@ def test_replace(name: str) -> None:
 def test_a_data_frame_has_the_arrays(name: str) -> None:
     result = results()[name]
     frame = result.to_dataframe()
-    rows = {"History": "step", "Loop": "point", "Comparison": "entry"}.get(name, "asperity")
-    assert frame.index.name == rows
+    rows = {"History": "step", "Loop": "point", "Comparison": "entry", "LoadPath": "point"}
+    rows |= {"MemoryCurve": "vertex", "PhaseLosses": "ellipse", "PathComparison": "entry"}
+    assert frame.index.name == rows.get(name, "asperity")
     for column in frame.columns:
         if hasattr(result, column):
             np.testing.assert_array_equal(frame[column].to_numpy(), getattr(result, column))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from convexrough.bench.machine import busy
 from convexrough.bench.measure import CostRow, Row
+from convexrough.bench.paths import PathRow
 from convexrough.bench.suite import Bench, Panel, ShearRow
 from convexrough.bench.summary import condensed, verdicts
 from convexrough.errors import FileError
@@ -21,6 +22,8 @@ WORK_HEADING = ["solver", "setting", "error", "seconds", "assembling", "certifyi
 WORK_HEADING += ["single", "iterations", "MB", ""]
 COST_HEADING = ["scene", "asperities", "touching", "seconds", "assembling", "solving"]
 COST_HEADING += ["certifying", "A P", "single", "MB", "B each", "proved error"]
+PATH_HEADING = ["scene", "asperities", "touching", "presses", "first call, s", "next, s"]
+PATH_HEADING += ["presses per segment", "undecided", "proved error", "MB", "order"]
 SHEAR_HEADING = ["what", "asperities", "touching", "states", "seconds", "s per state", "MB"]
 
 
@@ -66,6 +69,9 @@ def _costs(bench: Bench) -> Iterator[Section]:
     yield Section("cost of a press", _cost_table(bench.cost), 1, _messages(bench.cost))
     if bench.shear:
         yield Section("cost of shear", _shear_table(bench.shear), 1, _messages(bench.shear))
+    if bench.paths:
+        title = "cost of a load path of seven segments, with every bound and word"
+        yield Section(title, _path_table(bench.paths), 1, _messages(bench.paths))
 
 
 def renewed_page(page: Path, bench: Bench, figures: str) -> str:
@@ -147,7 +153,22 @@ def _shear_table(rows: Sequence[ShearRow]) -> list[list[str]]:
     return table
 
 
-def _messages(rows: Sequence[Row] | Sequence[CostRow] | Sequence[ShearRow]) -> list[str]:
+def _path_table(rows: Sequence[PathRow]) -> list[list[str]]:
+    table = [PATH_HEADING]
+    for row in rows:
+        cells = [f"{row.asperities:,}", row.outcome, *["-"] * 8]
+        if row.outcome == "answered":
+            cells = [f"{row.asperities:,}", f"{row.touching:,}", str(row.presses)]
+            cells += [_seconds(row.first), _seconds(row.again)]
+            cells += [f"{row.presses / row.segments:.1f}", str(row.undecided)]
+            cells += [f"{row.error:.0e}", _megabytes(row.memory), row.order]
+        table.append([row.family, *cells])
+    return table
+
+
+def _messages(
+    rows: Sequence[Row] | Sequence[CostRow] | Sequence[ShearRow] | Sequence[PathRow],
+) -> list[str]:
     """Why some did not answer, below their table."""
     found: dict[str, list[str]] = {}
     for row in rows:

@@ -23,6 +23,7 @@ from convexrough.bench.measure import (
     outcome_of,
     timed,
 )
+from convexrough.bench.paths import PathRow, measure_path
 from convexrough.bench.plan import Plan, attempts
 from convexrough.bench.reference import Reference, measurable, refine
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
@@ -99,6 +100,7 @@ class Bench:
     panels: tuple[Panel, ...]
     cost: tuple[CostRow, ...]
     shear: tuple[ShearRow, ...]
+    paths: tuple[PathRow, ...]
     seconds: float
 
     def fitted(self, family: Family) -> list[CostRow]:
@@ -134,12 +136,17 @@ def run(plan: Plan, announce: Announce | None = None) -> Bench:
         for family, size in sizes:
             say(f"shear, {what}: {family}, about {size:,}")
             sheared.append(_shear_row(plan, what, family, size, sheared))
+    followed = []
+    for family, size in plan.paths:
+        say(f"load path: {family}, about {size:,}")
+        followed.append(measure_path(family, scene(family, REFINEMENTS[size])))
     return Bench(
         machine=machine,
         quick=plan.quick,
         panels=tuple(panels),
         cost=tuple(cost),
         shear=tuple(sheared),
+        paths=tuple(followed),
         seconds=time.perf_counter() - began,
     )
 

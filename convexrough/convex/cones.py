@@ -13,8 +13,8 @@ For t in [0, 1] a *lift* stands for the powers of t by linear variables
     (y3 - y4) * z       >= (y4 - y5)^2
 
 Over them, min (3/5 - S/3) y5 + (S/3) z at fixed y3 = t^3 is (3/5) t^5 - (S/3) t^6 exactly: for
-0 <= S <= 21/25 with four cones, for 0 <= S <= 1 with five. docs/theory/exact-cones.md, "Why it
-is exact".
+0 <= S <= 21/25 with four cones, for 0 <= S <= 1 with five.
+docs/theory/exact-cones-proof.md, "Why it is exact".
 """
 
 from __future__ import annotations
@@ -56,12 +56,14 @@ class ConeRows(NamedTuple):
     cones: int
 
 
-def power_cones(lifts: Sequence[Indices], width: int) -> ConeRows:
+def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = None) -> ConeRows:
     """The cones of n lifts in Clarabel's form  A x + s = b,  s in the cones; all lifts at once.
 
     lifts : columns, (n,) each, of y2, y3, y4, y5, z (four-cone form), or of y1, y2, y3, y4, y5, z
         (five-cone form), among all variables of the program
     width : how many variables the program has
+    ones  : (n,) columns of variables that stand for the 1 of each lift: then a lift may be a part
+        of a whole, of that size
 
     Rows are grouped by lift: the cones of the first, three rows each, then those of the second.
     """
@@ -72,6 +74,9 @@ def power_cones(lifts: Sequence[Indices], width: int) -> ConeRows:
     cones = _SECOND_ORDER @ (FIVE_CONES if names == 6 else FOUR_CONES)
     rows = cones.reshape(-1, 7)  # of one lift
     constant, coefficients = rows[:, 0], rows[:, 7 - names :]
+    if ones is not None:
+        columns = np.vstack((ones, columns))
+        constant, coefficients = np.zeros(len(rows)), np.column_stack((constant, coefficients))
     row, name = np.nonzero(coefficients)
     at = (len(rows) * np.arange(n) + row[:, None], columns[name])
     values = np.broadcast_to(-coefficients[row, name][:, None], at[1].shape)

@@ -13,6 +13,7 @@ halved until Phi falls enough (docs/theory/newton.md). What is different from la
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
@@ -131,7 +132,7 @@ def solve(
         if tell is not None:
             tell(step, state)
         accurate = state.residual <= stopping.accurate * state.scale
-        size, noise = float(np.linalg.norm(state.defect)), law.noise(state)
+        size, noise = math.sqrt(np.vdot(state.defect, state.defect)), law.noise(state)
         done = state.residual <= max(stopping.tolerance * state.scale, 0.0)
         if done or (accurate and size <= noise):
             return state, step - 1

@@ -53,7 +53,7 @@ def correct(
 
     Raises SolverError where even the shells leave the matrix indefinite, that is by rounding.
     """
-    touching = np.flatnonzero(root)
+    touching = root.nonzero()[0]
     if len(touching) == 0:
         return -defect
     direct = len(touching) <= (FACTORISED if influence.at_hand else FACTORISED_UNSTORED)
@@ -90,14 +90,12 @@ def _factorise(
     factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
     if info != 0:
         raise _IndefiniteError
-    right = np.empty((2, len(w)))
-    np.multiply(w, defect[touching], out=right[0])
-    right[1] = w
-    y, border = dpotrs(factor, right.T, lower=1, overwrite_b=1)[0].T
+    y = dpotrs(factor, w * defect[touching], lower=1, overwrite_b=1)[0]
     shift = 0.0
     if balanced:
+        border = dpotrs(factor, w, lower=1)[0]
         shift = float(w @ y) / float(w @ border)
-        y = y - shift * border
+        y -= shift * border
     changes = np.zeros(len(root))
     changes[touching] = w * y
     return shift - defect + influence.apply(changes)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import get_args
 
-from convexrough.arrays import Indices
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
-from convexrough.influence.coupling import Influence, Kind
+from convexrough.influence.coupling import Influence, Kind, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.scattered import ScatteredInfluence
+from convexrough.scene.layout import Layout
 from convexrough.scene.scene import Scene
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -35,8 +36,14 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     points, error = scene.contact_points[which], scene.point_error
     n = len(which)
     if kind == "dense" or (kind is None and n <= FEW_ASPERITIES):
+        if scene.geometry == "summit" and len(scene) <= FEW_ASPERITIES:
+            inverse = _among(scene.asperities.layout.keep(_inverse), which)
+            return DenseInfluence.of(points, scale, scale * inverse, error)
         return DenseInfluence.assemble(points, scale, error)
     if kind != "scattered" and scene.lattice is not None:
+        if scene.geometry == "summit" and (sites := scene.asperities.layout.sites) is not None:
+            all_points = scene.contact_points
+            return LatticeInfluence.of(all_points, which, scene.lattice, sites[which], scale, error)
         return LatticeInfluence.assemble(points, scene.lattice, scale, error)
     if kind == "lattice":
         raise InputError(
@@ -45,3 +52,12 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     if kind is None and n <= FEW_SCATTERED:
         return DenseInfluence.assemble(points, scale, error)
     return ScatteredInfluence(points, scale, error)
+
+
+def _inverse(layout: Layout) -> Array:
+    """(n, n) 1 / r_ij of a small layout, which all its scenes share."""
+    return frozen(inverse_distances(layout.points, layout.points))
+
+
+def _among(matrix: Array, which: Indices) -> Array:
+    return matrix if len(which) == len(matrix) else matrix.take(which, axis=0).take(which, axis=1)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.influence.lattice_smoother import differences
 
 #: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.5 for the
 #: twiddle factors and the products with them, and sqrt(p) ((p - 1) / 2 + 4) for the sums of p terms
@@ -22,28 +21,45 @@ PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 #: Transforms of more numbers than this use every core.
 PARALLEL = 2**18
 
-#: Columns transformed at a time: what a cache holds.
-COLUMNS = 256
+#: Columns are transformed some at a time: so many bytes of each row, what a cache holds.
+ROW = 512
 
 
 @dataclass(frozen=True, eq=False)
 class Box:
     """A box of sites, and convolutions on it.
 
-    shape : (rows, columns) of sites;  basis : (2, 2) rows b1 and b2, in units of the spacing: so
+    shape  : (rows, columns) of sites;  basis : (2, 2) rows b1 and b2, in units of the spacing: so
         single precision holds the kernel whatever the scene's units
+    extent : [spacing] no two sites that matter are further apart
     """
 
     shape: tuple[int, int]
     basis: Array
+    extent: float = np.inf
 
     @cached_property
     def padded(self) -> tuple[int, int]:
-        """The size of the transforms."""
+        """The size of the transforms: no two differences of sites that matter share a place in it.
+
+        So it is with twice the box, as no difference has so many rows or columns; and where any
+        period i b1 + j b2 is longer than twice the extent.
+        """
         from scipy.fft import next_fast_len  # 0.1 s to import: only where there is a lattice
 
-        rows, columns = self.shape
-        return next_fast_len(2 * rows - 1), next_fast_len(2 * columns - 1, real=True)
+        (rows, columns), longest = self.shape, 2.0 * self.extent
+        (across, along), twice = np.hypot(*self.basis.T), (2 * rows - 1, 2 * columns - 1)
+        first = next_fast_len(_least(rows, twice[0], longest / across))
+        second = next_fast_len(_least(columns, twice[1], longest / along), real=True)
+        while first < twice[0] and second < twice[1]:
+            both = np.array([[first, second], [first, -second]]) @ self.basis
+            if (np.hypot(*both.T) > longest).all():
+                break
+            if first * across <= second * along:
+                first = next_fast_len(first + 1)
+            else:
+                second = next_fast_len(second + 1, real=True)
+        return first, second
 
     @property
     def workers(self) -> int:
@@ -56,54 +72,81 @@ class Box:
         return float(sum(_pass_roundoffs(length) for length in self.padded))
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
-        """1 / |i b1 + j b2|^power for every difference of two sites of the box, 0 for none."""
+        """1 / |i b1 + j b2|^power for every difference of sites that matter, 0 for none."""
         from scipy import fft
 
         rows, columns = self.padded
-        i, j = differences(rows), differences(columns)
-        j_used = np.abs(j) < self.shape[1]
         half = np.zeros((rows, columns // 2 + 1), dtype=np.result_type(dtype, np.complex64))
         total = square = 0.0
-        block = max(1, 2**20 // columns)
-        for start in range(0, self.shape[0], block):
-            taken = slice(start, min(start + block, self.shape[0]))
-            x = np.add.outer(i[taken] * self.basis[0, 0], j * self.basis[1, 0])
-            y = np.add.outer(i[taken] * self.basis[0, 1], j * self.basis[1, 1])
-            x *= x
-            y *= y
-            x += y
-            np.sqrt(x, out=x)
-            if start == 0:
-                x[0, 0] = np.inf
-            values = j_used / x
-            if power > 1:
-                values **= power
-            weights = np.where(i[taken] > 0, 2.0, 1.0)  # i and -i
+        block = max(1, 2**18 // columns)
+        for start in range(0, rows // 2 + 1, block):
+            taken = slice(start, min(start + block, rows // 2 + 1))
+            values = self._squares(taken)
+            values[values > self.extent**2] = np.inf
+            np.sqrt(values, out=values)
+            np.divide(1.0, values, out=values)
+            nearest = values.copy() if power > 1 else values
+            for _ in range(power - 1):
+                values *= nearest
+            i = np.arange(taken.start, taken.stop)
+            weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # i and -i
             total += float(weights @ values.sum(axis=1))
-            square += float(weights @ (values * values).sum(axis=1))
-            half[taken] = fft.rfft(values.astype(dtype), axis=1, workers=self.workers)
+            square += float(weights @ np.einsum("ij,ij->i", values, values))
+            half[taken] = fft.rfft(values.astype(dtype, copy=False), axis=1, workers=self.workers)
         # The kernel is even: row -i is row i read backwards.
-        last = self.shape[0] - 1
+        last = (rows - 1) // 2
         if last:
-            half[-last:] = np.conj(half[last:0:-1])
+            np.conj(half[last:0:-1], out=half[-last:])
         spectrum = np.empty(half.shape, dtype=dtype)
-        for each in _blocks(half.shape[1]):
+        for each in _blocks(half):
             spectrum[:, each] = fft.fft(half[:, each], axis=0, workers=self.workers).real
         return Kernel(spectrum, total, float(np.sqrt(square)))
 
+    def _squares(self, taken: slice) -> Array:
+        """|i b1 + j b2|^2 in some rows of the padded box, infinite for no difference.
+
+        In each place stands the shortest difference of two sites of the box that falls on it.
+        """
+        (rows, columns), (height, width) = self.shape, self.padded
+        squares = np.full((taken.stop - taken.start, width), np.inf)
+        right, left = np.arange(columns), np.arange(1 - columns, 0)
+        for shift in (0, height):
+            i = np.arange(taken.start, taken.stop) - shift
+            inside = np.flatnonzero(np.abs(i) < rows)
+            if len(inside) == 0:
+                continue
+            within = slice(int(inside[0]), int(inside[-1]) + 1)
+            for j, places in ((right, slice(columns)), (left, slice(width + 1 - columns, width))):
+                x, y = (
+                    np.add.outer(i[within] * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1)
+                )
+                x *= x
+                y *= y
+                x += y
+                np.minimum(squares[within, places], x, out=squares[within, places])
+        if taken.start == 0:
+            squares[0, 0] = np.inf
+        return squares
+
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        """The convolution of a field (rows, columns) with a kernel, on the box."""
+        """The convolution of a field (rows, columns) with a kernel, on the box.
+
+        The field may be filled up with columns of zeros, to the padded width at most: then nothing
+        is copied, and those columns of the result mean nothing.
+        """
         from scipy import fft
 
         rows, columns = self.padded
         half = fft.rfft(field, columns, axis=1, workers=self.workers)
-        for each in _blocks(half.shape[1]):
+        for each in _blocks(half):
             full = fft.fft(half[:, each], rows, axis=0, workers=self.workers)
             full *= spectrum[:, each]
             full = fft.ifft(full, axis=0, overwrite_x=True, workers=self.workers)
             half[:, each] = full[: self.shape[0]]
-        result: NDArray[Any] = fft.irfft(half, columns, axis=1, workers=self.workers)
-        return result[:, : self.shape[1]]
+        result: NDArray[Any] = fft.irfft(
+            half, columns, axis=1, overwrite_x=True, workers=self.workers
+        )
+        return result[:, : field.shape[1]]
 
     def bound(self, kernel: Kernel, roundoff: float) -> float:
         """Bound on the 2-norm of the error of `convolve`, relative to that of the field.
@@ -134,9 +177,15 @@ class Kernel:
     norm: float
 
 
-def _blocks(width: int) -> Iterator[slice]:
-    for start in range(0, width, COLUMNS):
-        yield slice(start, min(start + COLUMNS, width))
+def _blocks(half: NDArray[Any]) -> Iterator[slice]:
+    width, step = half.shape[1], max(1, ROW // half.itemsize)
+    for start in range(0, width, step):
+        yield slice(start, min(start + step, width))
+
+
+def _least(sites: int, twice: int, length: float) -> int:
+    """The fewest places along one direction: no period of them is as short as `length`."""
+    return twice if length >= twice else max(sites, int(length) + 1)
 
 
 def _pass_roundoffs(length: int) -> int:

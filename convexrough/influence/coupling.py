@@ -7,6 +7,7 @@ Hertz's business.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple, Protocol
 
@@ -47,7 +48,8 @@ class Rounding(NamedTuple):
         By a factor of 10 beside that of sums, which is near the truth, and of 20 beside that of
         transforms, which is some thousand times the truth.
         """
-        return 0.1 * self.relative * float(np.linalg.norm(displacement)) + 0.05 * self.norm
+        size = math.sqrt(np.vdot(displacement, displacement))
+        return 0.1 * self.relative * size + 0.05 * self.norm
 
     @property
     def component(self) -> float:
@@ -72,6 +74,13 @@ class Coupling(Protocol):
         Higher where the strengths differ by many powers of ten, and the sum is small.
 
         strengths : (n,) not negative;  power : 2 or 3
+        """
+        ...
+
+    def clearances(self) -> Array:
+        """(m,) [length] lower bounds on the distance of each point to the nearest asperity.
+
+        Of an asperity itself, to the nearest of the others.
         """
         ...
 
@@ -120,12 +129,26 @@ class Influence(Coupling, Protocol):
         """The displacements that these asperities cause elsewhere; 0 from a point to itself."""
         ...
 
+    def slopes(self, loads: Array) -> Array:
+        """(n, 2) [1 / length] how A P changes at each asperity as its point is moved.
+
+        -scale sum_j (c_i - c_j) P_j / r_ij^3; nothing is proved of its rounding.
+        """
+        ...
+
     def separations(self) -> Array:
         """(n,) [length] lower bounds on the distance of each asperity to its nearest neighbour."""
         ...
 
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij over all pairs, for contact radii a (n,), 0 where open."""
+        ...
+
+    def packing(self, radii: Array) -> float:
+        """At least the largest t_i / (r_ij - t_j) over pairs with radii t (n,) that are not 0.
+
+        Infinite where that is not below 1: where two such spheres meet.
+        """
         ...
 
     def smoother(self, root: Array) -> Smoother | None:
@@ -156,5 +179,13 @@ def inverse_distances(points: Array, others: Array) -> Array:
     squares = squared_distances(points, others)
     with np.errstate(divide="ignore"):
         inverse: Array = 1.0 / np.sqrt(squares)
+    inverse[squares == 0] = 0.0
+    return inverse
+
+
+def cubed(squares: Array) -> Array:
+    """1 / r^3 of squared distances, and 0 where two points are one."""
+    with np.errstate(divide="ignore"):
+        inverse: Array = squares**-1.5
     inverse[squares == 0] = 0.0
     return inverse

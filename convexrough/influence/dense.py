@@ -16,8 +16,11 @@ from convexrough.influence.coupling import (
     Kind,
     Rounding,
     Smoother,
+    cubed,
     inverse_distances,
+    squared_distances,
 )
+from convexrough.influence.packing import clearances, matrix_packing
 from convexrough.roundoff import ROUNDOFF
 
 
@@ -44,6 +47,19 @@ def entry_error(point_error: float, nearest: float) -> float:
     return 1.01 * (ENTRY_ROUNDOFFS * ROUNDOFF + moved)
 
 
+def by_pairs(points: Array, values: Array) -> Array:
+    """(n, 2) sum_j (c_i - c_j) v_j / r_ij^3, pair by pair: the odd sums of `slopes`."""
+    total = np.empty_like(points)
+    rows = max(1, 2**22 // max(1, len(points)))
+    for start in range(0, len(points), rows):
+        some = points[start : start + rows]
+        weights = cubed(squared_distances(some, points)) * values
+        for k in (0, 1):
+            apart = np.subtract.outer(some[:, k], points[:, k])
+            total[start : start + rows, k] = (weights * apart).sum(axis=1)
+    return total
+
+
 @dataclass(frozen=True, eq=False)
 class DenseInfluence:
     """The coupling A as a stored matrix.
@@ -66,7 +82,13 @@ class DenseInfluence:
 
     @classmethod
     def assemble(cls, points: Array, scale: float, point_error: float = 0.0) -> DenseInfluence:
-        matrix = dense_matrix(points, scale)
+        return cls.of(points, scale, dense_matrix(points, scale), point_error)
+
+    @classmethod
+    def of(
+        cls, points: Array, scale: float, matrix: Array, point_error: float = 0.0
+    ) -> DenseInfluence:
+        """Where the matrix (n, n) is known."""
         largest = float(matrix.max(initial=0.0))
         nearest = scale / largest if largest > 0 else np.inf
         return cls(points, scale, matrix, point_error, entry_error(point_error, nearest))
@@ -99,7 +121,7 @@ class DenseInfluence:
         return total * (1.0 + self._loss(power))
 
     def submatrix(self, which: Indices) -> Array:
-        return np.asarray(self.matrix[which[:, None], which])
+        return self.matrix.take(which, axis=0).take(which, axis=1)
 
     def among(self, which: Indices) -> DenseInfluence:
         matrix = self.submatrix(which)
@@ -109,6 +131,9 @@ class DenseInfluence:
 
     def onto(self, points: Array) -> DenseCoupling:
         return DenseCoupling(self.points, points, self.scale, self.point_error)
+
+    def slopes(self, loads: Array) -> Array:
+        return -self.scale * by_pairs(self.points, loads)
 
     def separations(self) -> Array:
         if len(self) < 2:
@@ -120,6 +145,12 @@ class DenseInfluence:
         if len(radii) < 2:
             return 0.0
         return float((np.add.outer(radii, radii) * self.matrix).max()) / self.scale
+
+    def packing(self, radii: Array) -> float:
+        return matrix_packing(self.matrix * ((1.0 + 2.0 * self.entry_error) / self.scale), radii)
+
+    def clearances(self) -> Array:
+        return self.separations()
 
     def smoother(self, root: Array) -> Smoother | None:
         return None
@@ -162,6 +193,9 @@ class DenseCoupling:
             total[block] = inverse**power @ strengths
         loss = (len(self.points) + 3) * ROUNDOFF + power * self._entry_error
         return total * (1.0 + 1.01 * loss)
+
+    def clearances(self) -> Array:
+        return clearances(self.points, self.targets, self.point_error)
 
     def _rows(self) -> Iterator[tuple[slice, Array]]:
         """1 / r in blocks of rows."""

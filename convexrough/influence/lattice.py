@@ -8,6 +8,7 @@ lattice: Fourier transforms".
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -17,15 +18,20 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel, neighbours
-from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
+from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
+from convexrough.influence.packing import beside, lattice_packing, point_packing
+from convexrough.influence.slopes import Spectra, odd_spectra
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import crowding, separations
 
 #: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
 ENTRY_ROUNDOFFS = 24
+
+#: Numbers looked at together: what a cache holds.
+CHUNK = 2**14
 
 #: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree:
 #: a heuristic, which decides speed and how sharp shells are.
@@ -74,6 +80,10 @@ class LatticeCoupling:
         stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
         return np.maximum(total, 0.0) * (largest * stretched)
 
+    def clearances(self) -> Array:
+        """Of points that are none of the asperities: any two sites are the spacing apart."""
+        return np.full(len(self.targets), self.spacing * self._least * (1.0 - 8 * ROUNDOFF))
+
     @property
     def _unit(self) -> float:
         """A_ij of nearest neighbours."""
@@ -96,19 +106,31 @@ class LatticeCoupling:
         return self._single if dtype == np.float32 else self._kernel.spectrum
 
     def _convolve(self, values: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
-        field = np.zeros(self.box.shape[0] * self.box.shape[1], dtype=values.dtype)
-        field[self.sources] = values
-        return self.box.convolve(field.reshape(self.box.shape), spectrum).ravel()[self.targets]
+        field = np.zeros((self.box.shape[0], self.box.padded[1]), dtype=values.dtype)
+        sources, targets = self._padded
+        field.ravel()[sources] = values
+        return self.box.convolve(field, spectrum).ravel()[targets]
+
+    @cached_property
+    def _padded(self) -> tuple[Indices, Indices]:
+        """`sources` and `targets` where each row of the box is as long as the transforms."""
+        (_, columns), (_, width) = self.box.shape, self.box.padded
+        sources = self.sources + self.sources // columns * (width - columns)
+        if self.targets is self.sources:
+            return sources, sources
+        return sources, self.targets + self.targets // columns * (width - columns)
 
 
 @dataclass(frozen=True, eq=False)
 class LatticeInfluence(LatticeCoupling):
     """The coupling among asperities on a lattice.
 
-    points : (n, 2) [length];  places : (n, 2) i and j of each
+    array  : (N, 2) [length] points;  members : (n,) of which these asperities are some
+    places : (n, 2) i and j of each
     """
 
-    points: Array
+    array: Array
+    members: Indices
     lattice: Lattice
     places: Sites
     point_error: float
@@ -125,36 +147,47 @@ class LatticeInfluence(LatticeCoupling):
         places = lattice.sites(points)
         if places is None:
             raise ValueError("points off the lattice")
-        return cls._of(points, lattice, places, scale, point_error)
+        return cls.of(points, np.arange(len(points)), lattice, places, scale, point_error)
 
     @classmethod
-    def _of(
-        cls, points: Array, lattice: Lattice, places: Sites, scale: float, point_error: float
+    def of(
+        cls,
+        array: Array,
+        members: Indices,
+        lattice: Lattice,
+        places: Sites,
+        scale: float,
+        point_error: float,
     ) -> LatticeInfluence:
+        """Where the places are known."""
         box, index = _boxed(lattice, places)
         off = 2.0 * float(np.sqrt(2.0)) * (lattice.blur + point_error)
         spacing = lattice.spacing
         both = scale, spacing, off / spacing
-        return cls(box, index, index, *both, points, lattice, places, point_error)
+        return cls(box, index, index, *both, array, members, lattice, places, point_error)
 
     def __len__(self) -> int:
-        return len(self.points)
+        return len(self.members)
+
+    @property
+    def points(self) -> Array:
+        """(n, 2) [length]"""
+        return self.array[self.members]
 
     @property
     def matrix(self) -> Array:
         return dense_matrix(self.points, self.scale)
 
     def submatrix(self, which: Indices) -> Array:
-        return dense_matrix(self.points[which], self.scale)
+        return dense_matrix(self.array[self.members[which]], self.scale)
 
     @property
     def entry_error(self) -> float:
         return entry_error(self.point_error, self.spacing * self._least)
 
     def among(self, which: Indices) -> LatticeInfluence:
-        return self._of(
-            self.points[which], self.lattice, self.places[which], self.scale, self.point_error
-        )
+        members, places = self.members[which], self.places[which]
+        return self.of(self.array, members, self.lattice, places, self.scale, self.point_error)
 
     def onto(self, points: Array) -> Coupling:
         places = self.lattice.sites(points)
@@ -169,6 +202,14 @@ class LatticeInfluence(LatticeCoupling):
         """Whether a neighbouring site is mostly taken."""
         return len(self) > FILLED * self.box.shape[0] * self.box.shape[1]
 
+    def slopes(self, loads: Array) -> Array:
+        each = [self._convolve(loads, spectrum) for spectrum in self._odd]
+        return -self.scale / self.spacing**2 * np.stack(each, axis=1)
+
+    @cached_property
+    def _odd(self) -> Spectra:
+        return odd_spectra(self.box, cubed)
+
     def separations(self) -> Array:
         if not self._filled:
             return separations(self.points, self.point_error)
@@ -182,17 +223,27 @@ class LatticeInfluence(LatticeCoupling):
         field = np.full(self.box.shape, -np.inf)
         field.ravel()[self.sources] = radii
         most, worst = 2.0 * float(radii.max()), 0.0
-        for on_sites, i, j in neighbours(self.box):
-            distance = self.spacing * (on_sites - self.blur)  # at least that of the points
+        for distance, i, j in self._pairs():
             if most <= worst * distance:
                 break
-            here, there = field[i:], field[: len(field) - i]
-            if j >= 0:
-                pairs = here[:, j:] + there[:, : there.shape[1] - j]
-            else:
-                pairs = here[:, :j] + there[:, -j:]
-            worst = max(worst, float(pairs.max(initial=0.0)) / distance)
+            here, there = beside(field, i, j)
+            worst = max(worst, float((here + there).max(initial=0.0)) / distance)
         return worst
+
+    def packing(self, radii: Array) -> float:
+        if not self._filled:
+            return point_packing(self.points, radii, 3.0 * self.point_error)
+        field = np.zeros(self.box.shape)
+        field.ravel()[self.sources] = radii
+        return lattice_packing(field, self._pairs())
+
+    def clearances(self) -> Array:
+        return self.separations()
+
+    def _pairs(self) -> Iterator[tuple[float, int, int]]:
+        """`neighbours`, and no more than the distance of points that far apart."""
+        for on_sites, i, j in neighbours(self.box):
+            yield self.spacing * (on_sites - self.blur) * (1.0 - 8 * ROUNDOFF), i, j
 
     def smoother(self, root: Array) -> Smoother:
         box = self.box
@@ -201,9 +252,20 @@ class LatticeInfluence(LatticeCoupling):
 
 def _boxed(lattice: Lattice, places: Sites) -> tuple[Box, Indices]:
     """The smallest box, and where in it each place is."""
+    basis = lattice.basis / lattice.spacing
     if len(places) == 0:
-        return Box((1, 1), lattice.basis / lattice.spacing), np.zeros(0, dtype=np.intp)
-    low = places.min(axis=0)
-    rows, columns = (places.max(axis=0) - low + 1).tolist()
-    index = (places[:, 0] - low[0]) * columns + (places[:, 1] - low[1])
-    return Box((rows, columns), lattice.basis / lattice.spacing), index
+        return Box((1, 1), basis), np.zeros(0, dtype=np.intp)
+    low, high = places.min(axis=0), places.max(axis=0)
+    rows, columns = (high - low + 1).tolist()
+    index = (places[:, 0] - low[0]) * np.intp(columns) + (places[:, 1] - low[1])
+    return Box((rows, columns), basis, _extent(places, (low + high) / 2.0, basis)), index
+
+
+def _extent(places: Sites, middle: Array, basis: Array) -> float:
+    """No two places are further apart: twice the largest distance from the middle, and a little."""
+    (g11, g12), (_, g22) = basis @ basis.T
+    largest = 0.0
+    for start in range(0, len(places), CHUNK):
+        i, j = (places[start : start + CHUNK] - middle).T
+        largest = max(largest, float((i * (g11 * i + 2.0 * g12 * j) + g22 * (j * j)).max()))
+    return 2.0 * float(np.sqrt(largest)) * (1.0 + 1e-9)

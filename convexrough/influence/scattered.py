@@ -15,8 +15,10 @@ import numpy as np
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
+from convexrough.influence.packing import clearances, point_packing
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered_smoother import coarse_inverse
+from convexrough.influence.slopes import Spectra, by_mesh, mesh_spectra
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
@@ -96,11 +98,24 @@ class ScatteredInfluence:
         together = np.concatenate((self.points, points))
         return ScatteredCoupling(replace(self, points=together), len(self))
 
+    def slopes(self, loads: Array) -> Array:
+        return -self.scale * by_mesh(self._double, self._odd, loads)
+
+    @cached_property
+    def _odd(self) -> Spectra | None:
+        return mesh_spectra(self._double)
+
     def separations(self) -> Array:
         return separations(self.points, self.point_error)
 
     def crowding(self, radii: Array) -> float:
         return crowding(self.points, radii)
+
+    def packing(self, radii: Array) -> float:
+        return point_packing(self.points, radii, 3.0 * self.point_error)
+
+    def clearances(self) -> Array:
+        return self.separations()
 
     def smoother(self, root: Array) -> Smoother | None:
         return coarse_inverse(self.points, self.scale, root)
@@ -146,6 +161,11 @@ class ScatteredCoupling:
 
     def falloff(self, strengths: Array, power: int) -> Array:
         return self.joint.falloff(self._all(strengths), power)[self.sources :]
+
+    def clearances(self) -> Array:
+        points = self.joint.points
+        here, elsewhere = points[: self.sources], points[self.sources :]
+        return clearances(here, elsewhere, self.joint.point_error)
 
     def _all(self, values: Array) -> Array:
         everywhere = np.zeros(len(self.joint), dtype=values.dtype)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +24,14 @@ class Claim(ABC):
     within : the forces must be proved this near, in parts of the largest; None: near enough for
         every word to follow from the forces alone
     total_prescribed : [force] None where it is not prescribed
+    certificate : of the forces as given
+    solution    : one nearby with its own words; None where none was needed or found
     """
 
     within: float | None
     total_prescribed: float | None
+    certificate: Any
+    solution: Any
 
     @property
     @abstractmethod
@@ -35,27 +40,38 @@ class Claim(ABC):
 
     @property
     @abstractmethod
-    def errors(self) -> Array:
-        """(n,) [force] proved bounds on |force - solution|; infinite where nothing is proved."""
-
-    @property
-    @abstractmethod
-    def status(self) -> NDArray[np.str_]:
-        """(n,) the proved words; "undecided" without one."""
+    def errors_alone(self) -> Array:
+        """(n,) [force] what the forces alone prove of |force - solution|; infinite for nothing."""
 
     @property
     @abstractmethod
     def wrong(self) -> dict[str, Indices]:
         """Who is claimed to be what they are proved not to be, by what is wrong about them."""
 
-    @property
-    @abstractmethod
-    def decided_alone(self) -> bool:
-        """Every word follows from the given forces alone."""
-
     @abstractmethod
     def nearby(self) -> tuple[Array, Array] | None:
         """(n,) [force] a solution nearby, and its bounds; None where none was needed or found."""
+
+    @cached_property
+    def status(self) -> NDArray[np.str_]:
+        """(n,) the proved words, of the forces or else of the solution; "undecided" without one."""
+        words: NDArray[np.str_] = self.certificate.status
+        if self.solution is None:
+            return words
+        return frozen(np.where(words == "undecided", self.solution.status, words))
+
+    @property
+    def decided_alone(self) -> bool:
+        """Every word follows from the given forces alone."""
+        return bool(self.certificate.holds)
+
+    @cached_property
+    def errors(self) -> Array:
+        """(n,) [force] proved bounds on |force - solution|; infinite where nothing is proved."""
+        if (nearby := self.nearby()) is None:
+            return self.errors_alone
+        true, bounds = nearby
+        return frozen(np.minimum(self.errors_alone, np.abs(self.values - true) + bounds))
 
     @property
     def holds(self) -> bool:

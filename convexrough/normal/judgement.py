@@ -29,18 +29,18 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.convex.definite import proved_margin
-from convexrough.errors import InputError
 from convexrough.influence.coupling import Coupling, Influence, error_reach
+from convexrough.normal.prescribed_load import approach_error, riding_weights
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.residual import SUM_ROUNDOFFS, Fit, fit, scaled_to
+from convexrough.normal.sup_norm import SupNorm
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.sphere import hertz
 
 Scope = Literal["global", "local", "none"]
-
-#: Roundoffs lost in k P^(2/3) and in adding it, A P and D up: "Rounding".
-SUM_ROUNDOFFS = 16
 
 #: Convexity number of the loads themselves from which shells fitted to them are tried. A heuristic:
 #: if it is off, work is wasted, or a bound is less sharp than it could be.
@@ -70,64 +70,84 @@ class Judgement(NamedTuple):
     @classmethod
     def of(cls, problem: NormalProblem, given: Array) -> Judgement:
         """Of loads (n,) of the candidates, not negative."""
-        loads = given if problem.load is None else _scaled_to(problem.load, given)
-        fit = _fit(problem, loads)
-        screened = _screened(problem, loads, fit.approach)
-        indentation = problem.to_scene(fit.indentation)
-        indentation[screened.which] = screened.indentation
-        box = _find_box(problem, loads, fit.displacement)
-        if box is None:
-            return _unproved(problem, loads, fit, indentation)
-        problem, ball = box.problem, _ball(box, fit, loads)
-        if ball is None:
-            return _unproved(problem, loads, fit, indentation)
-        errors = ball.load_errors
-
-        # What it says of A P and D0, and so of delta* = D - A P*.
-        A = problem.influence
-        moved = ball.moves(A, A.scale)
-        approach_error = 0.0
+        loads, weights = given, None
         if problem.load is not None:
-            approach_error = _approach_error(problem, loads, fit, errors, moved)
-        error = moved + fit.rounding + fit.component + approach_error
+            loads = scaled_to(problem.load, given)
+            weights = riding_weights(problem, loads)
+        found = fit(problem, loads, weights)
+        screened = _screened(problem, loads, found.approach)
+        indentation = problem.to_scene(found.indentation)
+        indentation[screened.which] = screened.indentation
+        box = _find_box(problem, loads, found.displacement)
+        ball = None if box is None else _ball(box, found, loads)
+        if box is None or ball is None:
+            return _unproved(problem, loads, found, indentation)
+        bounds = _bounds(box.problem, loads, found, ball, weights, screened.coupling)
+        error = bounds.moved + found.rounding + found.component + bounds.approach
 
         # delta* gives a second bound on each load, sharper where the load is small.
-        low = hertz.load(fit.indentation - error, problem.coefficients) * (1 - SAFETY)
-        high = hertz.load(fit.indentation + error, problem.coefficients) * (1 + SAFETY)
-        load_errors = np.minimum(errors, np.maximum(loads - low, high - loads))
+        low = hertz.load(found.indentation - error, problem.coefficients) * (1 - SAFETY)
+        high = hertz.load(found.indentation + error, problem.coefficients) * (1 + SAFETY)
+        load_errors = np.minimum(bounds.loads, np.maximum(loads - low, high - loads))
         load_errors += np.abs(loads - given) * (1 + SAFETY) + 4 * ROUNDOFF * loads
 
         everywhere = problem.to_scene(error)
-        if screened.coupling is not None:
-            moved = ball.moves(screened.coupling, A.scale)
-            everywhere[screened.which] = moved + screened.rounding + approach_error
+        everywhere[screened.which] = bounds.elsewhere + screened.rounding + bounds.approach
         return cls(
             scope=box.scope,
             convexity_number=box.convexity_number,
             load_errors=load_errors,
-            touches=(loads > errors) | (fit.indentation > error),
+            touches=(loads > bounds.loads) | (found.indentation > error),
             indentation=indentation,
             errors=everywhere,
-            approach=fit.approach,
-            approach_error=approach_error,
-            duality_gap=problem.duality_gap(
-                loads, fit.displacement, fit.approach, ball.near, fit.rounding + fit.component
+            approach=found.approach,
+            approach_error=bounds.approach,
+            duality_gap=box.problem.duality_gap(
+                loads,
+                found.displacement,
+                found.approach,
+                ball.near,
+                found.rounding + found.component,
             ),
         )
 
 
-class _Fit(NamedTuple):
-    """How well loads fit the contact law, with the rounding error of saying so."""
+class _Bounds(NamedTuple):
+    """What is proved of the distance to the solution."""
 
-    displacement: Array  # A P
-    indentation: Array  # D - A P
-    gap: Array  # k P^(2/3) + A P - D
-    local: Array  # k P^(2/3)
-    rounding: Array  # bound on the error of each of the above, less a remainder
-    remainder: float  # bound on the 2-norm of that
-    component: float  # bound on each component of it
-    residual: Array  # bound on |e|, less the remainder: |gap| where loaded, else its negative part
-    approach: float  # D0
+    loads: Array  # (n,) of P
+    moved: Array  # (n,) of A P
+    approach: float  # of D0
+    elsewhere: Array  # of A P at the screened asperities
+
+
+def _bounds(
+    problem: NormalProblem,
+    loads: Array,
+    found: Fit,
+    ball: _Ball,
+    weights: Array | None,
+    screened: Coupling | None,
+) -> _Bounds:
+    """The smaller of (1) and of docs/theory/sup-norm.md, for each asperity."""
+    A, errors, shift = problem.influence, ball.load_errors, 0.0
+    sup = SupNorm.of(A, problem.stiffness(ball.near))
+    if weights is not None:
+        shift = np.inf
+        if sup is not None:
+            shift = approach_error(problem, loads, errors, found, weights, sup)
+        if shift == np.inf:
+            shift = _approach_error(problem, loads, found, errors, ball.moves(A, A.scale))
+    if sup is None or shift == np.inf:
+        elsewhere = np.zeros(0) if screened is None else ball.moves(screened, A.scale)
+        return _Bounds(errors, ball.moves(A, A.scale), shift, elsewhere)
+    residuals = found.residual + (found.component + shift)
+    largest = float(residuals.max(initial=0.0))
+    errors = np.minimum(errors, sup.load_errors(residuals, largest))
+    moved, elsewhere = ball.lesser(sup.moves(A, largest), A, A), np.zeros(0)
+    if screened is not None:
+        elsewhere = ball.lesser(sup.moves_at(screened, largest), screened, A)
+    return _Bounds(errors, moved, shift, elsewhere)
 
 
 class _Box(NamedTuple):
@@ -157,60 +177,43 @@ class _Ball(NamedTuple):
         """How far A (P - P*) can be from 0."""
         return self.radius * error_reach(coupling, scale, 1.0 / self.stiffness) * (1 + SAFETY)
 
+    def lesser(self, moved: Array, coupling: Coupling, influence: Influence) -> Array:
+        """The smaller of `moved` and `moves`, which is left out where it cannot be much smaller.
 
-def _ball(box: _Box, fit: _Fit, loads: Array) -> _Ball | None:
+        As sum_j A_ij^2 / h_j is no less than what it would be if all were as far as the farthest.
+        """
+        if len(influence) == 0:
+            return moved
+        extent = max(float(np.hypot(*np.ptp(influence.points, axis=0))), checks.SMALLEST)
+        total = float((1.0 / self.stiffness).sum()) - 1.0 / float(self.stiffness.min())
+        least = self.radius * influence.scale / extent * np.sqrt(max(total, 0.0))
+        if float(moved.max(initial=0.0)) <= least:
+            return moved
+        return np.minimum(moved, self.moves(coupling, influence.scale))
+
+
+def _ball(box: _Box, found: Fit, loads: Array) -> _Ball | None:
     """(1) on the box, and once more on the box up to there: "A bound on the loads".
 
     None where the solution may lie outside the local box: "Which box", 3.
     """
     h = box.stiffness
-    radius = _norm(fit, h, box.convexity_number)
+    radius = _norm(found, h, box.convexity_number)
     errors = radius / np.sqrt(h)
     if (loads + errors >= box.faces).any():
         return None
     near = np.minimum(box.loads, loads + errors)
     if (theta := box.problem.convexity_number(near)) <= box.convexity_number:
         h = box.problem.stiffness(near)
-        radius = _norm(fit, h, theta)
+        radius = _norm(found, h, theta)
     return _Ball(radius, h, near)
 
 
-def _norm(fit: _Fit, stiffness: Array, convexity_number: float) -> float:
+def _norm(found: Fit, stiffness: Array, convexity_number: float) -> float:
     """eps = || e ||_{H^-1} / (1 - theta), the right side of (1)."""
-    squared = float(np.sum(fit.residual**2 / stiffness))
-    remainder = fit.remainder / np.sqrt(float(stiffness.min(initial=np.inf)))
+    squared = float(np.sum(found.residual**2 / stiffness))
+    remainder = found.remainder / np.sqrt(float(stiffness.min(initial=np.inf)))
     return float(np.sqrt(squared) + remainder) / (1.0 - convexity_number) * (1 + SAFETY)
-
-
-def _scaled_to(load: float, given: Array) -> Array:
-    """Loads that add up to what is prescribed: "Prescribed load"."""
-    total = float(given.sum())
-    if total == 0.0:
-        expected = "a load on some asperity that could touch, as the total is prescribed"
-        raise InputError("loads", found="none", expected=expected)
-    return given / total * load
-
-
-def _fit(problem: NormalProblem, loads: Array) -> _Fit:
-    """The residual e, with its "Rounding"; D0 as "Prescribed load" says."""
-    displacement = problem.influence.apply(loads)
-    local = hertz.indentation(loads, problem.coefficients)
-    approach = problem.approach
-    if approach is None:  # the D0 that fits the touching asperities best
-        weights = np.cbrt(loads) / problem.coefficients
-        approach = float(weights @ (local + displacement - problem.offsets) / weights.sum())
-    indentation = approach + problem.offsets - displacement
-    gap = local - indentation
-    off = problem.influence.rounding(loads)
-    # The relative part is of the true product, which the computed one may miss by the remainder.
-    rounding = (
-        off.relative * (np.maximum(displacement, 0.0) + off.component) + problem.offset_errors
-    )
-    rounding += SUM_ROUNDOFFS * ROUNDOFF * (local + np.abs(displacement) + abs(approach))
-    residual = np.where(loads > 0, np.abs(gap) + rounding, np.maximum(rounding - gap, 0.0))
-    return _Fit(
-        displacement, indentation, gap, local, rounding, off.norm, off.component, residual, approach
-    )
 
 
 def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box | None:
@@ -256,14 +259,14 @@ def convex_margin(influence: Influence, stiffness: Array, margins: Sequence[floa
 
 
 def _approach_error(
-    problem: NormalProblem, loads: Array, fit: _Fit, errors: Array, moved: Array
+    problem: NormalProblem, loads: Array, found: Fit, errors: Array, moved: Array
 ) -> float:
     """|D0 - D0*|, as D0* = k_i P*_i^(2/3) + (A P*)_i - d_i at every asperity sure to touch.
 
     "Prescribed load".
     """
     least = hertz.indentation(np.maximum(loads - errors, 0.0), problem.coefficients)
-    each = np.abs(fit.gap) + fit.rounding + fit.component + (fit.local - least) + moved
+    each = np.abs(found.gap) + found.rounding + found.component + (found.local - least) + moved
     return float(each.min(where=loads > errors, initial=np.inf))
 
 
@@ -288,7 +291,7 @@ def _screened(problem: NormalProblem, loads: Array, approach: float) -> _Screene
     return _Screened(others, coupling, approach + offsets - product, rounding)
 
 
-def _unproved(problem: NormalProblem, loads: Array, fit: _Fit, indentation: Array) -> Judgement:
+def _unproved(problem: NormalProblem, loads: Array, found: Fit, indentation: Array) -> Judgement:
     """Said plainly: "Which box", 4."""
     return Judgement(
         scope="none",
@@ -297,7 +300,7 @@ def _unproved(problem: NormalProblem, loads: Array, fit: _Fit, indentation: Arra
         touches=np.zeros(len(loads), dtype=bool),
         indentation=indentation,
         errors=np.full(len(indentation), np.inf),
-        approach=fit.approach,
+        approach=found.approach,
         approach_error=0.0 if problem.load is None else np.inf,
         duality_gap=np.inf,
     )

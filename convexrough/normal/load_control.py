@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -21,17 +22,24 @@ LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Array:
     """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
 
-    The sum grows and is convex in tau, so Newton's method from the right descends on the root. The
-    shift is counted from the highest, so that loads of any size come out to all digits.
+    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it grows and is convex in tau:
+    Newton's method descends on the root once it is to the right of it, which it is after one step;
+    in few steps, as it is nearly straight. The shift is counted from the highest, so that loads of
+    any size come out to all digits.
     """
-    indentation = indentation - indentation.max()
+    highest = float(indentation.max())
+    indentation = indentation - highest
     alone = hertz.indentation(load, coefficients)  # one asperity alone would carry it all
-    shift = float((alone - indentation).min())
-    for _ in range(200):
-        loads = hertz.load(indentation + shift, coefficients)
-        slope = float(np.sum(np.cbrt(loads) / coefficients)) * 1.5
-        step = (float(loads.sum()) - load) / slope
-        if not step > 4 * ROUNDOFF * shift:
+    most = float((alone - indentation).min())
+    shift = min(most, max(highest, 1e-9 * most))
+    for steps in range(200):
+        ratio = np.maximum(indentation + shift, 0.0) / coefficients
+        root = np.sqrt(ratio)
+        total = float((ratio * root).sum())
+        # (total^(2/3) - load^(2/3)) over its slope, without cancellation
+        excess = -math.expm1(2 / 3 * math.log1p((load - total) / total)) * total
+        step = excess / float((root / coefficients).sum())
+        if steps > 0 and not step > 4 * ROUNDOFF * shift:
             break
         shift -= step
     return indentation + shift

@@ -1,4 +1,4 @@
-"""What slip costs along a load path, in closed form: docs/theory/load-paths.md, "Energy".
+"""What slip costs along a load path, in closed form: docs/theory/load-path-proofs.md, "Energy".
 
 A front that runs down through a layer of slope th, from L0 to L1, while the load goes in proportion
 from P0 to P1, costs c_t f^2 (1 - c th) I with

@@ -6,8 +6,8 @@ straight step to (P, T) presses at P, where the indentations become delta_i, and
     eta_i + (A (T_i(eta_i) - T_i before))_i = x,    sum T_i(eta_i) = T
 
 for what each asperity must take up, by Newton's method. Where indentations are ordered one step per
-segment is exact; else it is of second order in the step. Derived in docs/theory/load-paths.md,
-"Without order".
+segment is exact; else it is of second order in the step. Derived in docs/theory/without-order.md,
+"The general step".
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
-With elastic shares q_i(v) of the vertices v of a path, q0_i of its mean, in units of f,
+With elastic shares q_i(v) of the vertices v of a path, in units of f, and t0 its mean,
 
-    maximise lambda  with  |q0_i + lambda q_i(v) + rho_i| <= P_i  for all i and v,  sum rho_i = 0,
+    maximise lambda  with  |r_i + lambda q_i(v)| <= P_i  for all i and v,  sum r_i = t0,
 
-and by slips s_iv with sum_v s_iv the same for all i, any lambda is at most
+and for slips s_iv with sum_v s_iv = x the same for all i, any such lambda is at most
 
-    [sum P_i |s_iv| - sum s_iv . q0_i] / sum s_iv . q_i(v).
+    [sum P_i |s_iv| - x . t0] / sum s_iv . q_i(v).
 
-Both are evaluated here for what a solver found, so it need not be trusted:
-docs/theory/load-paths.md, "Melan's program".
+Both are evaluated here for what a solver found, so it need not be trusted, and with what shares and
+loads can be off by: docs/theory/shakedown.md, "Melan's program".
 """
 
 from __future__ import annotations
@@ -22,71 +22,62 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
-from convexrough.roundoff import SAFETY
+from convexrough.paths.elastic_shares import Shares, vector_shares
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.solvers.programs import ConeProgram, run_clarabel
-from convexrough.vector_shear.problem import VectorProblem
 
 #: What the solver is asked for, and how far its state is moved towards one that is surely safe.
 TOLERANCE, MARGIN = 1e-10, 1e-9
 
+#: Slips are multiples of the largest over this: sums of such numbers are exact.
+STEPS = 2.0**30
+
 
 class Melan(NamedTuple):
-    """Bounds on lambda, the residual state [force over f] and the slips of each vertex."""
+    """Bounds on lambda, the state at rest [force over f] and the slips of each vertex.
 
+    lower, upper : proved; 0 and infinite where the shares or the loads are not
+    factor       : what the state admits, were shares and loads as computed
+    """
+
+    factor: float
     lower: float
     upper: float
     gross: float
-    residual: Array  # (n, 2)
+    rest: Array  # (n, 2)
     slips: Array  # (m, n, 2)
-
-
-def elastic_shares(contact: Contact) -> Array:
-    """(n,) of a vanishing shear force, all sticking, with the scalar kernel."""
-    problem = TangentialProblem.of(contact)
-    shares: Array = problem.to_scene(problem.elastic)
-    return shares
 
 
 def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
     """The program with the full tangential kernel; mean (2,) and vertices (m, 2) are Q / f."""
-    problem = VectorProblem.of(contact)
-    scalar, n = problem.scalar, len(problem)
-    unit = scalar.units.force
-    limits = scalar.loads
-    shares = _shares(problem)  # (n, 2, 2)
-    elastic = np.einsum("ijk,vk->vij", shares, vertices / unit)  # (m, n, 2)
-    steady = shares @ (mean / unit)  # (n, 2)
-    checks.fits_in_memory("cones", len(vertices) * n, 4000.0)
-    raw = run_clarabel(_program(limits, steady, elastic), "shakedown", TOLERANCE)
-    rest = raw.x[1:].reshape(n, 2)
-    cones = raw.multipliers[2:].reshape(len(vertices), n, 3)
-    slips = -cones[..., 1:] / limits[:, None]
-    lower, rest = _lower(limits, steady, elastic, shares, rest, mean / unit)
-    upper, slips = _upper(limits, steady, elastic, slips)
-    errors = contact.certificate.load_errors[scalar.touching] / contact.loads[scalar.touching]
-    doubt = float(errors.max()) + SAFETY
-    residual = np.zeros((len(contact.scene), 2))
-    residual[scalar.touching] = rest * unit
-    everywhere = np.zeros((len(vertices), len(contact.scene), 2))
-    everywhere[:, scalar.touching] = slips
-    total = contact.load
-    whole = np.broadcast_to(mean, vertices.shape)
-    gross = float(_largest(whole, vertices, np.full(len(vertices), total))[1])
-    return Melan(lower * (1 - doubt), upper * (1 + doubt), gross, residual, everywhere)
-
-
-def _shares(problem: VectorProblem) -> Array:
-    """(n, 2, 2) Y_i: forces q_i = Y_i Q under which all asperities move together, unslipped."""
-    n = len(problem)
-    stiffness = problem.kernel + np.diag(np.repeat(problem.stiffness, 2))
-    together = np.tile(np.eye(2), (n, 1))
-    moved = np.linalg.solve(stiffness, together)
-    return np.asarray((moved @ np.linalg.inv(together.T @ moved)).reshape(n, 2, 2))
+    problem = TangentialProblem.of(contact)
+    unit, touching, n = problem.units.force, problem.touching, len(problem.loads)
+    shares, m = vector_shares(contact), len(vertices)
+    checks.fits_in_memory("cones", m * n, 4000.0)
+    elastic = np.einsum("ijk,vk->vij", shares.values, vertices / unit)  # (m, n, 2)
+    errors = np.einsum("ik,vk->vi", shares.errors, np.abs(vertices) / unit)
+    steady = shares.values @ (mean / unit)
+    raw = run_clarabel(_program(shares.loads, steady, elastic), "shakedown", TOLERANCE)
+    rest = _inwards(shares.loads, steady + raw.x[1:].reshape(n, 2), mean / unit)
+    cones = raw.multipliers[2:].reshape(m, n, 3)
+    slips = _closed(-cones[..., 1:] / shares.loads[:, None])
+    everyone = np.zeros((m, len(contact.scene), 2))
+    everyone[:, touching] = slips
+    state = np.zeros((len(contact.scene), 2))
+    state[touching] = (rest - steady) * unit
+    return Melan(
+        factor=_largest(rest, elastic, shares.loads)[1],
+        lower=_lower(shares, rest, mean / unit, elastic, errors),
+        upper=_upper(shares, slips, mean / unit, elastic, errors),
+        gross=_largest(mean[None], vertices[:, None], np.array([contact.load]))[1],
+        rest=state,
+        slips=everyone,
+    )
 
 
 def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
-    """Unknowns lambda and rho; cones scaled by P_i."""
+    """Unknowns lambda and rho = r - steady; cones scaled by P_i."""
     from scipy.sparse import csc_matrix, hstack, identity, kron, vstack
 
     m, n, _ = elastic.shape
@@ -113,25 +104,41 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
     )
 
 
-def _lower(
-    limits: Array, steady: Array, elastic: Array, shares: Array, rest: Array, mean: Array
-) -> tuple[float, Array]:
-    """The largest lambda that the state admits, once it balances and is moved a little inwards."""
-    rest = rest - shares @ rest.sum(axis=0)
-    safe = limits[:, None] / limits.sum() * mean - steady
-    rest = rest + MARGIN * (safe - rest)
-    whole = np.broadcast_to(steady + rest, elastic.shape)
-    least, most = _largest(whole, elastic, np.broadcast_to(limits, elastic.shape[:-1]))
-    if not max(least, 0.0) <= most:
-        raise SolverError("the residual state is outside friction", solver="shakedown")
-    return most, rest
+def _inwards(limits: Array, state: Array, mean: Array) -> Array:
+    """(n, 2) a state at rest that adds up, and is moved a little towards one within friction."""
+    parts = limits[:, None] / limits.sum()
+    state = state + parts * (mean - state.sum(axis=0))
+    return np.asarray(state + MARGIN * (parts * mean - state))
+
+
+def _lower(shares: Shares, rest: Array, mean: Array, elastic: Array, errors: Array) -> float:
+    """The largest lambda that the state is sure to admit.
+
+    What it misses of the total is counted at every asperity, as no matter who is given it.
+    """
+    missing = float(np.hypot(*(rest.sum(axis=0) - mean)))
+    missing += 4 * len(rest) * ROUNDOFF * float(np.abs(rest).sum())
+    limits = (shares.loads - shares.load_errors - missing) * (1 - SAFETY)
+    if not np.isfinite(errors).all() or (limits <= 0).any():
+        return 0.0
+    least, most = _largest(rest, elastic, limits)
+    if not least <= 0.0 <= most:
+        return 0.0
+    limits = limits - most * errors  # more than any smaller lambda needs
+    if (limits <= 0).any():
+        return 0.0
+    least, most = _largest(rest, elastic, limits)
+    return most * (1 - SAFETY) if least <= 0.0 <= most else 0.0
 
 
 def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
-    """The least and largest lambda with |fixed + lambda scaled| <= limit everywhere."""
+    """The least and largest lambda with |fixed + lambda scaled| <= limit everywhere.
+
+    fixed : (n, 2);  scaled : (m, n, 2);  limits : (n,)
+    """
     a = (scaled**2).sum(axis=-1)
     b = (fixed * scaled).sum(axis=-1)
-    c = (fixed**2).sum(axis=-1) - limits**2
+    c = np.broadcast_to((fixed**2).sum(axis=-1) - limits**2, a.shape)
     moving = a > 0
     root = np.sqrt(np.maximum(b**2 - a * c, 0.0)[moving])
     if (b**2 < a * c)[moving].any() or (c[~moving] > 0).any():
@@ -140,17 +147,27 @@ def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
     return float(((-b - root) / a).max()), float(((-b + root) / a).min())
 
 
-def _upper(limits: Array, steady: Array, elastic: Array, slips: Array) -> tuple[float, Array]:
-    """The bound of the slips, made to close and scaled to unit work."""
+def _closed(slips: Array) -> Array:
+    """(m, n, 2) slips that add up to the same everywhere, exactly: they are whole numbers."""
+    largest = float(np.abs(slips).max())
+    if not largest > 0:
+        raise SolverError("the program was answered without a mechanism", solver="shakedown")
+    slips = np.round(slips * (STEPS / largest))
     net = slips.sum(axis=0)
-    together = net.mean(axis=0)
-    slips = slips.copy()
-    largest = np.hypot(slips[..., 0], slips[..., 1]).argmax(axis=0)
-    everyone = np.arange(len(limits))
-    slips[largest, everyone] += together - net
-    work = float((slips * elastic).sum())
-    if not work > 0:
-        raise SolverError("the slips do no work", solver="shakedown")
-    slips /= work
+    together = np.round(net.mean(axis=0))
+    most = np.hypot(slips[..., 0], slips[..., 1]).argmax(axis=0)
+    slips[most, np.arange(slips.shape[1])] += together - net
+    return np.asarray(slips)
+
+
+def _upper(shares: Shares, slips: Array, mean: Array, elastic: Array, errors: Array) -> float:
+    """What slips that close prove; infinite where they do no work."""
     sizes = np.hypot(slips[..., 0], slips[..., 1])
-    return float((sizes * limits).sum() - (slips * steady).sum()), slips
+    done = slips * elastic
+    doubt = float((sizes * errors).sum()) + 4 * done.size * ROUNDOFF * float(np.abs(done).sum())
+    work = float(done.sum()) - doubt
+    together = slips.sum(axis=0)[0]
+    given = together * mean
+    cost = float((sizes * (shares.loads + shares.load_errors)).sum()) * (1 + SAFETY)
+    cost += -float(given.sum()) + 4 * ROUNDOFF * float(np.abs(given).sum())
+    return cost / work * (1 + SAFETY) if work > 0 else np.inf

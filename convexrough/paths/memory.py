@@ -16,12 +16,18 @@ rational, as float64 numbers are, and every rule is exact.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
+from convexrough.drawn import Drawn
 from convexrough.errors import InputError
+from convexrough.frames import Variables
+from convexrough.record import Along, Table, in_words
 
 
 class Piece(NamedTuple):
@@ -39,8 +45,8 @@ class Piece(NamedTuple):
     load_after: Fraction
 
 
-@dataclass(frozen=True)
-class MemoryCurve:
+@dataclass(frozen=True, repr=False)
+class MemoryCurve(Table, Drawn):
     """A state: vertices (levels[k], heights[k]) from the origin, slopes[k] from k to k + 1.
 
     front : level L down to which the contact slipped last; None where all of it stuck last
@@ -49,6 +55,8 @@ class MemoryCurve:
     >>> float(curve.front), float(curve.heights[-1])
     (0.75, 0.25)
     """
+
+    _along: ClassVar[Along] = {("vertex",): ("levels", "heights"), ("layer",): ("slopes",)}
 
     levels: tuple[Fraction, ...] = (Fraction(0),)
     heights: tuple[Fraction, ...] = (Fraction(0),)
@@ -69,6 +77,22 @@ class MemoryCurve:
     def height(self) -> Fraction:
         """T."""
         return self.heights[-1]
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        """Rounded: fractions are long."""
+        for name, (_, values) in self._variables().items():
+            yield name, in_words(values)
+        yield "front", "none" if self.front is None else in_words(float(self.front))
+
+    def _variables(self) -> Variables:
+        return {
+            name: (along, np.array([float(value) for value in getattr(self, name)]))
+            for along, names in self._along.items()
+            for name in names
+        }
+
+    def _attributes(self) -> dict[str, Any]:
+        return {} if self.front is None else {"front": float(self.front)}
 
     @property
     def bends(self) -> list[tuple[Fraction, Fraction]]:

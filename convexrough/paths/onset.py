@@ -39,7 +39,8 @@ def onset(levels: Levels, asperity: int, below: float) -> Onset:
     )
     root = low if indentation(low) == 0 else brentq(indentation, low, high, xtol=1e-16 * high)
     if root == 0:
-        return Onset(0.0, 0.0, 0.0)
+        above = (below * part for part in TRIED)
+        return Onset(0.0, 0.0, next((s for s in above if levels.at(s).touching[asperity]), below))
     lower = next(
         (load for part in TRIED if _open(levels, asperity, load := root * (1 - part))), 0.0
     )

@@ -1,6 +1,6 @@
 """Order: no indentation falls as the load rises. Where it holds the memory curve is exact.
 
-docs/theory/load-paths.md, "When it is exact".
+docs/theory/load-path-proofs.md, "When it is exact".
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
+from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.influence import Kind
 from convexrough.paths.energy import loss
@@ -24,14 +26,15 @@ from convexrough.paths.memory import MemoryCurve, Piece
 from convexrough.paths.order import Order, order_of
 from convexrough.paths.state import levels_of, states_of, words
 from convexrough.progress import Announce
+from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
 #: General steps per segment where order fails: of second order, so good to about a per cent.
 STEPS = 8
 
 
-@dataclass(frozen=True, eq=False)
-class LoadPath:
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadPath(Table, Drawn):
     """A sequence of m points (P, Q), with straight segments between. Errors are proved bounds.
 
     loads, applied : (m,) P and Q [force]
@@ -52,6 +55,17 @@ class LoadPath:
     >>> path.order, path.status.shape, path.presses
     ('proved at the levels used', (1, 61), 1)
     """
+
+    _along: ClassVar[Along] = {
+        ("point",): (
+            *("loads", "applied", "displacements", "displacement_errors", "approaches"),
+            *("energy", "energy_errors", "fronts"),
+        ),
+        ("point", "asperity"): (
+            *("forces", "force_errors", "normal_loads"),
+            *("asperity_displacements", "drifts", "status"),
+        ),
+    }
 
     scene: Scene
     loads: Array
@@ -100,6 +114,20 @@ def load_path(
     >>> (path.displacements > 0).tolist(), path.presses
     ([False, True, True], 4)
     """
+    return walk(scene, loads, forces, start, influence, steps, announce)
+
+
+def walk(
+    scene: Scene,
+    loads: ArrayLike,
+    forces: ArrayLike,
+    start: Contact | None = None,
+    influence: Kind | None = None,
+    steps: int | None = None,
+    announce: Announce | None = None,
+    stepper: type[Stepper] = Stepper,
+) -> LoadPath:
+    """`load_path`, with a choice of how a general step is solved."""
     points = points_of(scene, loads, forces)
     curve = MemoryCurve()
     if start is not None:
@@ -118,7 +146,7 @@ def load_path(
         energy, energy_errors = np.cumsum([loss(levels, each) for each in costs], axis=0).T
         status = np.array([words(levels, each) for each in curves])
     else:
-        bundles = Stepper(levels).along(curve, points, _count(steps))
+        bundles = stepper(levels).along(curve, points, _count(steps))
         found, energy, status = stepped(levels, bundles)
         energy_errors = np.full(len(points), np.inf)
     here = [levels.at(load) for load, _ in points]

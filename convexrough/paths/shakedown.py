@@ -2,13 +2,13 @@
 
 The path is (P0, Q0) + factor (p, q). With T = Q / f, r+ and r- the largest -(p + t) and -(p - t) of
 its points, the permanently stuck level is  L* = P0 - factor (r+ + r-) / 2,  and asperity i slides
-for ever once L* falls below its onset sigma_i: docs/theory/load-paths.md, "Shakedown".
+for ever once L* falls below its onset sigma_i: docs/theory/shakedown.md, "The exact limit".
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,27 +16,32 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
+from convexrough.drawn import Drawn
 from convexrough.errors import InputError
+from convexrough.frames import Variables
 from convexrough.influence import Kind
 from convexrough.paths import melan
+from convexrough.paths.elastic_shares import scalar_shares
 from convexrough.paths.levels import Levels
 from convexrough.paths.onset import last_to_touch, onsets
 from convexrough.paths.order import Order, order_of
+from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
+from convexrough.shearing.problem import TangentialProblem
 from convexrough.shearing.state import MOST_ONSETS
 
 Theory = Literal["exact", "elastic", "vector"]
 
 
-@dataclass(frozen=True, eq=False)
-class Shakedown:
+@dataclass(frozen=True, eq=False, repr=False)
+class Shakedown(Table, Drawn):
     """The factor up to which sliding shakes down, from below by a state and above by slips.
 
     kind    : "exact": partial slip, any path; sliding of whole asperities ceases. "elastic" and
         "vector": Melan's theorem for asperities that stick until they slide, at constant load
-    factor  : least of `factors`, or of the program;  lower, upper : bounds on it, proved for
-        "exact" only: the others rest on elastic shares as they are computed
+    factor  : least of `factors`, or of the program;  lower, upper : proved bounds on it; 0 and
+        infinite where the loads are not proved, or the order that "exact" rests on
     factors : (n,) of each asperity that touches at the mean load, nan of others and where not
         looked for; one number for all by "vector"
     gross   : the factor at which all of them slide at once, beyond which there is no such path
@@ -44,12 +49,19 @@ class Shakedown:
         with what the path adds elastically
     mechanism : (n,) slips just beyond, the largest 1; (m, n, 2) of each vertex by "vector"
     order   : what "exact" rests on, at the levels used; None of the others
+    load, force : P0 and Q0 [force], Q0 (2,) by "vector"
+    load_amplitudes, force_amplitudes : (m,) p and q [force], q (m, 2) by "vector"
 
     >>> Q = 0.1 * contact.load
     >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
     >>> limit.lower <= limit.factor <= limit.upper
     True
     """
+
+    _along: ClassVar[Along] = {
+        ("asperity",): ("factors", "witness", "mechanism"),
+        ("vertex",): ("load_amplitudes", "force_amplitudes"),
+    }
 
     scene: Scene
     kind: Theory
@@ -60,12 +72,33 @@ class Shakedown:
     gross: float
     witness: Array
     mechanism: Array
+    load: float
+    force: float | Array
+    load_amplitudes: Array
+    force_amplitudes: Array
     order: Order | None = None
 
     @property
     def gap(self) -> float:
         """(upper - lower) / factor."""
         return (self.upper - self.lower) / self.factor if np.isfinite(self.factor) else 0.0
+
+    @property
+    def proved(self) -> bool:
+        """The bounds enclose the factor."""
+        return self.lower > 0 and bool(self.upper < np.inf or self.factor == np.inf)
+
+    def _variables(self) -> Variables:
+        """Vectors by "vector", whose mechanism has slips for each vertex."""
+        found = super()._variables()
+        if self.kind == "vector":
+            for name, along in (
+                ("witness", ("asperity", "direction")),
+                ("mechanism", ("vertex", "asperity", "direction")),
+                ("force_amplitudes", ("vertex", "direction")),
+            ):
+                found[name] = along, found[name][1]
+        return found
 
 
 def shakedown(
@@ -99,29 +132,50 @@ def shakedown(
         raise InputError("kind", found=repr(kind), expected='"exact", "elastic" or "vector"')
     if kind == "vector":
         Q0, q = _vectors("forces", forces, 1)[0], _vectors("force_amplitudes", force_amplitudes, 2)
-        p = checks.array("load_amplitudes", load_amplitudes, length=len(q))
-        t0, t = Q0 / f, q / f
     else:
-        Q0 = checks.finite("forces", float(np.asarray(forces)))
-        q = np.atleast_1d(checks.array("force_amplitudes", np.atleast_1d(force_amplitudes)))
-        p = checks.array("load_amplitudes", load_amplitudes, length=len(q))
-        t0, t = Q0 / f, q / f
+        Q0 = checks.finite("forces", cast("float", forces))
+        q = checks.array("force_amplitudes", np.atleast_1d(np.asarray(force_amplitudes)))
+    p = _alike("load_amplitudes", load_amplitudes, len(q))
+    t0, t = Q0 / f, q / f
     if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
         raise InputError("forces", found=forces, expected=f"less than f P = {f * P0:g} in size")
     if len(q) == 0 or not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
         expected = "a path that moves: at least two points, such as [Q, -Q]"
-        found = "one point" if len(q) else "none"
-        raise InputError("force_amplitudes", found=found, expected=expected)
+        given = "one point" if len(q) else "none"
+        raise InputError("force_amplitudes", found=given, expected=expected)
     if kind == "exact":
-        return _exact(scene, P0, float(t0), p, t, Levels(scene, P0, influence))
-    if np.any(p):
+        found = _exact(scene, P0, float(t0), p, t, Levels(scene, P0, influence))
+    elif np.any(p):
         expected = 'none: only "exact" holds where the normal load varies'
         raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)
-    contact = press(scene, load=P0, influence=influence)
-    return (_elastic if kind == "elastic" else _vector)(contact, t0, t)
+    else:
+        contact = press(scene, load=P0, influence=influence)
+        found = _elastic(contact, float(t0), t) if kind == "elastic" else _vector(contact, t0, t)
+    return Shakedown(
+        scene=scene,
+        kind=kind,
+        load=P0,
+        force=frozen(f * t0) if kind == "vector" else float(f * t0),
+        load_amplitudes=frozen(p),
+        force_amplitudes=frozen(q),
+        **found._asdict(),
+    )
 
 
-def _exact(scene: Scene, P0: float, t0: float, p: Array, t: Array, levels: Levels) -> Shakedown:
+class _Found(NamedTuple):
+    """As in `Shakedown`."""
+
+    factor: float
+    lower: float
+    upper: float
+    factors: Array
+    gross: float
+    witness: Array
+    mechanism: Array
+    order: Order | None = None
+
+
+def _exact(scene: Scene, P0: float, t0: float, p: Array, t: Array, levels: Levels) -> _Found:
     f = checks.friction(scene.friction)
     plus, minus = float((-(p + t)).max()), float((-(p - t)).max())
     fall = (plus + minus) / 2  # of L*, per factor
@@ -137,82 +191,97 @@ def _exact(scene: Scene, P0: float, t0: float, p: Array, t: Array, levels: Level
     sure = next((each for each in levels.known if each.touching[touching].all()), levels.at(P0))
     beyond = levels.at(worst.lower)
     lower, upper = ((P0 - s) / fall if fall > 0 else np.inf for s in (sure.load, beyond.load))
+    order = order_of(levels, [levels.at(0.0), sure, levels.at(P0)])
     height = t0 - lower * (plus - minus) / 2 if fall > 0 else t0
     gaps = np.maximum(-beyond.indentations, 0.0) * (levels.at(P0).loads > 0)
-    return Shakedown(
-        scene=scene,
-        kind="exact",
+    proved = order.startswith("proved") and bool(sure.touching[touching].all())
+    return _Found(
         factor=float(factors[last]),
-        lower=lower * (1 - SAFETY),
-        upper=upper * (1 + SAFETY),
+        lower=lower * (1 - SAFETY) if proved else 0.0,
+        upper=upper * (1 + SAFETY) if proved else np.inf,
         factors=frozen(factors),
         gross=gross,
         witness=frozen(f * height / (sure.load or 1.0) * sure.loads),
         mechanism=frozen(gaps / (gaps.max() or 1.0)),
-        order=order_of(levels, [levels.at(0.0), sure, levels.at(P0)]),
+        order=order,
     )
 
 
-def _elastic(contact: Contact, t0: float, t: Array) -> Shakedown:
+def _elastic(contact: Contact, t0: float, t: Array) -> _Found:
     """The scalar program in closed form: alternating slip of one asperity, or gross sliding."""
     f = checks.friction(contact.scene.friction)
-    shares = melan.elastic_shares(contact)
+    problem, shares = TangentialProblem.of(contact), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())
-    reach = np.abs(shares) * (high - low)
-    alternating = np.divide(
-        2.0 * contact.loads, reach, out=np.full_like(reach, np.inf), where=reach > 0
-    )
-    gross = min(
+    q, P, doubt, off = shares.values, shares.loads, shares.load_errors, shares.errors
+
+    def limits(loads: Array, sizes: Array) -> Array:
+        """Of each asperity: it slides to and fro where the range of its share is 2 P_i."""
+        reach = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
+        return np.divide(2.0 * loads, reach, out=np.full_like(loads, np.inf), where=reach > 0)
+
+    each = limits(P, np.abs(q))
+    sliding = min(
         (contact.load - t0) / high if high > 0 else np.inf,
         (contact.load + t0) / -low if low < 0 else np.inf,
     )
-    loaded = contact.loads > 0
-    factors = np.where(loaded, alternating, np.nan)
-    critical = int(np.nanargmin(factors))
-    factor = min(float(factors[critical]), gross)
+    factor = min(float(each.min()), sliding)
+    lower = min(float(limits(np.maximum(P - doubt, 0.0), np.abs(q) + off).min()), sliding)
+    upper = min(float(limits(P + doubt, np.abs(q) - off).min()), sliding)
+    proved = bool(np.isfinite(off).all())
+    critical = np.arange(len(P)) == int(np.argmin(each)) if factor < sliding else np.ones(len(P))
     # At rest each asperity has room from -P_i - factor q_i low to P_i - factor q_i high.
-    room_low = -contact.loads - factor * np.minimum(shares * low, shares * high)
-    room_high = contact.loads - factor * np.maximum(shares * low, shares * high)
+    travelled = np.outer(factor * q / problem.units.force, (low, high))
+    room_low, room_high = -P - travelled.min(axis=1), P - travelled.max(axis=1)
     width = room_high - room_low
-    part = (t0 - room_low.sum()) / (width.sum() or 1.0)
-    mechanism = (np.arange(len(loaded)) == critical) | (factor == gross) & loaded
-    doubt = float((contact.certificate.load_errors[loaded] / contact.loads[loaded]).max()) + 1e-12
-    return Shakedown(
-        scene=contact.scene,
-        kind="elastic",
+    part = (t0 / problem.units.force - room_low.sum()) / (width.sum() or 1.0)
+    factors = np.full(len(contact.scene), np.nan)
+    factors[problem.touching] = each
+    return _Found(
         factor=factor,
-        lower=factor * (1 - doubt),
-        upper=factor * (1 + doubt),
+        lower=lower * (1 - SAFETY) if proved else 0.0,
+        upper=upper * (1 + SAFETY) if proved else np.inf,
         factors=frozen(factors),
-        gross=gross,
-        witness=frozen(f * (room_low + part * width)),
-        mechanism=frozen(mechanism.astype(np.float64)),
+        gross=sliding,
+        witness=frozen(problem.to_scene(f * problem.units.force * (room_low + part * width))),
+        mechanism=frozen(problem.to_scene(np.asarray(critical, dtype=np.float64))),
     )
 
 
-def _vector(contact: Contact, t0: Array, t: Array) -> Shakedown:
+def _vector(contact: Contact, t0: Array, t: Array) -> _Found:
     f = checks.friction(contact.scene.friction)
     found = melan.solve(contact, t0, t)
     slips = np.hypot(*np.moveaxis(found.slips, -1, 0)).max()
-    return Shakedown(
-        scene=contact.scene,
-        kind="vector",
-        factor=(found.lower + found.upper) / 2,
+    return _Found(
+        factor=found.factor,
         lower=found.lower,
         upper=found.upper,
-        factors=frozen(np.where(contact.loads > 0, (found.lower + found.upper) / 2, np.nan)),
+        factors=frozen(np.where(contact.loads > 0, found.factor, np.nan)),
         gross=found.gross,
-        witness=frozen(f * found.residual),
-        mechanism=frozen(found.slips / (slips or 1.0)),
+        witness=frozen(f * found.rest),
+        mechanism=frozen(found.slips / slips),
     )
 
 
 def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
     """(m, 2) of forces in the plane; one of them, or a number along x, if one is expected."""
-    given = np.asarray(values, dtype=np.float64)
+    try:
+        given = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(what, found=repr(values)[:60], expected="numbers") from error
     if given.ndim == 0 and dimensions == 1:
         given = np.array([float(given), 0.0])
     if given.ndim != dimensions or given.shape[-1] != 2 or not np.isfinite(given).all():
         shape = "two finite numbers" if dimensions == 1 else "finite numbers of shape (m, 2)"
         raise InputError(what, found=f"shape {given.shape}", expected=shape)
     return np.atleast_2d(given)
+
+
+def _alike(what: str, values: ArrayLike, count: int) -> Array:
+    """(count,) of amplitudes; a number stands for as many of it."""
+    given = checks.array(what, np.atleast_1d(np.asarray(values)))
+    if np.ndim(values) == 0:
+        return frozen(np.full(count, float(given[0])))
+    if len(given) != count:
+        expected = f"{count}, as many as of force_amplitudes"
+        raise InputError(what, found=f"{len(given)} values", expected=expected)
+    return given

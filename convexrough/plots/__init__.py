@@ -8,16 +8,21 @@ of dense scenes are pixels inside a vector file: save that with a `dpi` too.
 """
 
 from convexrough.plots.axes import plot
+from convexrough.plots.closed_path import phase_figures, steady_figures
 from convexrough.plots.cycle import cycle_figures
+from convexrough.plots.gradient import gradient_figures
 from convexrough.plots.history import history_figures
-from convexrough.plots.path import path_figures, shakedown_figures, steady_figures
+from convexrough.plots.path import path_figures
 from convexrough.plots.press import press_figures
+from convexrough.plots.shakedown import shakedown_figures
 from convexrough.plots.shear import shear_figures
 
 __all__ = [
     "cycle_figures",
+    "gradient_figures",
     "history_figures",
     "path_figures",
+    "phase_figures",
     "plot",
     "press_figures",
     "shakedown_figures",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any
 
@@ -12,10 +13,21 @@ from convexrough.arrays import Array
 from convexrough.compare import Comparison
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.gradients.gradient import Gradient
+from convexrough.paths.memory import MemoryCurve
+from convexrough.paths.path import LoadPath
+from convexrough.paths.phases import PhaseLosses
+from convexrough.paths.shakedown import Shakedown
+from convexrough.paths.side_by_side import PathComparison
+from convexrough.paths.steady import Steady
+from convexrough.plots.closed_path import draw_losses
 from convexrough.plots.cycle import few_ticks, smooth_loop
+from convexrough.plots.gradient import draw_gradient
 from convexrough.plots.history import between_steps
+from convexrough.plots.load_plane import draw_closed, draw_curve, draw_path
 from convexrough.plots.notebook import Figure
 from convexrough.plots.press import draw_pressure, draw_pressure_bar
+from convexrough.plots.shakedown import draw_factors
 from convexrough.plots.shear import State, draw_state, legend_handles, state_title
 from convexrough.plots.style import (
     DASHED,
@@ -43,8 +55,10 @@ def plot(
     """Draw the main picture of a result, and return the axes it is in.
 
     result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
-        Cycle: its loop, History: its path, Q against X; Verdict: map of who is not as claimed;
-        Comparison: what each solver took
+        Cycle: its loop, History: its path, Q against X; Gradient: map of who matters; Verdict:
+        map of who is not as claimed; Comparison: what each solver took; LoadPath, MemoryCurve,
+        Steady: the plane of loads; PhaseLosses: loss against phase; Shakedown: map of the factors;
+        PathComparison: what each way took
     axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
     length_unit, force_unit : only said, never converted
 
@@ -115,6 +129,11 @@ def _(past: History, axes: Axes, length_unit: str, force_unit: str) -> None:
 
 
 @_draw.register
+def _(gradient: Gradient, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_gradient(axes, gradient, Scale.of(gradient.contact, length_unit, force_unit))
+
+
+@_draw.register
 def _(verdict: Verdict, axes: Axes, length_unit: str, force_unit: str) -> None:
     draw_claim(axes, verdict, verdict.scene.asperities.positions, length_unit)
 
@@ -128,11 +147,51 @@ def _(comparison: Comparison, axes: Axes, length_unit: str, force_unit: str) -> 
                       va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
         else:
             axes.plot(entry.contact.seconds, place, "o", color=ROUGH)
-    names = [entry.solver for entry in comparison.entries]
+    _name_rows(axes, [entry.solver for entry in comparison.entries])
+
+
+def _name_rows(axes: Axes, names: Sequence[str]) -> None:
     axes.set(xscale="log", ylim=(len(names) - 0.5, -0.5))
     axes.set_yticks(range(len(names)), names, fontsize=TICK)
     few_ticks(axes.xaxis)
     label(axes, "time [s]", "")
+
+
+@_draw.register
+def _(path: LoadPath, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_path(axes, path, force_unit)
+
+
+@_draw.register
+def _(curve: MemoryCurve, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_curve(axes, curve, force_unit)
+
+
+@_draw.register
+def _(closed: Steady, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_closed(axes, closed, force_unit)
+
+
+@_draw.register
+def _(losses: PhaseLosses, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_losses(axes, losses, length_unit, force_unit)
+
+
+@_draw.register
+def _(comparison: PathComparison, axes: Axes, length_unit: str, force_unit: str) -> None:
+    """What each way took, from above; those without an answer say so."""
+    for place, entry in enumerate(comparison.entries):
+        if entry.path is None:
+            axes.text(0.02, place, entry.outcome, transform=axes.get_yaxis_transform(),
+                      va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
+        else:
+            axes.plot(entry.seconds, place, "o", color=ROUGH)
+    _name_rows(axes, [entry.way for entry in comparison.entries])
+
+
+@_draw.register
+def _(limit: Shakedown, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_factors(axes, limit, length_unit)
 
 
 def _against(axes: Axes, scale: ShearScale, x: Array, q: Array, **look: Any) -> None:

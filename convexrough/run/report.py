@@ -100,6 +100,13 @@ def describe_varied(summary: Summary, length_unit: str, force_unit: str) -> list
         heading = ["stuck level", "energy", "error", "partial", "slide", "intermittent"]
         lines += _numbers(heading, [[steady[key] for key in keys]])
         lines.append(f"order of indentations: {steady['order']}")
+    if losses := summary.get("phase_losses"):
+        lines += ["", _titled("loss against phase", f"energy {work}")]
+        keys = ["phase", "factor", "energy", "smooth"]
+        rows = list(zip(*(losses[key] for key in keys), strict=True))
+        if len(rows) > 20:
+            lines.append(f"(the last 20 of {len(rows)} ellipses; all are in phase_losses.csv)")
+        lines += _numbers(["phase", "factor", "energy", "smooth sphere"], rows[-20:])
     if limit := summary.get("shakedown"):
         lines += ["", f"shakedown  ({limit['kind']})"]
         keys = ["factor", "lower", "upper", "gross"]
@@ -172,9 +179,11 @@ def warnings(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
     for stage in ("path", "steady"):
         if unsure := summary.get(stage, {}).get("undecided", 0):
             found.append(f"not certified: {unsure} words in {stage} undecided")
-    for stage in ("path", "steady", "shakedown"):
+    for stage in ("path", "steady", "phase_losses", "shakedown"):
         if summary.get(stage, {}).get("order") in ("checked", "fails"):
             found.append(f"not proved: the order of indentations, on which [{stage}] rests")
+    if not summary.get("shakedown", {}).get("proved", True):
+        found.append("not proved: any bounds on the limit of [shakedown]")
     for stage in ("shear", "cycle"):
         doubtful = sum(1 for row in summary.get(stage, ()) if row["undecided"])
         if doubtful:

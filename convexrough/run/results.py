@@ -186,6 +186,8 @@ def _draw(found: Findings, units: UnitNames) -> dict[str, Figure]:
         figures |= plots.path_figures(varied.path, **names)
     if varied.steady is not None:
         figures |= plots.steady_figures(varied.steady, **names)
+    if varied.phase_losses is not None:
+        figures |= plots.phase_figures(varied.phase_losses, **names)
     if varied.shakedown is not None:
         figures |= plots.shakedown_figures(varied.shakedown, **names)
     return figures

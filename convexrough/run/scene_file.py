@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from convexrough.record import Record
 from convexrough.run.stages import Stages
 from convexrough.run.tables import few, read_summits, read_text
 from convexrough.run.toml_slips import explained
-from convexrough.run.varying import Limit, Points, Varying
+from convexrough.run.varying import Limit, Phases, Points, Varying
 from convexrough.scene.asperities import Asperities, largest_tip_radius
 from convexrough.scene.material import Material
 from convexrough.scene.patterns import CUT_DEVIATIONS
@@ -140,7 +140,7 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
 def _varying(tables: Document) -> Varying:
     """The paths of a file, in its units."""
     friction = tables.friction.coefficient if tables.friction else 0.0
-    found: dict[str, Points] = {}
+    found: dict[str, Any] = {}
     for name in ("path", "steady"):
         if (table := getattr(tables, name)) is None:
             continue
@@ -149,12 +149,24 @@ def _varying(tables: Document) -> Varying:
         else:
             loads, forces = np.array(table.loads), np.array(table.forces)
         found[name] = Points(table.reference * loads, table.reference * forces)
+    closed = tables.steady
+    if closed is not None and closed.ellipse is not None and closed.phases:
+        shape = closed.ellipse
+        found["phases"] = Phases(
+            load=closed.reference * shape.load,
+            load_amplitude=closed.reference * shape.load_amplitude,
+            force=closed.reference * shape.force,
+            force_amplitude=closed.reference * shape.force_amplitude,
+            phases=tuple(closed.phases),
+            factors=tuple(closed.factors),
+            chords=shape.chords,
+        )
     limit = None
     if (table := tables.shakedown) is not None:
         amplitudes = table.load_amplitudes or [0.0] * len(table.force_amplitudes)
         limit = Limit(
             table.reference * table.loads,
-            table.reference * table.forces,
+            table.reference * np.array(table.forces),
             table.reference * np.array(amplitudes),
             table.reference * np.array(table.force_amplitudes),
             table.kind,

@@ -69,7 +69,16 @@ InfluenceName = Annotated[str, _expected(f"one of: {', '.join(KINDS)}", KINDS.__
 SolverName = Annotated[str, _expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)]
 
 
-ShakedownKind = Annotated[Literal["exact", "elastic"], _expected('"exact" or "elastic"')]
+ShakedownKind = Annotated[
+    Literal["exact", "elastic", "vector"], _expected('"exact", "elastic" or "vector"')
+]
+Pair = Annotated[
+    list[Finite], _expected("a pair [x, y] of finite numbers", lambda value: len(value) == 2)
+]
+Force = Annotated[
+    Annotated[Finite, Tag("number")] | Annotated[Pair, Tag("list")],
+    Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
+]
 
 
 class Table(BaseModel):
@@ -194,11 +203,17 @@ class Path(Table):
             yield f"loads, forces: found {found}, expected as many of both, at least one"
 
 
+class Steady(Path):
+    needs: ClassVar = {"phases": "ellipse", "factors": "phases"}
+    phases: Annotated[list[Finite], _expected("a list of finite numbers", bool)] | None = None
+    factors: Annotated[list[Positive], _expected("a list of positive numbers", bool)] = [1.0]
+
+
 class Shakedown(Table):
     loads: Positive
-    forces: Finite = 0.0
+    forces: Force = 0.0
     load_amplitudes: list[Finite] | None = None
-    force_amplitudes: list[Finite]
+    force_amplitudes: list[Force]
     kind: ShakedownKind = "exact"
     reference: Positive = 1.0
 
@@ -206,6 +221,13 @@ class Shakedown(Table):
         if self.load_amplitudes and len(self.load_amplitudes) != len(self.force_amplitudes):
             found = len(self.load_amplitudes)
             yield f"load_amplitudes: found {found} values, expected {len(self.force_amplitudes)}"
+        pairs = self.kind == "vector"
+        expected = 'a pair [x, y] with kind = "vector"' if pairs else "a number with this kind"
+        if isinstance(self.forces, list) != pairs and self.forces != 0.0:
+            yield f"forces: found {self.forces}, expected {expected}"
+        for i, force in enumerate(self.force_amplitudes):
+            if isinstance(force, list) != pairs:
+                yield f"force_amplitudes[{i}]: found {force}, expected {expected}"
 
 
 class Solver(Table):
@@ -231,7 +253,7 @@ class Document:
     cycle: Cycle | None = None
     history: History | None = None
     path: Path | None = None
-    steady: Path | None = None
+    steady: Steady | None = None
     shakedown: Shakedown | None = None
     solver: Solver = field(default_factory=Solver)
     units: Units = field(default_factory=Units)
@@ -247,7 +269,7 @@ _TABLES: dict[str, tuple[type[Table], ...]] = {
     "cycle": (Cycle,),
     "history": (History,),
     "path": (Path,),
-    "steady": (Path,),
+    "steady": (Steady,),
     "shakedown": (Shakedown,),
     "solver": (Solver,),
     "units": (Units,),

@@ -91,10 +91,18 @@ def comparison_summary(comparison: Comparison) -> Summary:
 
 
 def proved(summary: Summary) -> bool:
-    """Every asperity has a proved word, in every stage."""
+    """Every asperity has a proved word, in every stage, and so is the order that words rest on."""
     stages = [summary["normal"], *summary.get("shear", ()), *summary.get("cycle", ())]
     stages += [summary[name] for name in ("path", "steady") if name in summary]
     scope = summary["normal"]["certificate"]["scope"]
+    ordered = ("path", "steady", "phase_losses")
+    rests = [summary[name]["order"] for name in ordered if name in summary]
+    if (limit := summary.get("shakedown")) is not None:
+        rests.append(limit["order"] or "proved")
+        if not limit["proved"]:
+            return False
+    if not all(order.startswith("proved") for order in rests):
+        return False
     return scope != "none" and not any(stage["undecided"] for stage in stages)
 
 
@@ -160,6 +168,7 @@ def _entry_summary(entry: Entry) -> Summary:
             "duality_gap": proof.duality_gap,
             "iterations": contact.iterations,
             "seconds": contact.seconds,
+            "influence": contact.influence,
         }
     return row
 

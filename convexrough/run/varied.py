@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.contact import Contact
+from convexrough.paths.shakedown import Shakedown
 from convexrough.run.varying import Varied
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
@@ -60,9 +61,31 @@ def varied_tables(found: Varied, contact: Contact) -> Iterator[tuple[str, Column
     if (closed := found.steady) is not None:
         columns = {"slip": closed.slips, "stick_radius": closed.stick_radii}
         yield "steady", {"x": x, "y": y, **columns, "status": closed.status}
+    if (losses := found.phase_losses) is not None:
+        yield (
+            "phase_losses",
+            {
+                "phase": losses.phases,
+                "factor": losses.factors,
+                "energy": losses.energy,
+                "energy_error": losses.energy_errors,
+                "smooth": losses.smooth,
+                "level": losses.levels,
+                "sliding": losses.sliding,
+            },
+        )
     if (limit := found.shakedown) is not None:
-        columns = {"factor": limit.factors, "witness": limit.witness, "slip": limit.mechanism}
-        yield "shakedown", {"x": x, "y": y, **columns}
+        yield "shakedown", {"x": x, "y": y, "factor": limit.factors, **_witnesses(limit)}
+
+
+def _witnesses(limit: Shakedown) -> Columns:
+    """The state at rest and the mechanism; with vectors their components, of each vertex."""
+    if limit.kind != "vector":
+        return {"witness": limit.witness, "slip": limit.mechanism}
+    columns = {f"witness_{name}": limit.witness[:, k] for k, name in enumerate("xy")}
+    for v, slips in enumerate(limit.mechanism):
+        columns |= {f"slip_{v}_{name}": slips[:, k] for k, name in enumerate("xy")}
+    return columns
 
 
 def varied_summary(found: Varied) -> dict[str, Any]:
@@ -94,6 +117,14 @@ def varied_summary(found: Varied) -> dict[str, Any]:
             "order": closed.order,
             "presses": closed.presses,
         }
+    if (losses := found.phase_losses) is not None:
+        summary["phase_losses"] = {
+            "phase": losses.phases.tolist(),
+            "factor": losses.factors.tolist(),
+            "energy": losses.energy.tolist(),
+            "smooth": losses.smooth.tolist(),
+            "order": losses.order,
+        }
     if (limit := found.shakedown) is not None:
         summary["shakedown"] = {
             "kind": limit.kind,
@@ -101,6 +132,7 @@ def varied_summary(found: Varied) -> dict[str, Any]:
             "lower": limit.lower,
             "upper": limit.upper,
             "gross": limit.gross,
+            "proved": limit.proved,
             "order": limit.order,
         }
     return summary

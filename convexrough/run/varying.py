@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.paths.path import LoadPath, load_path
-from convexrough.paths.shakedown import Shakedown, shakedown
+from convexrough.paths.phases import PhaseLosses, phase_losses
+from convexrough.paths.shakedown import Shakedown, Theory, shakedown
 from convexrough.paths.steady import Steady, steady
 from convexrough.progress import Announce
 
@@ -22,14 +23,26 @@ class Points(NamedTuple):
     forces: Array
 
 
+class Phases(NamedTuple):
+    """An ellipse, in the words of `phase_losses` [force], and which phases and factors of it."""
+
+    load: float
+    load_amplitude: float
+    force: float
+    force_amplitude: float
+    phases: tuple[float, ...]
+    factors: tuple[float, ...]
+    chords: int
+
+
 class Limit(NamedTuple):
-    """A mean P and Q [force], and amplitudes (m,) to be scaled."""
+    """A mean P and Q [force], and amplitudes (m,) to be scaled; Q (2,) and (m, 2) by "vector"."""
 
     loads: float
-    forces: float
+    forces: Array
     load_amplitudes: Array
     force_amplitudes: Array
-    kind: Literal["exact", "elastic"]
+    kind: Theory
 
 
 class Varied(NamedTuple):
@@ -37,20 +50,26 @@ class Varied(NamedTuple):
 
     path: LoadPath | None = None
     steady: Steady | None = None
+    phase_losses: PhaseLosses | None = None
     shakedown: Shakedown | None = None
 
 
 class Varying(NamedTuple):
-    """What is asked for: a path from no load, a closed path, and how far a path may be scaled."""
+    """What is asked for.
+
+    path, steady : a path from no load, and a closed path;  phases : of an ellipse
+    shakedown    : how far a path may be scaled
+    """
 
     path: Points | None = None
     steady: Points | None = None
+    phases: Phases | None = None
     shakedown: Limit | None = None
 
     def compute(self, contact: Contact, announce: Announce | None = None) -> Varied:
         """All of it, on the scene of a contact and with its kind of coupling."""
         scene, influence = contact.scene, contact.influence
-        path = closed = limit = None
+        path = closed = losses = limit = None
         if self.path is not None:
             with _blamed_on("path"):
                 path = load_path(
@@ -61,10 +80,15 @@ class Varying(NamedTuple):
                 closed = steady(
                     scene, **self.steady._asdict(), influence=influence, announce=announce
                 )
+        if self.phases is not None:
+            with _blamed_on("steady"):
+                losses = phase_losses(
+                    scene, **self.phases._asdict(), influence=influence, announce=announce
+                )
         if self.shakedown is not None:
             with _blamed_on("shakedown"):
                 limit = shakedown(scene, **self.shakedown._asdict(), influence=influence)
-        return Varied(path, closed, limit)
+        return Varied(path, closed, losses, limit)
 
 
 @contextmanager

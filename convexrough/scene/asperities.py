@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,21 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.scene.lattice import Lattice
-from convexrough.scene.neighbours import refuse_coincident
+from convexrough.scene.layout import Layout
 from convexrough.scene.patterns import (
     CUT_DEVIATIONS,
+    HEXAGONAL,
+    SQUARE,
+    Pattern,
     checked_seed,
     cut_normal,
-    hexagonal_sites,
-    square_sites,
 )
-
-#: Of more asperities than this, a lattice is looked for before the nearest neighbours of all.
-MANY = 5000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,28 +46,54 @@ class Asperities(Record):
     ) -> None:
         points = _points(positions)
         object.__setattr__(self, "positions", points)
-        n = len(points)
-        least = checks.SMALLEST
+        self._wear(tip_radii, heights)
+        self.layout  # noqa: B018, which refuses two at one place
+
+    def _wear(self, tip_radii: ArrayLike, heights: ArrayLike) -> None:
+        n, least = len(self), checks.SMALLEST
         radii = checks.array("tip_radii", tip_radii, length=n, sign="positive", smallest=least)
         object.__setattr__(self, "tip_radii", radii)
         tall = checks.array("heights", heights, length=n, smallest=least)
         object.__setattr__(self, "heights", tall)
-        if n <= MANY or self.lattice is None:
-            refuse_coincident(points)
+
+    def with_tips(self, tip_radii: ArrayLike, heights: ArrayLike = 0.0) -> Asperities:
+        """Other tips at the same positions; arguments as for `Asperities`.
+
+        What follows from the positions alone, such as their lattice and their distances, is found
+        once and shared: for many scenes on one array.
+
+        >>> asperities = scene.asperities
+        >>> rougher = asperities.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
+        >>> rougher.positions is asperities.positions
+        True
+        """
+        return self._on(self.layout, tip_radii, heights)
+
+    @classmethod
+    def _on(cls, layout: Layout, tip_radii: ArrayLike, heights: ArrayLike) -> Asperities:
+        asperities = object.__new__(cls)
+        object.__setattr__(asperities, "positions", layout.points)
+        object.__setattr__(asperities, "layout", layout)
+        asperities._wear(tip_radii, heights)
+        return asperities
 
     def __len__(self) -> int:
         return len(self.positions)
 
     @cached_property
+    def layout(self) -> Layout:
+        """What follows from the positions alone."""
+        return Layout(self.positions)
+
+    @property
     def lattice(self) -> Lattice | None:
         """What the summits lie on, each on a site of its own, if that is a lattice."""
-        return Lattice.through(self.positions)
+        return self.layout.lattice
 
-    @cached_property
+    @property
     def distances(self) -> Array:
         """(n,) [length] distance of each summit from the axis."""
-        x, y = self.positions.T
-        return frozen(np.hypot(x, y))
+        return self.layout.distances
 
     @classmethod
     def hexagonal(
@@ -97,7 +120,7 @@ class Asperities(Record):
         radii, as they were.
         """
         rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(hexagonal_sites, 2 / np.sqrt(3), spacing, tip_radius, within, *rough)
+        return cls._lattice(HEXAGONAL, spacing, tip_radius, within, *rough)
 
     @classmethod
     def square(
@@ -112,13 +135,12 @@ class Asperities(Record):
     ) -> Asperities:
         """A square lattice, one asperity on the axis; arguments as for `hexagonal`."""
         rough = (height_std, tip_radius_cv, seed)
-        return cls._lattice(square_sites, 1.0, spacing, tip_radius, within, *rough)
+        return cls._lattice(SQUARE, spacing, tip_radius, within, *rough)
 
     @classmethod
     def _lattice(
         cls,
-        sites: Callable[[float], tuple[Array, Indices]],
-        density: float,
+        pattern: Pattern,
         spacing: float,
         tip_radius: ArrayLike,
         within: float,
@@ -130,12 +152,10 @@ class Asperities(Record):
         within = checks.non_negative("within", within)
         height_std = checks.non_negative("height_std", height_std)
         tip_radius_cv = checks.non_negative("tip_radius_cv", tip_radius_cv)
-        checks.fits_in_memory("spacing", np.pi * density * (within / spacing) ** 2 + 1, 300)
+        checks.fits_in_memory("spacing", np.pi * pattern.density * (within / spacing) ** 2 + 1, 300)
 
-        unit, norms = sites((within / spacing) ** 2 * (1 + 1e-12))
-        angles = np.arctan2(unit[:, 1], unit[:, 0]) % (2 * np.pi)
-        unit = unit[np.lexsort((angles, norms))]
-        n = len(unit)
+        layout = Layout.of(pattern, spacing, (within / spacing) ** 2 * (1 + 1e-12))
+        n = len(layout.points)
         radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
         heights = np.zeros(n)
         if height_std > 0 or tip_radius_cv > 0:
@@ -143,7 +163,7 @@ class Asperities(Record):
             heights = height_std * cut_normal(n, seed, stream=0)
             width = np.sqrt(np.log1p(tip_radius_cv**2))
             radii = radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
-        return cls(spacing * unit, radii, heights)
+        return cls._on(layout, radii, heights)
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.checks import SMALLEST
 
-Sites = NDArray[np.int64]
+Sites = NDArray[Any]  # of whole numbers
 
 #: Points may be off a lattice by this many roundoffs of the largest coordinate: a few more than
 #: computing them in float64 loses.

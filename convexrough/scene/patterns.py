@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
@@ -12,27 +16,51 @@ from convexrough.errors import InputError
 CUT_DEVIATIONS = 6.0
 
 
-def hexagonal_sites(limit: float) -> tuple[Array, Indices]:
-    """Sites (i + j/2, sqrt(3)/2 j) with i^2 + i j + j^2 <= limit, and these squared distances."""
-    top = int(np.sqrt(4 * limit / 3)) + 1
-    i, j = _integers(top)
-    norms = i * i + i * j + j * j
-    keep = norms <= limit
-    i, j = i[keep], j[keep]
-    return np.column_stack((i + 0.5 * j, np.sqrt(0.75) * j)), norms[keep]
+@dataclass(frozen=True)
+class Pattern:
+    """Sites i b1 + j b2 of a lattice whose shortest distance is 1: the norm is |i b1 + j b2|^2.
+
+    skew   : the norm is i^2 + skew i j + j^2
+    second : b2; b1 is (1, 0)
+    """
+
+    skew: int
+    second: tuple[float, float]
+
+    @property
+    def basis(self) -> Array:
+        return np.array([[1.0, 0.0], self.second])
+
+    @property
+    def density(self) -> float:
+        """Sites in a unit of area."""
+        return 1.0 / self.second[1]
+
+    def within(self, limit: float) -> tuple[NDArray[np.int32], Indices]:
+        """(n, 2) i and j of the sites of norms up to a limit, by norm and then by angle; and the
+        order (n,) that sorts them by i and then by j."""
+        top = int(np.sqrt(limit / (1.0 - self.skew**2 / 4.0))) + 1
+        steps = np.arange(-top, top + 1)
+        norms = np.add.outer(steps * steps, steps * steps)
+        if self.skew:
+            norms += np.multiply.outer(self.skew * steps, steps)
+        taken = norms <= limit
+        i, j = (each - top for each in np.nonzero(taken))
+        x, y = self.coordinates(i, j)
+        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # below 1, which is between two norms
+        order = np.argsort(norms[taken] + turns)
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        return np.stack((i[order], j[order]), axis=1).astype(np.int32), back
+
+    def coordinates(self, i: NDArray[Any], j: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """x and y of i b1 + j b2."""
+        return i + self.second[0] * j, self.second[1] * j
 
 
-def square_sites(limit: float) -> tuple[Array, Indices]:
-    """Sites (i, j) with i^2 + j^2 <= limit, and these squared distances."""
-    i, j = _integers(int(np.sqrt(limit)) + 1)
-    norms = i * i + j * j
-    keep = norms <= limit
-    return np.column_stack((i[keep], j[keep])).astype(np.float64), norms[keep]
-
-
-def _integers(top: int) -> tuple[Indices, Indices]:
-    i, j = np.meshgrid(np.arange(-top, top + 1), np.arange(-top, top + 1))
-    return i.ravel(), j.ravel()
+#: Six nearest neighbours, and four.
+HEXAGONAL = Pattern(1, (0.5, float(np.sqrt(0.75))))
+SQUARE = Pattern(0, (0.0, 1.0))
 
 
 def checked_seed(seed: int | None) -> int:

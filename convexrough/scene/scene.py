@@ -12,8 +12,9 @@ from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.errors import InputError
 from convexrough.record import Record
-from convexrough.scene.asperities import MANY, Asperities
+from convexrough.scene.asperities import Asperities
 from convexrough.scene.lattice import Lattice
+from convexrough.scene.layout import MANY
 from convexrough.scene.material import Material
 from convexrough.scene.neighbours import refuse_coincident
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,10 @@ from convexrough.shearing.normal_map import States
 from convexrough.shearing.state import forces_at
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
+
+if TYPE_CHECKING:
+    from convexrough.gradients.adjoint import Holding
+    from convexrough.gradients.gradient import Gradient
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,6 +106,22 @@ class Cycle(Table, Drawn):
         """
         stored = self.force_amplitude * self.displacement_amplitude / 2.0
         return self.energy / (2.0 * np.pi * stored) if stored > 0 else np.nan
+
+    def gradient(self, *, holding: Holding | None = None, tolerance: float = 1e-9) -> Gradient:
+        """Derivatives of the energy with respect to the scene: two linear systems.
+
+        holding, tolerance : as in `Contact.gradient`; the forces are held
+
+        Raises InputError in gross sliding where several asperities slide last, or the approach is
+        held: there is no derivative.
+
+        >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
+        >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
+        5.907e-10 -9.964e-07
+        """
+        from convexrough.gradients.losses import cycle_gradient  # a floor above: when asked
+
+        return cycle_gradient(self, holding=holding, tolerance=tolerance)
 
     def loop(
         self,

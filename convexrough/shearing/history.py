@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,10 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.masing import remember
 from convexrough.shearing.normal_map import States
+
+if TYPE_CHECKING:
+    from convexrough.gradients.adjoint import Holding
+    from convexrough.gradients.gradient import Gradient
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,6 +56,31 @@ class History(Table, Drawn):
     slips: Array
     energy: Array
     energy_errors: Array
+
+    def gradient(
+        self,
+        *,
+        energy: ArrayLike | None = None,
+        displacements: ArrayLike | None = None,
+        holding: Holding | None = None,
+        tolerance: float = 1e-9,
+    ) -> Gradient:
+        """Derivatives of a weighted sum over the steps: one pressed state for all reversals.
+
+        energy, displacements : (m,) weights on them, at least one of the two
+        holding, tolerance    : as in `Contact.gradient`; the forces of all steps are held
+
+        Raises InputError where the history has reached gross sliding.
+
+        >>> past = cr.history(contact, forces=contact.load * np.array([0.3, -0.3]))
+        >>> print([f"{each:.3g}" for each in past.gradient(energy=[0, 1]).forces])
+        ['5.88e-06', '-2.94e-06']
+        """
+        from convexrough.gradients.losses import history_gradient  # a floor above: when asked
+
+        return history_gradient(
+            self, energy=energy, displacements=displacements, holding=holding, tolerance=tolerance
+        )
 
 
 def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = None) -> History:

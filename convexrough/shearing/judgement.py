@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.normal.judgement import SUM_ROUNDOFFS
+from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.energy import TangentialEnergy
 from convexrough.shearing.load_errors import LoadErrors, couple_above

@@ -52,6 +52,11 @@ class TangentialProblem(TangentialEnergy, Keeper):
         Raises InputError where the scene has no friction.
         """
         checks.friction(contact.scene.friction)
+        return cls.pressed(contact)
+
+    @classmethod
+    def pressed(cls, contact: Contact) -> TangentialProblem:
+        """The same, for what of it needs no friction."""
         return contact.keep(cls._assemble)
 
     @classmethod

@@ -10,7 +10,7 @@ every loaded asperity the displacement of the deep points is, [A16] of the sourc
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,11 @@ from convexrough.shearing.judgement import judge_states
 from convexrough.shearing.many_states import by_matrices
 from convexrough.shearing.normal_map import States, gross_sliding
 from convexrough.shearing.problem import TangentialProblem
+
+if TYPE_CHECKING:
+    from convexrough.gradients.adjoint import Holding
+    from convexrough.gradients.change import Direction, ShearChange
+    from convexrough.gradients.gradient import Gradient
 
 #: Of more loaded asperities than this, coupled by an operator, the onset of some only is found.
 MOST_ONSETS = 256
@@ -65,6 +70,49 @@ class ShearState(Table, Drawn):
     def status(self) -> NDArray[np.str_]:
         """(n,) "sliding", "partial", "open" or "undecided"; each of the first three is proved."""
         return self.certificate.status
+
+    def gradient(
+        self,
+        *,
+        displacement: float | None = None,
+        forces: ArrayLike | None = None,
+        slips: ArrayLike | None = None,
+        holding: Holding | None = None,
+        tolerance: float = 1e-9,
+    ) -> Gradient:
+        """Derivatives of a weighted sum of results with respect to the scene.
+
+        displacement : weight on X;  forces, slips : (n,) weights on those of the asperities
+        holding, tolerance : as in `Contact.gradient`; the shear force is held
+
+        Raises InputError in gross sliding where several asperities slide last, or the approach is
+        held: there is no derivative.
+
+        >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
+        >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")
+        9.88e-06 124.6
+        """
+        from convexrough.gradients.states import state_gradient  # a floor above: when asked
+
+        return state_gradient(
+            self,
+            displacement=displacement,
+            forces=forces,
+            slips=slips,
+            holding=holding,
+            tolerance=tolerance,
+        )
+
+    def change(self, direction: Direction, *, tolerance: float = 1e-9) -> ShearChange:
+        """How forces, slips and the displacement change, to first order, when the scene does.
+
+        direction : of what, by how much;  tolerance : as in `gradient`
+
+        Raises InputError in gross sliding.
+        """
+        from convexrough.gradients.change import shear_change  # a floor above: when asked
+
+        return shear_change(self, direction, tolerance=tolerance)
 
 
 def shear(

@@ -47,14 +47,6 @@ class ShearVerdict(Claim, Record):
         return self.forces
 
     @cached_property
-    def status(self) -> NDArray[np.str_]:
-        """(n,) the proved words: "sliding", "partial", "open" or "undecided"."""
-        words = self.certificate.status
-        if self.solution is None:
-            return words
-        return frozen(np.where(words == "undecided", self.solution.status, words))
-
-    @cached_property
     def wrongly_sliding(self) -> Indices:
         """(m,) claimed to slide, and proved to stick in part or to be open."""
         return frozen(np.flatnonzero(self.claimed & np.isin(self.status, ("partial", "open"))))
@@ -73,17 +65,9 @@ class ShearVerdict(Claim, Record):
         }
 
     @property
-    def decided_alone(self) -> bool:
-        """Every word follows from the forces alone."""
-        return self.certificate.holds
-
-    @cached_property
-    def errors(self) -> Array:
-        """(n,) [force] proved bounds on |force - solution|; infinite where nothing is proved."""
-        errors = self.certificate.force_errors
-        if (nearby := self.nearby()) is not None:
-            errors = np.minimum(errors, np.abs(self.forces - nearby[0]) + nearby[1])
-        return frozen(errors)
+    def errors_alone(self) -> Array:
+        """(n,) [force] the certificate's."""
+        return self.certificate.force_errors
 
     def nearby(self) -> tuple[Array, Array] | None:
         """The solution's forces and bounds."""

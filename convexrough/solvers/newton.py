@@ -27,8 +27,8 @@ from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import Announce
 from convexrough.roundoff import SAFETY
-from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.solvers.solution import Solution
+from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
 
 #: Of more candidates than this, only those near the contact are iterated on. Heuristic: any number
@@ -75,6 +75,9 @@ class Newton:
         while True:
             state, steps = self._iterate(problem, near, indentation[near], announce)
             iterations += steps
+            if len(near) == len(problem):
+                residual = problem.residual(state.forces, state.approach, state.displacement)
+                return Solution(state.forces, state.approach, iterations, residual)
             # What do the others feel?
             loads = among_zeros(state.forces, near, len(problem))
             displacement = problem.influence.apply(loads)
@@ -129,7 +132,9 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 class _State(NamedTuple):
     unknown: Array  # delta
     forces: Array  # P(delta)
+    slopes: Array  # c = P'(delta), 0 where open
     displacement: Array  # A P
+    gap: Array  # k P^(2/3) + A P - D, the gradient of Phi
     defect: Array  # F
     approach: float  # D0, under load control its latest estimate
     energy: float
@@ -152,28 +157,35 @@ class _Pressing:
 
     def evaluate(self, unknown: Array) -> _State:
         problem = self.problem
-        indentation = _on_constraint(problem, unknown)
-        loads = hertz.load(indentation, problem.coefficients)
+        indentation = np.maximum(_on_constraint(problem, unknown), 0.0)
+        ratio = indentation / problem.coefficients
+        root = np.sqrt(ratio)
+        loads = ratio * root
+        slopes = 1.5 * root / problem.coefficients
         displacement = problem.influence.apply(loads)
-        level = indentation + displacement - problem.offsets  # D0 at every touching asperity
-        if problem.approach is not None:
-            approach = problem.approach
+        gap = indentation + displacement - problem.offsets  # less D0; as Phi has it under a load
+        approach = problem.approach
+        if approach is None:
+            approach = float(root @ gap / root.sum())
+            energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
+            gap -= approach
         else:
-            weights = np.cbrt(loads)
-            approach = float(weights @ level / weights.sum())
+            gap -= approach
+            energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
         # What delta is at an open asperity does not matter: its gap, or 0 where that is negative.
-        gap = displacement - problem.offsets - approach
-        indentation = np.where(loads > 0, indentation, np.minimum(-gap, 0.0))
-        defect = indentation + gap
-        energy = problem.energy(loads, displacement)
+        touching = loads > 0
+        unknown = np.where(touching, indentation, np.minimum(-gap, 0.0))
+        defect = np.where(touching, gap, np.minimum(gap, 0.0))
         residual, scale = float(np.abs(defect).max()), abs(approach) + self.farthest
-        return _State(indentation, loads, displacement, defect, approach, energy, residual, scale)
+        return _State(
+            unknown, loads, slopes, displacement, gap, defect, approach, energy, residual, scale
+        )
 
     def direction(self, state: _State, left: float) -> Array:
         return correct(
             self.problem.influence,
             self.problem.shells,
-            np.sqrt(1.0 / self.problem.stiffness(state.forces)),  # W
+            np.sqrt(state.slopes),  # W
             state.defect,
             balanced=self.problem.load is not None,
             tolerance=left,
@@ -181,11 +193,10 @@ class _Pressing:
 
     def gradient(self, state: _State) -> Array:
         """The gap."""
-        return self.problem.gap(state.forces, state.displacement, state.approach)
+        return state.gap
 
     def energy_rounding(self, state: _State) -> float:
-        prescribed = np.abs(self.problem.offsets) + abs(state.approach)
-        return SAFETY * float(state.forces @ prescribed)
+        return SAFETY * float(state.forces.sum()) * state.scale
 
     def noise(self, state: _State) -> float:
         return self.problem.influence.rounding(state.forces).negligible(state.displacement)
@@ -206,10 +217,9 @@ class _Pressing:
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
-    """An indentation to start from: of the given loads, or of heights riding on a smooth sphere."""
+    """An indentation to start from: of the given loads, or the best guess there is."""
     if loads is None:
-        few = len(problem) <= ALL_ITERATED
-        return problem.smooth_indentation() if few else mean_field_indentation(problem)
+        return start_indentation(problem)
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
 
 

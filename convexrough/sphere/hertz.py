@@ -13,6 +13,9 @@ import numpy as np
 
 from convexrough.arrays import Number
 
+#: Of the series (x - sin x) / x^3 in -x^2, the last first.
+LESS_SINE = tuple(1.0 / factorial(m) for m in range(19, 1, -2))
+
 
 def local_coefficient(contact_modulus: Number, radius: Number) -> Number:
     """k of the local law  indentation = k load^(2/3),  k = (9 / (16 E*^2 R))^(1/3)."""
@@ -62,7 +65,7 @@ def surface_displacement(distance: Number, contact_radius: Number, radius: Numbe
 def less_sine(angle: Number) -> Number:
     """x - sin(x), by its series for small x."""
     small = np.square(np.minimum(angle, 1.0))
-    series = np.zeros_like(small)
-    for m in range(19, 1, -2):
-        series = 1.0 / factorial(m) - small * series
+    series = LESS_SINE[0]
+    for coefficient in LESS_SINE[1:]:
+        series = coefficient - small * series
     return np.where(angle < 1.0, series * angle**3, angle - np.sin(angle))

@@ -30,6 +30,7 @@ from convexrough.arrays import Array
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.errors import SolverError
 from convexrough.solvers.programs import ConeProgram, RawAnswer, Reduction, run_clarabel
+from convexrough.vector_shear.dual_bound import duality_gap
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
 if TYPE_CHECKING:
@@ -125,7 +126,7 @@ class FrictionConic:
             raw = run_clarabel(data, solver, self.tolerance, max_step_fraction=step)
             state = program.invert(raw)
             energy = problem.energy(state.increments, problem.couple(state.increments))
-            gap, residual = problem.duality_gap(state) / energy, problem.residual(state)
+            gap, residual = duality_gap(problem, state) / energy, problem.residual(state)
             if gap <= self.accepted and residual <= SLIPS * self.accepted:
                 q, rise, slips = state.increments, state.rise, state.slips
                 return VectorState(total, scale * q, scale * rise, scale * slips, state.iterations)

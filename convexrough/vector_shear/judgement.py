@@ -1,7 +1,7 @@
 """Judge vector friction states: bounds on forces and slips, and which asperities slide.
 
-The proof is that of docs/theory/friction.md, "Words that are proofs", step by step. Arrays are (n,)
-or (n, 2). In the letters of that page, forces over f and displacements over c_t f:
+The proof is that of docs/theory/friction-words.md, "Words that are proofs", step by step. Arrays
+are (n,) or (n, 2). In the letters of that page, forces over f and displacements over c_t f:
 
     loads P, errors b, ceilings kappa     forces q = Q, rise X, kernel B = C
     stiffness h of H, margin mu           available X - C Q
@@ -20,7 +20,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.convex.definite import proved_margin
-from convexrough.normal.judgement import SUM_ROUNDOFFS
+from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.judgement import (
     LIMIT_ROUNDOFFS,
@@ -40,7 +40,7 @@ def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) ->
     if problem.scalar.certificate.scope == "none":
         return Bounds.unproved(1, len(problem))
     known = LoadErrors.of(problem.scalar)
-    margin = 0.0 if gross else _margin(problem, known)
+    margin = 0.0 if gross else margin_of(problem, known)
     bounds = None if gross else _by_convexity(problem, known, state, margin)
     return bounds or _by_exhaustion(problem, known, state, margin)
 
@@ -48,7 +48,7 @@ def judge_vectors(problem: VectorProblem, state: VectorState, *, gross: bool) ->
 def _by_convexity(
     problem: VectorProblem, known: LoadErrors, state: VectorState, margin: float
 ) -> Bounds | None:
-    """The steps of docs/theory/friction.md, "Words that are proofs"; None where they end.
+    """The steps of docs/theory/friction-words.md, "Words that are proofs"; None where they end.
 
     An asperity may touch that the problem leaves out, or the energy may not be convex, or no
     asperity is sure to stick.
@@ -206,10 +206,11 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: float) -
 def _by_exhaustion(
     problem: VectorProblem, known: LoadErrors, state: VectorState, margin: float
 ) -> Bounds:
-    """docs/theory/friction.md, "Close to gross sliding": sum (P_i - q_i.t) is at most `unused`.
+    """docs/theory/friction-limit.md, "Close to gross sliding".
 
-    So each q is within (2 P unused)^(1/2) of P t, all together in the same sense; then X.t is no
-    less than what it is at any asperity, and a sliding force that is turned costs friction.
+    The sum of P_i - q_i.t is at most `unused`. So each q is within (2 P unused)^(1/2) of P t, all
+    together in the same sense; then X.t is no less than what it is at any asperity, and a sliding
+    force that is turned costs friction.
     """
     P, ceilings, sure, n = problem.scalar.loads, problem.scalar.ceilings, known.sure, len(problem)
     total = float(np.hypot(*state.total))
@@ -253,7 +254,7 @@ def _by_exhaustion(
 def _one_sticks(
     problem: VectorProblem, known: LoadErrors, side: Array, unused: float, margin: float
 ) -> bool:
-    """Whether not all asperities slide: docs/theory/friction.md, "The last one".
+    """Whether not all asperities slide: docs/theory/friction-limit.md, "The last one".
 
     side   : (n,) how much B P t differs across t;  unused : sum P* - T at most
     margin : I + H^-1/2 B H^-1/2 is at least that
@@ -272,7 +273,7 @@ def _one_sticks(
     return bool(unused - doubt > turned)  # sum P* - T at least
 
 
-def _margin(problem: VectorProblem, known: LoadErrors) -> float:
+def margin_of(problem: VectorProblem, known: LoadErrors) -> float:
     """A proved lower bound on the least eigenvalue of I + H^-1/2 B H^-1/2; 0 where none is found.
 
     With H on loads no smaller than the true ones, so that a little more is proved than is said.

@@ -24,7 +24,7 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.convex import newton
 from convexrough.errors import SolverError
-from convexrough.roundoff import SAFETY
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.newton import advice
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
@@ -124,8 +124,12 @@ class _Friction:
         return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
 
     def noise(self, state: _State) -> float:
-        """Not known: steps go on until one does not halve the residual."""
-        return 0.0
+        """At least that of X, of which eta and B q are parts; mostly more, which is not known.
+
+        Then steps go on until one does not halve the residual. But what is left across X on a
+        symmetric layout can shrink at every step until it vanishes from float64.
+        """
+        return ROUNDOFF * state.scale
 
     def advice(self, state: _State) -> str:
         return advice(self.problem.scalar, float(np.hypot(*self.total)))

@@ -24,7 +24,6 @@ docs/theory/friction.md, "The kernel" and "The program".
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -36,8 +35,8 @@ from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.convex.definite import is_definite
 from convexrough.errors import SolverError
-from convexrough.normal.judgement import SUM_ROUNDOFFS
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.normal.residual import SUM_ROUNDOFFS
+from convexrough.roundoff import ROUNDOFF
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.sphere import mindlin
 
@@ -60,7 +59,7 @@ class Shift(NamedTuple):
 
     shares : (n,) S_i, the shift over the least local stiffness; convex where all S_i <= 1
 
-    docs/theory/friction.md, "Convexity".
+    docs/theory/friction-convexity.md, "Convexity".
     """
 
     values: Array
@@ -111,7 +110,7 @@ class VectorProblem:
         """(n,) h_i = (2/3) ceiling_i / P_i = 1 / (2 E* a_i): the local Hessian is at least h_i I.
 
         Its eigenvalues, along q and across, are ceiling/P times deflection'(t) and deflection(t)/t:
-        docs/theory/friction.md, "Convexity".
+        docs/theory/friction-convexity.md, "Convexity".
         """
         h: Array = (2.0 / 3.0) * self.scalar.ceilings / self.scalar.loads
         return h
@@ -187,7 +186,8 @@ class VectorProblem:
     def shift(self) -> Shift:
         """A shift for the cones and the dual bound, confirmed by Cholesky.
 
-        By the neighbours' distances, (3) of docs/theory/friction.md, "Convexity": 2 / (2 - nu) of
+        By the neighbours' distances, (3) of docs/theory/friction-convexity.md, "Convexity":
+        2 / (2 - nu) of
 
             1 / (pi E* s_i) at nu = 0,    (9/4) (1 - 2 nu / 3) / (pi E* s_i) for 0 < nu <= 1/2.
 
@@ -229,57 +229,8 @@ class VectorProblem:
         matrix[np.diag_indices(len(matrix))] = np.repeat(shares, 2) + self._rounding
         return is_definite(matrix)
 
-    def duality_gap(self, state: VectorState) -> float:
-        """Upper bound on the energy of the forces above the least, from q and X alone.
-
-        With M = B + shift, semidefinite, and h_i(q) = the local energy - shift |q|^2 / 2, convex,
-
-            least energy >= X'T - q'Mq / 2 + sum_i min over |x| <= P_i of [h_i(x) + (M q - X)_i x],
-
-        and the energy less that is a sum of terms that are not negative. Infinite where a share
-        of the shift exceeds 1, or X is. docs/theory/friction.md, "The least energy from below",
-        and "Rounding" there.
-        """
-        shares = self.shift.shares + self._slack
-        if shares.max() > 1 or not np.isfinite(state.rise).all():
-            return np.inf
-        q, X, shift = state.increments, state.rise, shares * self.stiffness
-        size, coupling = np.hypot(*q.T), self.couple(q)
-        pull = X - coupling - shift[:, None] * q  # X - M q
-        slope = np.hypot(*pull.T)
-        best = self._best_sizes(slope, shares)
-        terms = self._convex_part(size, shift) - (pull * q).sum(axis=1)
-        terms = terms - self._convex_part(best, shift) + slope * best
-
-        # What pulls are off by moves the best forces, and both move the terms.
-        P = self.scalar.loads
-        sums = self.scalar.influence.matrix @ size + shift * size + float(np.hypot(*X))
-        off = self.product_error * sums + self._slope_defect(best, slope, shift)
-        curvature = self.stiffness - shift
-        moved = np.divide(off, curvature, out=np.full(len(P), np.inf), where=curvature > 0)
-        apart = np.hypot(*(along(best, pull, slope) - q).T)
-        rounding = off * np.minimum(apart + moved, 2.0 * np.maximum(P, size))
-        largest = np.maximum(size, best)
-        own = self.scalar.deflections(np.minimum(largest, P))
-        rounding += 64 * ROUNDOFF * largest * (own + shift * largest + slope)
-        short = [math.fsum((*column, -part)) for column, part in zip(q.T, state.total, strict=True)]
-        missing = abs(float(X @ short)) + 8 * ROUNDOFF * float(np.abs(X) @ np.abs(state.total))
-        missing += 4 * ROUNDOFF * float(np.abs(X) @ np.abs(short))
-        return (float((np.maximum(terms, 0.0) + rounding).sum()) + missing) * (1 + SAFETY)
-
-    def _slope_defect(self, sizes: Array, slope: Array, shift: Array) -> Array:
-        """(n,) how far the slopes of h_i at these sizes are from those asked for, with rounding."""
-        x = mindlin.deflection(sizes / self.scalar.loads)
-        own, P = self.scalar.ceilings * x, self.scalar.loads
-        found = own - shift * sizes
-        asked = np.where(sizes < P, slope, np.minimum(slope, found))
-        # One roundoff of a size near P changes the deflection by far more than one.
-        steep = self.scalar.deflections(np.minimum(sizes * (1 + 8 * ROUNDOFF), P)) - own
-        loss = np.abs(found - asked) + steep
-        return np.asarray(loss + 16 * ROUNDOFF * (own + shift * sizes + slope))
-
     @property
-    def _slack(self) -> float:
+    def slack(self) -> float:
         """What shares lack of a proof that B + shift >= 0: rounding of the factorisation, and of B.
 
         As in `convex.definite`, with a trace of at most 2n (the largest share and a little).
@@ -289,31 +240,6 @@ class VectorProblem:
         trace = n * (float(self.shift.shares.max()) + self._rounding)
         blur = (self.product_error + 8 * ROUNDOFF) * rows
         return self._rounding + 1.1 * (blur + (n + 2) * ROUNDOFF * trace)
-
-    def _convex_part(self, sizes: Array, shift: Array) -> Array:
-        """(n,) h_i of forces of these sizes: the local energy less shift |q|^2 / 2."""
-        P, ceilings = self.scalar.loads, self.scalar.ceilings
-        return np.asarray(P * ceilings * mindlin.potential(sizes / P) - shift * sizes**2 / 2.0)
-
-    def _best_sizes(self, slope: Array, shares: Array) -> Array:
-        """(n,) the size |q| <= P_i at which h_i(q) - slope_i |q| is least.
-
-        With x = deflection(|q| / P) that is where  ceiling [x - (2/3) S force(x)] = slope, or 1: a
-        convex, growing function of x, so Newton's method runs down to it from its tangent at 0.
-        docs/theory/friction.md, "The least energy from below".
-        """
-        ceilings = self.scalar.ceilings
-        slope = np.minimum(slope, ceilings * (1.0 - 2.0 / 3.0 * shares))
-        x = np.minimum(slope / (ceilings * np.maximum(1.0 - shares, 1e-300)), 1.0)
-        for _ in range(60):
-            value = ceilings * (x - 2.0 / 3.0 * shares * mindlin.force(x)) - slope
-            rate = ceilings * (1.0 - shares * np.sqrt(1.0 - x))
-            step = np.where(rate > 0, value / np.where(rate > 0, rate, 1.0), 0.0)
-            x = np.clip(x - step, 0.0, 1.0)
-            if (np.abs(step) <= 1e-15 * x).all():
-                break
-        best: Array = self.scalar.loads * mindlin.force(x)
-        return best
 
 
 def along(lengths: Array, vectors: Array, sizes: Array) -> Array:

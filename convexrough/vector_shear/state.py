@@ -22,6 +22,7 @@ from convexrough.errors import InputError, SolverError
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF
 from convexrough.shearing.certificate import ShearCertificate
+from convexrough.vector_shear.dual_bound import duality_gap
 from convexrough.vector_shear.judgement import judge_vectors
 from convexrough.vector_shear.newton import FrictionNewton
 from convexrough.vector_shear.problem import VectorProblem, VectorState
@@ -138,7 +139,7 @@ def shear_vector(
         stick_radii=in_scene(contact.contact_radii[scalar.touching] * np.cbrt(left), 1.0),
         disagreement=_disagreement(problem, state, amount),
         residual=problem.residual(state),
-        duality_gap=problem.duality_gap(state) * unit * travel,
+        duality_gap=duality_gap(problem, state) * unit * travel,
         certificate=ShearCertificate.of(scalar, judge_vectors(problem, state, gross=gross)),
         solver=solver.name,
         iterations=state.iterations,

@@ -15,7 +15,7 @@ from flint import arb, ctx
 from matplotlib.text import Text
 
 import convexrough as cr
-from convexrough.bench import measure, page, reference, suite, summary
+from convexrough.bench import measure, page, paths, reference, suite, summary
 from convexrough.bench.figures import bench_figures
 from convexrough.bench.frontier import better_than_default, exponent, mark_frontier
 from convexrough.bench.measure import Attempt, CostRow, Row, Tally, counted
@@ -32,6 +32,7 @@ TINY = replace(
     cost=(("lattice", 61), ("scattered", 61)),
     shear=(("lattice", 61),),
     cycles=(("lattice", 61),),
+    paths=(("lattice", 61), ("rough", 61)),
     amplitudes=2,
     patience=0.0,
 )
@@ -225,7 +226,7 @@ def invented(*rows: Row, reference: Any = None) -> Bench:
         for n in (5_000, 10_000, 100_000, 1_000_000)
     )  # fmt: skip
     panel = Panel("lattice", 61, found, "", mark_frontier(rows))
-    return replace(tiny(), panels=(panel,), cost=cost, shear=())
+    return replace(tiny(), panels=(panel,), cost=cost, shear=(), paths=())
 
 
 def test_verdicts() -> None:
@@ -273,7 +274,7 @@ def test_command(command: Any, tmp_path: Path) -> None:
     assert "The default solver is on the work-precision frontier in " in ran.out
     names = {path.name for path in (tmp_path / "bench-results").iterdir()}
     assert names == {
-        *("files.json", "bench.json", "work-precision.csv", "cost.csv", "shear.csv"),
+        *("files.json", "bench.json", "work-precision.csv", "cost.csv", "shear.csv", "paths.csv"),
         *("work-precision.png", "work-precision.svg", "cost.png", "cost.svg"),
     }
     with (tmp_path / "bench-results" / "work-precision.csv").open() as file:
@@ -312,6 +313,29 @@ def test_json(command: Any, tmp_path: Path) -> None:
     assert all(each["message"] for each in panel["rows"] if each["outcome"] != "answered")
     assert summary["cost"][0]["seconds"] > 0
     assert {each["what"] for each in summary["shear"]} == {"state", "loss curve"}
+    paper, rough = summary["paths"]
+    assert (paper["touching"], paper["presses"], paper["undecided"]) == (37, 9, 0)
+    assert paper["order"] == rough["order"] == "proved at the levels used"
+    assert 0 < paper["error"] < 1e-11
+
+
+def test_a_path_takes_at_most_three_presses_for_each_segment() -> None:
+    for each in tiny().paths:
+        assert each.outcome == "answered"
+        assert each.presses <= 3 * each.segments
+        assert each.first > 0
+        assert each.again > 0
+
+
+def test_a_path_that_is_not_followed_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise cr.SolverError("no", solver="test")
+
+    monkeypatch.setattr(paths, "load_path", refuse)
+    found = paths.measure_path("lattice", scene("lattice", 1.0))
+    assert (found.outcome, found.touching) == ("failed", 0)
+    assert "no" in found.message
+    assert "failed" in "".join(page.describe(replace(tiny(), paths=(found,))))
 
 
 PAGE = f"# Title\n\nBefore.\n\n{page.BEGIN}\nold\n{page.END}\n\nAfter.\n"
@@ -387,7 +411,7 @@ def test_a_figure_of_the_default_solver_alone() -> None:
 
 def test_progress_is_told() -> None:
     told: list[str] = []
-    plan = replace(TINY, cost=(), shear=(), cycles=())
+    plan = replace(TINY, cost=(), shear=(), cycles=(), paths=())
     short = [Attempt("newton", "", Newton()), Attempt("bristles", "", BristleQP(4))]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("convexrough.bench.suite.attempts", lambda plan: short)

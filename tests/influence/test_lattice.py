@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
@@ -400,6 +400,41 @@ def test_convolutions(shape: tuple[int, int], power: int) -> None:
             size = float(np.linalg.norm(given))
             assert np.linalg.norm(lost) <= box.bound(kernel, roundoff) * size
             assert lost.max() <= box.bound_each(kernel, roundoff) * size
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.sampled_from(sorted(BASES)),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from(["patch", "square", "few"]),
+)
+def test_no_two_differences_share_a_place(name: str, seed: int, kind: str) -> None:
+    """Of sites that are taken; and the kernel has there what belongs to them."""
+    rng = np.random.default_rng(seed)
+    points = patch(turned(BASES[name], 0.2), 60)
+    if kind == "square":
+        points = points[(np.abs(points) <= 3.5).all(axis=1)]
+    if kind == "few":
+        points = points[rng.permutation(60)[: int(rng.integers(6, 20))]]
+    lattice = Lattice.through(points)
+    assume(lattice is not None)
+    assert lattice is not None
+    A = LatticeInfluence.assemble(points, lattice, 1.0)
+    found = A.places[:, None] - A.places
+    differences = np.unique(found.reshape(-1, 2), axis=0)
+    places = differences % A.box.padded
+    assert len(np.unique(places, axis=0)) == len(differences)
+    kernel = A.box.kernel(1, np.float64)
+    values = np.fft.irfft2(kernel.spectrum, A.box.padded)
+    apart = np.hypot(*(differences @ A.box.basis).T)
+    exact = np.divide(1.0, apart, out=np.zeros(len(apart)), where=apart > 0)
+    assert_allclose(values[*places.T], exact, atol=1e-13)
+
+
+def test_discs_on_a_hexagonal_lattice_need_three_quarters_of_twice_the_box() -> None:
+    A = operator(patch(np.array(BASES["hexagonal"]), 30_000))
+    sites, padded = (np.prod(np.array(shape)) for shape in (A.box.shape, A.box.padded))
+    assert padded < 0.8 * 4 * sites
 
 
 # The smoother.

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from path_scenes import LARGEST, SCENES, path_of
+from path_scenes import LARGEST, SCENES, path_of, shaded
 from scenes import random_scenes
 
 import convexrough as cr
@@ -140,11 +140,71 @@ def test_every_later_cycle_is_the_same(drawn: tuple[cr.Scene, float], seed: int)
     assert_allclose(path.forces[10], path.forces[14], atol=1e-14 * largest)
 
 
+def test_losses_against_phase() -> None:
+    """Rows are closed paths of their own; the smooth sphere has a closed form in step."""
+    scene, P = SCENES["paper"], 0.7 * LARGEST["paper"]
+    p, t = 0.2 * P, 0.3 * P
+    found = cr.phase_losses(
+        scene,
+        load=P,
+        load_amplitude=p,
+        force_amplitude=0.5 * t,
+        phases=[0.0, 0.7, np.pi / 2],
+        factors=[1.0, 0.5],
+        chords=12,
+    )
+    assert found.phases.tolist() == [0.0, 0.7, np.pi / 2] * 2
+    assert found.factors.tolist() == [1.0] * 3 + [0.5] * 3
+    loads, forces = cr.elliptic_path(
+        load=P, load_amplitude=p, force_amplitude=0.5 * t, phase=0.7, friction=0.5, chords=12
+    )
+    alone = cr.steady(scene, loads=loads, forces=forces)
+    assert found.energy[1] == alone.energy
+    assert found.levels[1] == alone.level
+    assert found.sliding[1] == np.isin(alone.status, ("sliding", "intermittent")).sum()
+
+    def energy(s: float) -> float:  # V of the smooth sphere, R = 1: D0 = (3 s / 4)^(2/3)
+        return 0.6 * s * float((0.75 * s) ** (2 / 3))
+
+    def mean(a: float, b: float) -> float:
+        return (energy(b) - energy(a)) / (b - a)
+
+    bracket = mean(P - t, P + p) + mean(P - t, P - p) - mean(P - p, P + p)
+    bracket -= (0.75 * (P - t)) ** (2 / 3)
+    line = 4 * (2 - 0.3) / (2 * (1 - 0.3)) * 0.5**2 * t * bracket
+    assert found.smooth[2] == pytest.approx(line, rel=1e-9)
+    assert found.energy[2] < 0.5 * found.energy[0]
+    assert found.order == "proved at the levels used"
+
+
+def test_where_order_fails_nothing_is_said_of_cycles() -> None:
+    scene = shaded()
+    largest = cr.press(scene, approach=1.4).load
+    P, Q = np.array([0.8, 1.0]) * largest, np.array([-0.1, 0.1]) * largest
+    found = cr.steady(scene, loads=P, forces=Q)
+    assert found.order == "fails"
+    assert np.isinf([found.energy_error, found.energy_first_error]).all()
+    assert set(found.status) == {"undecided"}
+    path = cr.load_path(
+        scene, loads=np.append(np.tile(P, 2), P[0]), forces=np.append(np.tile(Q, 2), Q[0])
+    )
+    assert found.energy == pytest.approx(path.energy[4] - path.energy[2])
+    assert found.energy > 0
+
+
 def test_bad_input() -> None:
     scene, P, Q = octagon("paper")
     with pytest.raises(cr.InputError, match="gross sliding"):
         cr.steady(scene, loads=P, forces=4 * Q)
     with pytest.raises(cr.InputError, match="at least one"):
         cr.steady(scene, loads=[], forces=[])
+    with pytest.raises(cr.InputError, match=r"loads\[0\].*not negative"):
+        cr.steady(scene, loads=-P, forces=Q)
+    with pytest.raises(cr.InputError, match=r"forces\[0\].*before contact is lost"):
+        cr.steady(scene, loads=[0.0, P[1]], forces=[1e-9, 0.0])
+    with pytest.raises(cr.InputError, match="finite"):
+        cr.steady(scene, loads=[np.inf], forces=[0.0])
+    with pytest.raises(cr.InputError, match="phases: found none"):
+        cr.phase_losses(scene, load=P[0], load_amplitude=0.0, force_amplitude=0.0, phases=[])
     with pytest.raises(cr.InputError, match="chords"):
         cr.elliptic_path(load=1.0, load_amplitude=0.1, force_amplitude=0.1, friction=0.5, chords=2)

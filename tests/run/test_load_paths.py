@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from convexrough.run.report import warnings
+from convexrough.run.summary import proved
+
 SCENE = """
 [sphere]
 radius = 1.0
@@ -57,7 +60,7 @@ def test_a_run(command: Any) -> None:
     for name in ("steady", "shakedown"):
         with Path(f"out/{name}.csv").open() as file:
             assert len(list(csv.DictReader(file))) == 61
-    for stem in ("path", "path_stick_slip", "steady", "shakedown"):
+    for stem in ("path", "path_stick_slip", "steady", "shakedown", "shakedown_map"):
         assert Path(f"out/{stem}.png").stat().st_size > 5000
 
 
@@ -70,11 +73,168 @@ def test_a_run(command: Any) -> None:
         ("[path]\nloads = [1e-7]\nforces = [1e-7]\n", "[path]: forces[0]"),
         ("[steady]\nloads = []\nforces = []\n", "at least one"),
         ("[shakedown]\nloads = 1e-7\nforce_amplitudes = [0.0]\n", "expected a path that moves"),
-        ('[shakedown]\nloads = 1\nforce_amplitudes = [1]\nkind = "x"\n', '"exact" or "elastic"'),
+        (
+            '[shakedown]\nloads = 1\nforce_amplitudes = [1]\nkind = "x"\n',
+            '"exact", "elastic" or "vector"',
+        ),
+        (
+            "[shakedown]\nloads = 1.0\nforce_amplitudes = [[1, 0]]\n",
+            "expected a number with this kind",
+        ),
+        (
+            '[shakedown]\nloads = 1.0\nforce_amplitudes = [1, -1]\nkind = "vector"\n',
+            "force_amplitudes[0]: found 1.0, expected a pair [x, y]",
+        ),
+        (
+            '[shakedown]\nloads = 1\nforces = 0.1\nforce_amplitudes = [[1, 0]]\nkind = "vector"\n',
+            "forces: found 0.1, expected a pair [x, y]",
+        ),
+        (
+            '[shakedown]\nloads = 1.0\nforce_amplitudes = [[1, 0, 0]]\nkind = "vector"\n',
+            "expected a pair [x, y] of finite numbers",
+        ),
     ],
 )
 def test_mistakes(command: Any, table: str, message: str) -> None:
     Path("scene.toml").write_text(SCENE + table)
+    outcome = command("run", "scene.toml", "--no-figures")
+    assert outcome.status == 2
+    assert message in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("kind", "amplitudes", "factor"),
+    [
+        ("elastic", "[1.0, -1.0]", 0.2571338521083),
+        ("vector", "[[0.0, 1.0], [0.0, -1.0]]", 0.2419789620),
+    ],
+)
+def test_limits_by_melan(command: Any, kind: str, amplitudes: str, factor: float) -> None:
+    table = f'''
+[shakedown]
+loads = 2.0
+force_amplitudes = {amplitudes}
+kind = "{kind}"
+reference = 1.80426694373333e-07
+'''
+    Path("scene.toml").write_text(SCENE + table)
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert outcome.status == 0, outcome.err
+    limit = json.loads(Path("out/summary.json").read_text())["shakedown"]
+    assert limit["factor"] == pytest.approx(factor, rel=1e-9)
+    assert limit["lower"] < limit["factor"] < limit["upper"]
+    assert limit["proved"] is True
+    assert f"shakedown  ({kind})" in outcome.out
+    with Path("out/shakedown.csv").open() as file:
+        columns = next(csv.reader(file))
+    slips = ["slip"] if kind == "elastic" else ["slip_0_x", "slip_0_y", "slip_1_x", "slip_1_y"]
+    assert [name for name in columns if name.startswith("slip")] == slips
+    assert Path("out/shakedown.png").stat().st_size > 5000
+
+
+SHADED = """
+[sphere]
+radius = 1e6
+[material]
+contact_modulus = 1.0
+poisson_ratio = 0.3
+[asperities]
+pattern = "file"
+path = "shaded.csv"
+[normal]
+approach = 1.4
+[friction]
+coefficient = 0.5
+[path]
+loads = [0.8, 1.0]
+forces = [0.0, 0.1]
+reference = LOAD
+[steady]
+loads = [0.8, 1.0]
+forces = [-0.1, 0.1]
+reference = LOAD
+[shakedown]
+loads = 1.0
+force_amplitudes = [0.1, -0.1]
+reference = LOAD
+"""
+
+
+def test_nothing_is_proved_where_order_fails(command: Any) -> None:
+    """A small low asperity between five crowded ones loses load as the load rises."""
+    turn = 2 * np.pi * np.arange(5) / 5
+    rows = ["0,0,-0.06,0.05", *(f"{np.cos(t)},{np.sin(t)},0,1" for t in turn)]
+    Path("shaded.csv").write_text("\n".join(["x,y,height,tip_radius", *rows]))
+    Path("scene.toml").write_text(SHADED.replace("LOAD", "1.0").split("[path]")[0])
+    pressed = json.loads(command("run", "scene.toml", "--no-figures", "--json").out)["normal"]
+    Path("scene.toml").write_text(SHADED.replace("LOAD", repr(pressed["load"])))
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
+    assert outcome.status == 3
+    summary = json.loads(Path("out/summary.json").read_text())
+    for stage in ("path", "steady", "shakedown"):
+        assert summary[stage]["order"] == "fails"
+        assert f"not proved: the order of indentations, on which [{stage}] rests" in outcome.err
+    assert summary["steady"]["energy_error"] is None
+    assert summary["steady"]["undecided"] > 0
+    assert summary["shakedown"]["proved"] is False
+    assert summary["shakedown"]["upper"] is None
+    assert "not proved: any bounds on the limit of [shakedown]" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("stage", "key", "value"),
+    [
+        ("path", "order", "checked"),
+        ("steady", "order", "checked"),
+        ("phase_losses", "order", "checked"),
+        ("shakedown", "proved", False),
+        ("shakedown", "order", "checked"),
+    ],
+)
+def test_what_is_only_checked_is_not_certified(
+    command: Any, stage: str, key: str, value: object
+) -> None:
+    table = PATHS.replace("chords = 12 }", "chords = 12 }\nphases = [0.5]")
+    Path("scene.toml").write_text(SCENE + table)
+    summary = json.loads(command("run", "scene.toml", "--no-figures", "--json").out)
+    assert proved(summary)
+    assert warnings(summary) == []
+    summary[stage][key] = value
+    assert not proved(summary)
+    assert any(f"[{stage}]" in each for each in warnings(summary))
+
+
+def test_losses_against_phase(command: Any) -> None:
+    asked = "chords = 12 }\nphases = [0.0, 1.2]\nfactors = [0.5, 1.0]"
+    Path("scene.toml").write_text(SCENE + PATHS.replace("chords = 12 }", asked))
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert outcome.status == 0, outcome.err
+    assert "loss against phase" in outcome.out
+    summary = json.loads(Path("out/summary.json").read_text())["phase_losses"]
+    with Path("out/phase_losses.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["energy"]) for row in rows] == summary["energy"]
+    assert [float(row["factor"]) for row in rows] == [0.5, 0.5, 1.0, 1.0]
+    assert all(float(row["energy_error"]) >= 0 for row in rows)
+    steady = json.loads(Path("out/summary.json").read_text())["steady"]["energy"]
+    assert summary["energy"][2] == pytest.approx(steady, rel=1e-12)  # the ellipse itself
+    assert Path("out/phase_losses.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("loads = [1e-7]\nforces = [0.0]\nphases = [0.0]", "ellipse: missing, needed with phases"),
+        ("ellipse = {load = 1e-7, force_amplitude = 1e-8}\nphases = []", "finite numbers"),
+        ("ellipse = {load = 1e-7, force_amplitude = 1e-8}\nfactors = [1.0]", "phases: missing"),
+        (
+            "ellipse = {load = 1e-7, force_amplitude = 1e-8}\nphases = [0.0]\nfactors = [9.0]",
+            "[steady]: forces",
+        ),
+    ],
+)
+def test_mistakes_in_phases(command: Any, table: str, message: str) -> None:
+    Path("scene.toml").write_text(f"{SCENE}[steady]\n{table}\n")
     outcome = command("run", "scene.toml", "--no-figures")
     assert outcome.status == 2
     assert message in outcome.err

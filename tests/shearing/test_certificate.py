@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scenes import MATERIAL, PAPER_APPROACH, scattered, solve_exactly
 
 import convexrough as cr
-from convexrough.normal.judgement import SUM_ROUNDOFFS
+from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF
 from convexrough.shearing.judgement import SHARE_ROUNDOFFS, judge_states, own_change
 from convexrough.shearing.load_errors import LoadErrors

@@ -292,3 +292,13 @@ def test_gross_sliding_of_two_that_pull_each_other_aside_alike() -> None:
     assert state.residual < 1e-13
     assert_solves(state, 1e-12)
     assert (state.status == "undecided").all()
+
+
+def test_what_is_left_across_the_force_may_shrink_without_end() -> None:
+    """On three contacts, mirrored in the force: it fell to 1e-101 of X in 100 steps, and failed."""
+    case = cr.gallery.case("losing-contact-before")
+    contact = cr.press(case.scene, load=case.load)
+    state = shear_vector(contact, force=case.shear_force)
+    assert state.residual < 1e-14
+    assert state.iterations < 12
+    assert state.certificate.scope == "global"

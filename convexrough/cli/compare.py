@@ -1,0 +1,58 @@
+"""`compare`: every solver on one scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from convexrough.cli.options import PATH, json_option
+from convexrough.cli.speech import (
+    DONE,
+    NOT_CERTIFIED,
+    SOLVER_FAILED,
+    blamed_on,
+    progress,
+    say_aside,
+)
+
+
+@click.command()
+@click.argument("scene", type=PATH)
+@json_option
+def compare(scene: Path, as_json: bool) -> int:
+    """Run every formulation and solver on one scene: agreement, certificate, time.
+
+    The cone program also goes through SCS and QOCO, where they are installed.
+
+    Exit status 3 also where a solver refuses the scene, or where two certified answers exclude each
+    other: that would be a mistake in the mathematics.
+    """
+    from convexrough.compare import compare as compare_solvers
+    from convexrough.run.report import comparison_warnings, describe_comparison
+    from convexrough.run.scene_file import read_scene
+    from convexrough.run.summary import comparison_summary, to_json
+
+    file = read_scene(scene)
+    with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities") as show:
+        comparison = compare_solvers(
+            file.scene,
+            approach=file.approach,
+            load=file.load,
+            influence=file.influence,
+            announce=lambda name: show(f"pressing on {len(file.scene)} asperities: {name}"),
+        )
+    summary = comparison_summary(comparison)
+    if as_json:
+        click.echo(to_json(summary))
+    else:
+        length, force = file.units
+        click.echo("\n".join(describe_comparison(summary, length_unit=length, force_unit=force)))
+    for warning in comparison_warnings(summary):
+        say_aside("warning", warning)
+    outcomes = {entry.outcome for entry in comparison.entries}
+    if "failed" in outcomes and not comparison.contradictions:
+        return SOLVER_FAILED
+    if comparison.contradictions or "refused" in outcomes or not comparison.certified:
+        return NOT_CERTIFIED
+    return DONE

@@ -1,0 +1,86 @@
+"""The program: its commands, how it ends, and what becomes of errors.
+
+What is slow to import is imported by the command that needs it, when it runs.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from collections.abc import Sequence
+
+import click
+from click.shell_completion import shell_complete
+
+from convexrough.cli.bench import bench
+from convexrough.cli.compare import compare
+from convexrough.cli.gallery import gallery
+from convexrough.cli.paper import paper
+from convexrough.cli.proof import check
+from convexrough.cli.run import new, run
+from convexrough.cli.speech import (
+    DONE,
+    INTERRUPTED,
+    SOLVER_FAILED,
+    UNHEARD,
+    WRONG_INPUT,
+    say_aside,
+)
+from convexrough.cli.verify import verify
+from convexrough.errors import ConvexroughError, SolverError
+from convexrough.version import __version__
+
+#: What a shell sets that wants a script for completion, or the completions of a line.
+COMPLETE = "_CONVEXROUGH_COMPLETE"
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="convexrough")
+def program() -> None:
+    """Rough frictional contact, with a proof of which asperities touch.
+
+    Exit status: 0 done and certified; 1 standard output closed or full; 2 wrong input; 3 done, not
+    certified; 4 a solver failed; 130 interrupted.
+    """
+
+
+for command in (run, verify, check, compare, new, paper, bench, gallery):
+    program.add_command(command)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status; errors are a message, never a traceback."""
+    try:
+        if arguments is None and (asked := os.environ.get(COMPLETE)):
+            return shell_complete(program, {}, "convexrough", COMPLETE, asked)
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        with program.make_context("convexrough", given) as context:
+            status = int(program.invoke(context) or DONE)
+        if sys.stdout is not None:  # it is None where a shell closed it
+            sys.stdout.flush()
+        return status
+    except click.exceptions.Exit as end:
+        return end.exit_code
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        say_aside("interrupted")
+        return INTERRUPTED
+    except ConvexroughError as error:
+        for line in str(error).splitlines():
+            say_aside("error", line)
+        return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
+    except OSError as error:  # those of files are FileErrors
+        return _unheard(error)
+
+
+def _unheard(error: OSError) -> int:
+    """Nobody reads standard output any more, or it is full; results are written all the same."""
+    if error.errno != errno.EPIPE:
+        say_aside("error", f"standard output: {error.strerror or error}")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)  # so that what is left is not written when the interpreter ends
+    os.close(nowhere)
+    return UNHEARD

@@ -1,0 +1,42 @@
+"""`check`, and how `run` and `verify` write what it checks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from convexrough.cli.options import PATH
+from convexrough.cli.speech import DONE, NOT_CERTIFIED, progress, say_aside
+from convexrough.errors import ProofError
+
+if TYPE_CHECKING:
+    from convexrough.proof import Proof
+
+
+@click.command()
+@click.argument("proof", type=PATH)
+def check(proof: Path) -> int:
+    """Check a proof in exact arithmetic, believing nothing in the file.
+
+    Exit status: 0 all that it claims is proved; 1 refused, with the reason; 2 unreadable. The
+    checker is one file that needs Python only: python checker.py PROOF does the same.
+    """
+    from convexrough import checker
+
+    return checker.main([str(proof)])
+
+
+def write_proof(path: Path, work: Callable[[Callable[[str], object]], Proof], as_json: bool) -> int:
+    """Write a proof; NOT_CERTIFIED where there is none."""
+    try:
+        with progress("proving") as show:
+            proof = work(lambda news: show(f"proving: {news}"))
+    except ProofError as error:
+        say_aside("warning", str(error))
+        return NOT_CERTIFIED
+    proof.save(path)
+    click.echo(f"{proof.proved}\nwritten  {path}", err=as_json)
+    return DONE

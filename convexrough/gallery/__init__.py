@@ -1,0 +1,9 @@
+"""Hard scenes by name, each with its answer to 50 digits, for anybody's solver.
+
+`convexrough gallery --export DIR` writes them as files of qpsolvers, Clarabel and CBF.
+"""
+
+from convexrough.gallery.any_size import Manufactured, manufactured
+from convexrough.gallery.cases import HardCase, Judged, case, names
+
+__all__ = ["HardCase", "Judged", "Manufactured", "case", "manufactured", "names"]

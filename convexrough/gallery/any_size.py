@@ -1,0 +1,66 @@
+"""Contacts of any size, made from their answer: loads and gaps first, heights from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from convexrough import checks
+from convexrough.arrays import Array, frozen
+from convexrough.errors import InputError
+from convexrough.gallery.recipe import FRICTION, MATERIAL
+from convexrough.influence.choice import couple
+from convexrough.record import Record
+from convexrough.scene.asperities import Asperities
+from convexrough.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Manufactured(Record):
+    """A contact made from its answer. The heights that make it exact are rounded to float64, so
+
+        cr.certify(made.scene, made.loads, approach=made.approach)
+
+    proves by how much, and every word.
+
+    approach : [length] to press by
+    loads    : (n,) [force] with zeros where open;  gaps : (n,) [length]
+    """
+
+    scene: Scene
+    approach: float
+    loads: Array
+    gaps: Array
+
+
+def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufactured:
+    """`count` asperities on a hexagonal lattice, about this part of them in contact.
+
+    Contact radii are random from 0.1 to 0.45 of the spacing, tip radii from 4 to 8 of it, and gaps
+    up to the largest indentation. `seed` draws them; other versions of numpy may draw others.
+
+    >>> made = cr.gallery.manufactured(500)
+    >>> proof = cr.certify(made.scene, made.loads, approach=made.approach)
+    >>> proof.holds, bool(proof.load_errors.max() < 1e-9 * made.loads.max())
+    (True, True)
+    """
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise InputError("count", found=repr(count), expected="a positive whole number")
+    part = checks.between("touching", touching, 0.0, 1.0)
+    random = np.random.default_rng(seed)
+    patch = Asperities.hexagonal(spacing=1.0, tip_radius=1.0, within=0.6 * np.sqrt(count) + 1)
+    tips = random.uniform(4.0, 8.0, count)
+    flat = Asperities(patch.positions[:count], tips)
+    scene = Scene(1e3 * np.sqrt(count), flat, MATERIAL, FRICTION)
+
+    touches = random.random(count) < part
+    radii = np.where(touches, random.uniform(0.1, 0.45, count), 0.0)
+    own = radii**2 / scene.relative_radii
+    gaps = np.where(touches, 0.0, random.uniform(0.0, own.max(initial=0.0) or 1.0, count))
+    loads = 4.0 / 3.0 * MATERIAL.contact_modulus * radii * own
+    coupling = couple(scene, np.arange(count), 1.0 / (np.pi * MATERIAL.contact_modulus), None)
+    heights = own + coupling.apply(loads) - gaps - scene.offsets
+    approach = float(heights.max())
+    tall = replace(scene, asperities=Asperities(flat.positions, tips, heights - approach))
+    return Manufactured(tall, approach, frozen(loads), frozen(gaps))

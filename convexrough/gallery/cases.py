@@ -1,0 +1,186 @@
+"""A hard case: a scene, what is prescribed, and the answer, against which anybody's can be held."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.errors import InputError
+from convexrough.gallery import friction, grazing, layouts, limits, units
+from convexrough.gallery.answers import answer
+from convexrough.gallery.recipe import Recipes
+from convexrough.record import Record
+from convexrough.scene.scene import Scene
+
+RECIPES: Recipes = {
+    **limits.RECIPES,
+    **grazing.RECIPES,
+    **layouts.RECIPES,
+    **units.RECIPES,
+    **friction.RECIPES,
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Judged(Record):
+    """Somebody's numbers against the answer. Indices are those of the scene's asperities.
+
+    wrongly_open   : (m,) given nothing, and touching (of shear forces: loaded)
+    wrongly_loaded : (m,) given a load, and open
+    error          : largest distance from the answer, over the largest number of the answer
+    within         : how large that may be
+    """
+
+    wrongly_open: Indices
+    wrongly_loaded: Indices
+    error: float
+    within: float
+
+    @property
+    def right(self) -> bool:
+        """The set is right, and all numbers are near enough."""
+        wrong = len(self.wrongly_open) + len(self.wrongly_loaded)
+        return wrong == 0 and self.error <= self.within
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HardCase(Record):
+    """A hard scene, with an answer that is known to 50 digits.
+
+    Digits are strings: "0" is exact, all others are right to one unit of the 50th. The answer is
+    that of the scene whose data are the given float64 numbers. It exists and is the only one near
+    it, by an interval Newton step; that there is no other anywhere, `cr.certify` says.
+
+    family, why : what is hard about it
+    approach [length], load [force] : what is prescribed, the other one is None
+    loads, gaps : (n,) digits [force], [length]
+    exact_approach, exact_load : digits [length], [force]
+    shear_force : [force] that the contact is sheared by, once
+    history     : (m,) [force] instead, the shear forces until then; empty where it is sheared once
+    forces, slips : (n,) digits [force], [length] of that; empty where an asperity would be dragged
+        along, and the theorem of Ciavarella and Jaeger gives no answer
+    displacement  : digits [length], both bodies; "" there
+
+    >>> case = cr.gallery.case("grazing-gap-1e-9")
+    >>> case.judge(cr.press(case.scene, **case.control).loads).right
+    True
+    """
+
+    name: str
+    family: str
+    why: str
+    scene: Scene
+    approach: float | None
+    load: float | None
+    loads: tuple[str, ...]
+    gaps: tuple[str, ...]
+    exact_approach: str
+    exact_load: str
+    shear_force: float
+    history: Array
+    forces: tuple[str, ...]
+    slips: tuple[str, ...]
+    displacement: str
+
+    def __len__(self) -> int:
+        return len(self.loads)
+
+    @property
+    def control(self) -> dict[str, Any]:
+        """What `cr.press`, `cr.certify` and `cr.verify` take: the approach or the load."""
+        return {"approach": self.approach} if self.load is None else {"load": self.load}
+
+    @cached_property
+    def touching(self) -> NDArray[np.bool_]:
+        """(n,) who touches."""
+        return frozen(np.array([digits != "0" for digits in self.loads]))
+
+    def judge(self, loads: ArrayLike, *, within: float = 1e-6, floor: float = 0.0) -> Judged:
+        """Loads (n,) [force] from anywhere against the answer.
+
+        within : how far from it they may be, over the largest load
+        floor  : [force] a load up to this claims that its asperity is open
+        """
+        given = checks.array("loads", loads, length=len(self))
+        claimed = given > checks.non_negative("floor", floor)
+        return _judged(given, self.loads, claimed, self.touching, within)
+
+    def judge_shear(self, forces: ArrayLike, *, within: float = 1e-6) -> Judged:
+        """Shear forces (n,) [force] along the shear force, as `judge`; at the end of a history."""
+        if not self.forces:
+            found = "a case in which one is dragged along by the others"
+            raise InputError("forces", found=found, expected="a case with an answer in shear")
+        given = checks.array("forces", forces, length=len(self))
+        return _judged(given, self.forces, given != 0, self.touching, within)
+
+
+def _judged(
+    given: Array,
+    digits: Sequence[str],
+    claimed: NDArray[np.bool_],
+    touching: NDArray[np.bool_],
+    within: float,
+) -> Judged:
+    """Subtracted exactly, as some answers are nearer to each other than float64 numbers."""
+    exact = [Fraction(each) for each in digits]
+    apart = max(abs(Fraction(float(a)) - b) for a, b in zip(given, exact, strict=True))
+    largest = max(map(abs, exact))
+    return Judged(
+        wrongly_open=frozen(np.flatnonzero(touching & ~claimed)),
+        wrongly_loaded=frozen(np.flatnonzero(claimed & ~touching)),
+        error=float(apart / largest) if largest else float(apart),
+        within=checks.positive("within", within),
+    )
+
+
+def names(*wanted: str) -> tuple[str, ...]:
+    """Names of all cases, or of those wanted, by their own names or those of their families.
+
+    >>> cr.gallery.names("few", "clustered")
+    ('one', 'one-under-load', 'two-equal', 'clustered')
+    """
+    families = {name: recipe().family for name, recipe in RECIPES.items()}
+    for each in wanted:
+        if each not in RECIPES and each not in families.values():
+            valid = [*RECIPES, *sorted(set(families.values()))]
+            raise InputError("names", found=repr(each), expected=checks.nearest(str(each), valid))
+    return tuple(
+        name for name in RECIPES if not wanted or name in wanted or families[name] in wanted
+    )
+
+
+def case(name: str) -> HardCase:
+    """The hard case of this name.
+
+    >>> cr.gallery.case("one").why
+    'one contact: no neighbours, no shells, an answer in closed form'
+    """
+    if name not in RECIPES:
+        raise InputError("names", found=repr(name), expected=checks.nearest(str(name), RECIPES))
+    recipe = RECIPES[name]()
+    stored = answer(name, recipe)
+    return HardCase(
+        name=name,
+        family=recipe.family,
+        why=recipe.why,
+        scene=recipe.scene,
+        approach=recipe.approach,
+        load=recipe.load,
+        loads=tuple(stored["loads"]),
+        gaps=tuple(stored["gaps"]),
+        exact_approach=stored["approach"],
+        exact_load=stored["load"],
+        shear_force=float.fromhex(stored["shear_force"]),
+        history=frozen(np.array(recipe.history) * float.fromhex(stored["shear_force"])),
+        forces=tuple(stored["forces"]),
+        slips=tuple(stored["slips"]),
+        displacement=stored["displacement"],
+    )

@@ -1,0 +1,236 @@
+"""The result: derivatives with respect to everything in a scene, in its units.
+
+A derivative comes as dJ = offsets'dd + local'd log k + sum over pairs left'dA right + ...
+(`gradients.adjoint`); here dd, dk and dA become changes of heights, tip radii, positions, the
+sphere's radius and the modulus (docs/theory/scene-derivatives.md, "To the scene").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, among_zeros, frozen
+from convexrough.contact import Contact
+from convexrough.drawn import Drawn
+from convexrough.errors import InputError
+from convexrough.gradients.adjoint import Adjoint, Holding
+from convexrough.influence import Influence
+from convexrough.influence.choice import couple
+from convexrough.record import Along, Record, Table
+from convexrough.shearing.problem import TangentialProblem
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Gradient(Table, Drawn):
+    """Derivatives of one number with respect to a scene and to what is prescribed.
+
+    Units are those of the number over those of the parameter. Arrays are (n,), in the scene's
+    order; screened asperities, and open ones unless their gap is asked for, have 0 everywhere. Each
+    derivative is at fixed values of the other parameters named here: shear forces are held, not
+    their fractions of f P.
+
+    value           : the number itself
+    holding         : "load" or "approach": which of the two is held
+    heights, tip_radii : (n,)
+    contact_modulus : of E* at fixed Poisson's ratio;  poisson_ratio : at fixed E*
+    load, approach  : of the one that is held; None of the other
+    friction        : None where there is none
+    force           : the shear force of a friction state;  maximum, minimum : those of a cycle
+    forces          : (m,) those of a history; None each where there is none
+    balance_defect  : how far the modulus by its own sum is from what scaling all forces says,
+        over the largest term of both
+
+    >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
+    >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.maximum:.4g}")
+    5.907e-10 2.717e-06
+    """
+
+    _along: ClassVar[Along] = {("asperity",): ("heights", "tip_radii")}
+
+    contact: Contact
+    holding: Holding
+    value: float
+    heights: Array
+    tip_radii: Array
+    sphere_radius: float
+    contact_modulus: float
+    poisson_ratio: float
+    load: float | None
+    approach: float | None
+    friction: float | None
+    balance_defect: float
+    origin: Origin
+    force: float | None = None
+    maximum: float | None = None
+    minimum: float | None = None
+    forces: Array | None = None
+
+    @cached_property
+    def positions(self) -> Array:
+        """(n, 2) of x and y of each summit."""
+        scene, origin = self.contact.scene, self.origin
+        points = scene.asperities.positions[origin.places]
+        far, moved = far_radii(self.contact, origin.places)[:, None], origin.turning
+        if scene.geometry == "closest":
+            moved = moved * (scene.sphere_radius / far)
+        moved = moved - origin.offsets[:, None] * points / far
+        return frozen(among_zeros(moved, origin.places, len(scene)))
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        """But for what it was made from, and for parameters that it has not."""
+        return (row for row in super()._rows() if row[0] != "origin" and row[1] != "None")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Origin(Record):
+    """dJ = offsets'dd + local'd log k + sum over pairs left'dA right + prescribed d(P or D0).
+
+    J, lengths and the load are in the scene's units, A in the problem's own. Arrays are (n,), of
+    the asperities at `places` in the scene; left and right are (m, n).
+    """
+
+    contact: Contact
+    places: Indices
+    offsets: Array
+    local: Array
+    left: Array
+    right: Array
+    prescribed: float
+
+    @classmethod
+    def of(
+        cls,
+        contact: Contact,
+        adjoint: Adjoint,
+        holding: Holding,
+        places: Indices | None = None,
+    ) -> Origin:
+        """places : of the arrays of the adjoint; default the loaded asperities"""
+        problem = pressed(contact)
+        units = problem.units
+        return cls(
+            contact=contact,
+            places=frozen(problem.touching.copy() if places is None else places),
+            offsets=frozen(adjoint.offsets / units.length),
+            local=frozen(adjoint.local),
+            left=frozen(np.stack([pair.left for pair in adjoint.pairs])),
+            right=frozen(np.stack([pair.right for pair in adjoint.pairs])),
+            prescribed=adjoint.prescribed / (units.force if holding == "load" else units.length),
+        )
+
+    @cached_property
+    def influence(self) -> Influence:
+        """A."""
+        problem = pressed(self.contact)
+        if len(self.places) == len(problem):
+            return problem.influence
+        return couple(
+            self.contact.scene, self.places, problem.influence.scale, self.contact.influence
+        )
+
+    @cached_property
+    def turning(self) -> Array:
+        """(n, 2) [1 / length] dJ/dc through the coupling, c the contact points: G."""
+        slopes, total = self.influence.slopes, np.zeros((len(self.places), 2))
+        for left, right in zip(self.left, self.right, strict=True):
+            total += left[:, None] * slopes(right) + right[:, None] * slopes(left)
+        return total
+
+    @cached_property
+    def coupled(self) -> tuple[float, float]:
+        """The sum over pairs of left'A right, and the sum of the sizes of its terms."""
+        each = zip(self.left, self.right, strict=True)
+        terms = [left * self.influence.apply(right) for left, right in each]
+        return sum(float(t.sum()) for t in terms), sum(float(np.abs(t).sum()) for t in terms)
+
+
+def to_scene(
+    origin: Origin,
+    holding: Holding,
+    *,
+    value: float,
+    scaled: tuple[float, ...],
+    cancels: bool,
+    poisson_ratio: float = 0.0,
+    friction: float | None = None,
+    load: float | None = None,
+    force: float | None = None,
+    maximum: float | None = None,
+    minimum: float | None = None,
+    forces: Array | None = None,
+) -> Gradient:
+    """The gradient that an origin is.
+
+    scaled  : terms whose sum, less P dJ/dP under load control, is E* dJ/dE* by scaling all forces
+    cancels : whether the modulus' own sum does, so that the other is reported
+    load    : dJ/dP where it is not that of the origin
+    """
+    contact, places = origin.contact, origin.places
+    scene = contact.scene
+    R, rho = scene.sphere_radius, scene.asperities.tip_radii[places]
+    radii, points = scene.relative_radii[places], scene.asperities.positions[places]
+    offsets, local, far = origin.offsets, origin.local, far_radii(contact, places)
+    tips, sphere = -local / 3.0 * radii / rho**2, -local / 3.0 * radii / R**2
+    sunk = offsets * (points**2).sum(axis=1) / (2.0 * far**2)
+    sphere += sunk
+    if scene.geometry == "closest":
+        outwards = (origin.turning * points).sum(axis=1) / far**2
+        tips += sunk - outwards * R
+        sphere += outwards * rho
+
+    by_load = holding == "load"
+    prescribed = origin.prescribed
+    terms = (*scaled, -contact.load * prescribed) if by_load else scaled
+    coupled, sizes = origin.coupled
+    own, by_scaling = -2.0 / 3.0 * float(local.sum()) - coupled, sum(terms)
+    size = max(2.0 / 3.0 * float(np.abs(local).sum()), sizes, *map(abs, terms))
+    return Gradient(
+        contact=contact,
+        holding=holding,
+        value=value,
+        heights=frozen(among_zeros(offsets, places, len(scene))),
+        tip_radii=frozen(among_zeros(tips, places, len(scene))),
+        sphere_radius=float(sphere.sum()),
+        contact_modulus=(by_scaling if cancels else own) / scene.material.contact_modulus,
+        poisson_ratio=poisson_ratio,
+        load=(prescribed if load is None else load) if by_load else None,
+        approach=None if by_load else prescribed,
+        friction=friction,
+        balance_defect=abs(own - by_scaling) / size if size > 0 else 0.0,
+        origin=origin,
+        force=force,
+        maximum=maximum,
+        minimum=minimum,
+        forces=forces,
+    )
+
+
+def held(contact: Contact, holding: Holding | None) -> Holding:
+    """What is held, checked; default what was prescribed."""
+    checks.instance("contact", contact, Contact)
+    if holding is None:
+        return "approach" if contact.prescribed_load is None else "load"
+    if holding not in ("load", "approach"):
+        raise InputError("holding", found=repr(holding), expected='"load" or "approach"')
+    return holding
+
+
+def pressed(contact: Contact) -> TangentialProblem:
+    """The loaded asperities of a contact, of which there must be some."""
+    if contact.load == 0.0:
+        expected = "a contact that carries some load: without, nothing has a derivative"
+        raise InputError("contact", found="no load", expected=expected)
+    return TangentialProblem.pressed(contact)
+
+
+def far_radii(contact: Contact, places: Indices) -> Array:
+    """(n,) [length] with a drop of r^2 / (2 far): R, or R + rho in the geometry "closest"."""
+    scene, rho = contact.scene, contact.scene.asperities.tip_radii[places]
+    R = scene.sphere_radius
+    return R + rho if scene.geometry == "closest" else np.full(len(rho), R)

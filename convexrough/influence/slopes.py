@@ -1,0 +1,89 @@
+"""How the surface slopes at each asperity: the derivative of the coupling by its points.
+
+An asperity that is moved by dc feels the displacement A P changed by its slope times dc,
+
+    d(A P)_i / dc_i = -scale sum_j (c_i - c_j) P_j / r_ij^3,
+
+two sums with odd kernels. They need the same boxes and meshes as the coupling, and no bounds:
+nothing is proved of derivatives by positions. On a mesh the smooth part is -grad L, which is r
+times the softened 1 / r^3 of one order less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array
+from convexrough.influence.convolution import Box
+from convexrough.influence.lattice_smoother import differences
+from convexrough.influence.pair_sums import Product
+from convexrough.influence.softened import Softened
+
+#: Pairs looked at together.
+BLOCK = 2**22
+
+Spectra = tuple[NDArray[Any], NDArray[Any]]
+
+
+def odd_spectra(box: Box, over_cube: Callable[[Array], Array]) -> Spectra:
+    """The transforms of x and y over r^3 for every difference of two sites of a box.
+
+    over_cube : 1 / r^3, or what is taken for it, of squared distances
+    """
+    from scipy import fft
+
+    i, j = (differences(length) for length in box.padded)
+    x, y = (np.add.outer(i * box.basis[0, k], j * box.basis[1, k]) for k in (0, 1))
+    values = over_cube(x * x + y * y)
+    values *= np.logical_and.outer(np.abs(i) < box.shape[0], np.abs(j) < box.shape[1])
+    return fft.rfft2(values * x, workers=box.workers), fft.rfft2(values * y, workers=box.workers)
+
+
+def by_mesh(product: Product, spectra: Spectra | None, values: Array) -> Array:
+    """(n, 2) the same sums: smooth at a distance, pair by pair nearby."""
+    ordered = values[product.order.places]
+    total = _nearby(product, ordered)
+    if product.weights is not None and spectra is not None:
+        field = product.weights.to_nodes(ordered)
+        for k in (0, 1):
+            smooth = product.mesh.convolve(field, spectra[k])
+            total[:, k] += product.weights.from_nodes(smooth)
+    result = np.empty_like(total)
+    result[product.order.places] = total
+    return result
+
+
+def mesh_spectra(product: Product) -> Spectra | None:
+    """Those of the smooth part of a product; None where it has none."""
+    if product.weights is None:
+        return None
+    return odd_spectra(product.mesh, _softer(product).smooth)
+
+
+def _softer(product: Product) -> Softened:
+    kernel = product.splitting.kernel
+    return Softened(3, kernel.order - 1, kernel.reach)
+
+
+def _nearby(product: Product, ordered: Array) -> Array:
+    """What the smooth part leaves to near pairs, some rows of them at a time."""
+    upper, points, kernel = product.near.upper, product.order.points, _softer(product)
+    total, n = np.zeros_like(points), len(points)
+    edges = np.searchsorted(upper.indptr, np.arange(0, upper.nnz + BLOCK, BLOCK))
+    edges = np.unique(np.append(np.minimum(edges, n), (0, n)))
+    for first, last in pairwise(edges):
+        counts = np.diff(upper.indptr[first : last + 1])
+        here = np.repeat(np.arange(first, last), counts)
+        there = upper.indices[upper.indptr[first] : upper.indptr[last]]
+        apart = points[here] - points[there]
+        weights = kernel.local((apart**2).sum(axis=1))
+        for k in (0, 1):
+            pull = weights * apart[:, k]
+            total[:, k] += np.bincount(here, pull * ordered[there], minlength=n)
+            total[:, k] -= np.bincount(there, pull * ordered[here], minlength=n)
+    return total

@@ -1,0 +1,82 @@
+"""Where asperities stand, and what follows from that alone, whoever stands there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.kept import Keeper
+from convexrough.scene.lattice import Lattice, Sites
+from convexrough.scene.neighbours import refuse_coincident
+from convexrough.scene.patterns import Pattern
+
+#: Of more asperities than this, a lattice is looked for before the nearest neighbours of all.
+MANY = 5000
+
+
+#: Coordinates of points made on a lattice may be off their sites by this part of the largest: three
+#: roundoffs in making them, and what `Lattice.sites` loses and allows for when it looks.
+MADE_BLUR = 16 * 2.0**-53
+
+
+@dataclass(frozen=True, eq=False)
+class Layout(Keeper):
+    """Distinct points (n, 2) [length] in the plane; asperities of one layout share all of this.
+
+    made : the lattice that they were made on, and i and j (n, 2) of each; None to look for one
+    """
+
+    points: Array
+    made: tuple[Lattice, Sites] | None = None
+
+    def __post_init__(self) -> None:
+        if self.made is None and (len(self.points) <= MANY or self.lattice is None):
+            refuse_coincident(self.points)
+
+    @classmethod
+    def of(cls, pattern: Pattern, spacing: float, limit: float) -> Layout:
+        """All sites of a pattern whose norm is at most the limit, made this far apart [length]."""
+        sites, order = pattern.within(limit)
+        points = spacing * np.stack(pattern.coordinates(*sites.T), axis=1)
+        if len(points) < 3:
+            return cls(frozen(points))
+        blur = MADE_BLUR * float(np.abs(points).max())
+        layout = cls(frozen(points), (Lattice(np.zeros(2), spacing * pattern.basis, blur), sites))
+        layout.__dict__["order"] = order
+        return layout
+
+    @cached_property
+    def lattice(self) -> Lattice | None:
+        """What the points lie on, each on a site of its own, if that is a lattice."""
+        return Lattice.through(self.points) if self.made is None else self.made[0]
+
+    @cached_property
+    def sites(self) -> Sites | None:
+        """(n, 2) i and j of each point on the lattice."""
+        if self.made is not None:
+            return self.made[1]
+        return None if self.lattice is None else self.lattice.sites(self.points)
+
+    @cached_property
+    def order(self) -> Indices | None:
+        """(n,) that sorts the points by i and then by j: as transforms go through them."""
+        if self.sites is None:
+            return None
+        i, j = (self.sites - self.sites.min(axis=0)).T
+        return np.argsort(i * (int(j.max()) + np.int64(1)) + j)
+
+    def sorted(self, wanted: NDArray[np.bool_]) -> Indices:
+        """The points that are wanted (n,): of many on a lattice in the `order` of its sites."""
+        if len(self.points) <= MANY or self.order is None:
+            return wanted.nonzero()[0]
+        return self.order[wanted[self.order]]
+
+    @cached_property
+    def distances(self) -> Array:
+        """(n,) [length] distance of each point from the axis."""
+        x, y = self.points.T
+        return frozen(np.hypot(x, y))

@@ -1,0 +1,59 @@
+"""Where Newton's method starts from when it is given nothing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.normal.problem import NormalProblem
+from convexrough.solvers.mean_field import mean_field_indentation
+from convexrough.sphere import hertz
+
+#: Up to so many candidates, one product with A is worth a start. Heuristic: any start leads to the
+#: same answer.
+FEW = 1000
+
+#: A rough contact reaches further than the smooth sphere's, in the square of its radius, by about
+#: this: the paper's scene. A heuristic, which a start can bear.
+WIDER = 1.1
+
+
+def start_indentation(problem: NormalProblem) -> Array:
+    """(n,) indentations of the candidates, negative where open (own units)."""
+    if len(problem) > FEW:
+        return mean_field_indentation(problem)
+    return _on_hertz_pressure(problem)
+
+
+def _on_hertz_pressure(problem: NormalProblem) -> Array:
+    """Each rides on the displacement A P of loads in proportion to the smooth sphere's pressure.
+
+    P = x^3 s, s = (1 - r^2 / a^2)^(1/2), of the given total; or, at a given approach, where the
+    energy is least along s:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
+    """
+    squares = problem.scene.asperities.distances[problem.candidates] ** 2
+    inside = np.maximum(1.0 - squares / (WIDER * _smooth_radius(problem) ** 2), 0.0)
+    s = np.sqrt(inside)
+    displacement = problem.influence.apply(s)
+    prescribed = problem.ceiling + problem.offsets
+    total, work = float(s.sum()), float(s @ prescribed)
+    if not (total > 0 and work > 0):  # nothing where the smooth sphere would touch
+        return problem.smooth_indentation()
+    if problem.load is not None:
+        return prescribed - problem.load / total * displacement
+    local, coupled = float(s @ (problem.coefficients * np.cbrt(inside))), float(s @ displacement)
+    x = math.sqrt(work / local)
+    for _ in range(8):  # from the right of the root of a convex function
+        x -= (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
+    return np.asarray(prescribed - x**3 * displacement)
+
+
+def _smooth_radius(problem: NormalProblem) -> float:
+    """[length] a of a smooth sphere: at the approach, or under the load."""
+    radius, units = problem.scene.sphere_radius, problem.units
+    if problem.load is None:
+        return float(np.sqrt(radius * max(problem.ceiling, 0.0) * units.length)) or 1.0
+    modulus = problem.scene.material.contact_modulus
+    return float(hertz.contact_radius(problem.load * units.force, modulus, radius))

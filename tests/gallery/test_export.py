@@ -1,0 +1,172 @@
+"""The benchmark pack: read back by other libraries, solved by two solvers each, and judged."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import clarabel
+import numpy as np
+import picos
+import pytest
+import qpsolvers
+import scs
+from gallery_answers import true_words
+from picos.modeling.file_in import import_cbf
+from scipy import sparse
+
+import convexrough as cr
+from convexrough import cli, gallery
+
+#: Tolerance of interior-point solvers; an energy that near fixes loads to its root only.
+TOLERANCE = 1e-9
+NEAR = 1e-4
+
+each_case = pytest.mark.parametrize("name", gallery.names())
+
+
+@pytest.fixture(scope="module")
+def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("gallery") / "pack"
+    assert cli.main(["gallery", "--export", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def index(pack: Path) -> Any:
+    return json.loads((pack / "index.json").read_text())["cases"]
+
+
+def judged(name: str, about: Any, x: Any, near: float) -> None:
+    """As the index says how, and by the certificate, whose words are held against the answer."""
+    case = gallery.case(name)
+    loads = np.zeros(len(case))
+    members = about["asperities"]
+    loads[members] = np.maximum(about["force_unit"] * np.array(x[: len(members)]), 0.0)
+    assert case.judge(loads).error < near
+    assert true_words(case, cr.certify(case.scene, loads, **case.control).status)
+
+
+def program(index: Any, name: str, ending: str) -> Any:
+    found = index[name]["programs"].get(f"{name}.{ending}")
+    if found is None:
+        kind = "bristles" if ending.startswith("bristles") else "cones"
+        assert "convex" in index[name]["left_out"].get(kind, "convex"), name
+    return found
+
+
+@each_case
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # how qpsolvers calls OSQP
+def test_bristle_programs(name: str, pack: Path, index: Any) -> None:
+    about = program(index, name, "bristles.npz")
+    if about is None:
+        return
+    problem = qpsolvers.Problem.load(pack / f"{name}.bristles.npz")
+    assert len(problem.q) == about["variables"]
+    assert problem.lb is None
+    assert np.array_equal(problem.P, problem.P.T)
+    problem.P, problem.G, problem.A = map(sparse.csc_matrix, (problem.P, problem.G, problem.A))
+    settings = {"eps_abs": TOLERANCE, "eps_rel": TOLERANCE, "max_iter": 50_000, "polishing": True}
+    for solver, given in (("clarabel", {}), ("osqp", settings)):
+        judged(name, about, qpsolvers.solve_problem(problem, solver, **given).x, about["off"])
+
+
+@each_case
+def test_cone_programs_by_clarabel(name: str, pack: Path, index: Any) -> None:
+    about = program(index, name, "cones.json")
+    if about is None:
+        return
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+    found = clarabel.load_from_file(str(pack / f"{name}.cones.json"), settings).solve()
+    judged(name, about, found.x, NEAR)
+    assert abs(found.obj_val - about["objective"]) < 1e-7 * max(abs(about["objective"]), 1e-3)
+
+
+@each_case
+def test_cone_programs_by_another_solver(name: str, pack: Path, index: Any) -> None:
+    about = program(index, name, "cones.json")
+    if about is None:
+        return
+    data = json.loads((pack / f"{name}.cones.json").read_text())
+
+    def matrix(part: Any) -> Any:
+        columns = part["nzval"], part["rowval"], part["colptr"]
+        return sparse.csc_matrix(columns, shape=(part["m"], part["n"]))
+
+    given = {"P": matrix(data["P"]), "A": matrix(data["A"])}
+    given |= {"b": np.array(data["b"]), "c": np.array(data["q"])}
+    zero, *orders = data["cones"]
+    cones = {"z": zero["ZeroConeT"], "q": [cone["SecondOrderConeT"] for cone in orders]}
+    settings = {"eps_abs": TOLERANCE, "eps_rel": TOLERANCE, "max_iters": 50_000}
+    found = scs.SCS(given, cones, verbose=False, **settings).solve()
+    judged(name, about, found["x"], NEAR)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:picos")  # of PICOS' reader, by itself
+@pytest.mark.parametrize("name", ["one", "two-equal", "load-1e-15", "convexity-bound-1-above",
+                                  "convexity-solution-21-25-above", "ring-of-six",
+                                  "grazing-load-1e-9", "shear-1e-12-of-all"])  # fmt: skip
+def test_cbf(name: str, pack: Path, index: Any) -> None:
+    """Through a reader of CBF that shares nothing with our writer."""
+    about = program(index, name, "cbf")
+    problem, (variables,), *_ = import_cbf(str(pack / f"{name}.cbf"))
+    assert len(variables) == about["variables"] + 1  # the last one is the quadratic term
+    for solver in ("cvxopt", "ecos"):
+        settings = {"rel_bnb_opt_tol": None, "abs_prim_fsb_tol": 1e-8, "verbosity": 0}
+        problem.solve(solver=solver, **settings)
+        judged(name, about, np.ravel(variables.value), NEAR)
+        least = about["objective"]
+        assert abs(problem.value - least) < 1e-6 * max(abs(least), 1e-3)
+    assert isinstance(problem, picos.Problem)
+
+
+def test_a_file_with_one_number_changed_is_found_out(pack: Path, index: Any) -> None:
+    """The tests above can fail: here they do."""
+    about = program(index, "two-equal", "cones.json")
+    data = json.loads((pack / "two-equal.cones.json").read_text())
+    data["q"][0] *= 1.01
+    changed = pack / "changed.json"
+    changed.write_text(json.dumps(data))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    found = clarabel.load_from_file(str(changed), settings).solve()
+    with pytest.raises(AssertionError):
+        judged("two-equal", about, found.x, NEAR)
+
+
+def test_the_index(pack: Path, index: Any) -> None:
+    assert list(index) == list(gallery.names())
+    page = (pack / "index.md").read_text()
+    for name, about in index.items():
+        case = gallery.case(name)
+        assert f"| {name} " in page
+        assert about["answer"]["loads"] == list(case.loads)
+        assert about["touching"] == case.touching.sum()
+        assert about["scene"]["heights"] == case.scene.asperities.heights.tolist()
+        undecided = about["certificate"]["undecided"]
+        assert (undecided == []) == (about["certificate"]["load_error"] is not None) or undecided
+        for file in about["programs"]:
+            assert (pack / file).stat().st_size < 2_000_000
+    left_out = {name for name, about in index.items() if "bristles" in about["left_out"]}
+    assert left_out == {"convexity-end-above"}
+    written = {path.name for path in pack.iterdir()}
+    listed = set(json.loads((pack / "files.json").read_text())["files"])
+    assert written - listed <= {"files.json", "changed.json"}
+
+
+def test_the_command(command: Any, tmp_path: Path) -> None:
+    listed = command("gallery", "--list", "few")
+    assert listed.status == 0
+    assert listed.out.count("\n") == 4
+    assert "two equal contacts" in listed.out
+    wrong = command("gallery", "grasing")
+    assert (wrong.status, "grazing" in wrong.err) == (2, True)
+    assert command("gallery", "few", "--export", "pack").status == 0
+    again = command("gallery", "few", "--export", "pack")
+    assert (again.status, "not empty" in again.err) == (2, True)
+    before = {path.name: path.read_bytes() for path in (tmp_path / "pack").iterdir()}
+    assert command("gallery", "few", "--export", "pack", "--force").status == 0
+    assert before == {path.name: path.read_bytes() for path in (tmp_path / "pack").iterdir()}
+    said = command("gallery", "few", "--json")
+    assert list(json.loads(said.out)["cases"]) == ["one", "one-under-load", "two-equal"]

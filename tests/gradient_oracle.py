@@ -1,0 +1,264 @@
+"""Contacts, friction states and losses in 130 digits, for differences of them: the test oracle.
+
+Written from the formulas of physics alone, in the scene's own units, and sharing no code with the
+package: Hertz's law k P^(2/3), Boussinesq's coupling, Mindlin's law at constant load, odd in the
+force, and the loss as eight times the error of the trapezoid rule. Who touches and who slides is
+taken from a state in float64 and must not change within a step.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from flint import arb, arb_mat, ctx
+
+import convexrough as cr
+
+DIGITS = 130
+STEP = "1e-25"  # of each parameter over its own size
+Balls: TypeAlias = Any  # an arb, or an object array of arb
+
+exact = np.vectorize(lambda value: arb(float(value)), otypes=[object])
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything a result depends on; `control` is P or D0, `forces` are shear forces."""
+
+    positions: Balls
+    tip_radii: Balls
+    heights: Balls
+    sphere_radius: Balls
+    contact_modulus: Balls
+    poisson_ratio: Balls
+    friction: Balls
+    control: Balls
+    forces: Balls
+    geometry: str
+    by_load: bool
+
+    @classmethod
+    def of(cls, contact: cr.Contact, holding: str, forces: Any = ()) -> "Setup":
+        scene, material = contact.scene, contact.scene.material
+        control = contact.load if holding == "load" else contact.approach
+        numbers = scene.sphere_radius, material.contact_modulus, material.poisson_ratio
+        return cls(
+            exact(scene.asperities.positions),
+            exact(scene.asperities.tip_radii),
+            exact(scene.asperities.heights),
+            *(arb(float(value)) for value in (*numbers, scene.friction or 1.0, control)),
+            exact(np.asarray(forces, dtype=float)) if np.size(forces) else np.zeros(0, object),
+            scene.geometry,
+            holding == "load",
+        )
+
+    def moved(self, name: str, by: Balls) -> "Setup":
+        return replace(self, **{name: getattr(self, name) + by})
+
+
+class Oracle:
+    """The state of a setup, solved from one near it, in multiprecision.
+
+    near : loads (n,) and the approach; of another oracle, or of a contact
+    """
+
+    def __init__(self, setup: Setup, loads: Balls, approach: Balls, steps: int = 4) -> None:
+        s = self.setup = setup
+        self.touching = np.flatnonzero([bool(load > 0) for load in loads])
+        rho, R, E = s.tip_radii, s.sphere_radius, s.contact_modulus
+        self.k = cube_root(arb(9) / 16 / (E * E) * (1 / R + 1 / rho))
+        r2 = (s.positions**2).sum(axis=1)
+        closest = s.geometry == "closest"
+        far = R + rho if closest else R + 0 * rho
+        points = s.positions * (R / (R + rho))[:, None] if closest else s.positions
+        self.offsets = s.heights - r2 / (2 * far)
+        apart = points[:, None, :] - points[None, :, :]
+        squares = (apart * apart).sum(axis=2)
+        np.fill_diagonal(squares, arb(1))
+        self.A = 1 / (arb.pi() * E * np.sqrt(squares))
+        np.fill_diagonal(self.A, arb(0))
+        on = self.touching
+        self.inner = self.A[np.ix_(on, on)]
+        self.P, self.approach = self._press(mid(loads[on]), approach, steps)
+        self.ceilings = self.k[on] * cube_root(self.P) ** 2
+
+    def _press(self, P: Balls, approach: Balls, steps: int) -> tuple[Balls, Balls]:
+        k, d, s = self.k[self.touching], self.offsets[self.touching], self.setup
+        approach = approach if s.by_load else s.control
+        for _ in range(steps):
+            root = cube_root(P)
+            defect = k * root**2 + self.inner @ P - d - approach
+            n = len(P)
+            matrix = np.full((n + 1, n + 1), arb(0))
+            matrix[:n, :n] = self.inner + np.diag(2 * k / (3 * root))
+            matrix[:n, n] = arb(-1)
+            matrix[n, :n], right = arb(1), np.append(defect, P.sum() - s.control)
+            if not s.by_load:
+                matrix, right = matrix[:n, :n], defect
+            step = solve(matrix, right)
+            P = mid(P - step[:n])
+            approach = (approach - step[n]).mid() if s.by_load else approach
+        return P, approach
+
+    @property
+    def loads(self) -> Balls:
+        full = np.full(len(self.offsets), arb(0))
+        full[self.touching] = self.P
+        return full
+
+    @property
+    def gaps(self) -> Balls:
+        gaps = self.A @ self.loads - self.offsets - self.approach
+        gaps[self.touching] = arb(0)
+        return gaps
+
+    @property
+    def ratio(self) -> Balls:
+        nu = self.setup.poisson_ratio
+        return (2 - nu) / (2 * (1 - nu))
+
+    def friction(self, T: Balls, eta: Balls, steps: int = 4) -> "Sheared":
+        """The increments u with sum T: eta + A u(eta) = Delta, from eta near it."""
+        C, n, rise = self.ceilings, len(self.P), arb(0)
+        eta = mid(eta)
+        for step in range(steps + 1):
+            size = np.array([abs(e) for e in eta]) / C
+            left = np.sqrt(np.array([max(1 - (z.mid()), arb(0)) for z in size]))
+            sign = np.array([arb(1 if e > 0 else -1) for e in eta])
+            u, c = sign * self.P * (1 - left**3), 3 * self.P * left / (2 * C)
+            if step == steps:
+                break
+            matrix = np.full((n + 1, n + 1), arb(0))
+            matrix[:n, :n] = self.inner * c + np.diag(np.full(n, arb(1)))
+            matrix[:n, n], matrix[n, :n] = arb(-1), c
+            change = solve(matrix, np.append(eta + self.inner @ u - rise, u.sum() - T))
+            eta, rise = mid(eta - change[:n]), (rise - change[n]).mid()
+        return Sheared(self, T, eta, u, rise)
+
+
+@dataclass(frozen=True)
+class Sheared:
+    """A friction state, in the scene's units over f or c_t f."""
+
+    oracle: Oracle
+    T: Balls
+    eta: Balls
+    u: Balls
+    rise: Balls
+
+    @property
+    def displacement(self) -> Balls:
+        return self.oracle.ratio * self.oracle.setup.friction * self.rise
+
+    @property
+    def forces(self) -> Balls:
+        return self.oracle.setup.friction * self.u
+
+    @property
+    def slips(self) -> Balls:
+        beyond = [
+            e - c if e > c else e + c if e < -c else arb(0)
+            for e, c in zip(self.eta, self.oracle.ceilings, strict=True)
+        ]
+        return self.oracle.ratio * self.oracle.setup.friction * np.array(beyond)
+
+    @property
+    def loss(self) -> Balls:
+        """8 c_t f^2 (T Delta / 2 - Psi)."""
+        P, u = self.oracle.P, self.u
+        t = np.array([abs(each) for each in u / P])
+        left = np.array([max((1 - each).mid(), arb(0)) for each in t])
+        psi = t - arb(3) / 5 * (1 - cube_root(left) ** 5)
+        energy = (P * self.oracle.ceilings * psi).sum() + (u @ (self.oracle.inner @ u)) / 2
+        f = self.oracle.setup.friction
+        return 8 * self.oracle.ratio * f * f * (self.T * self.rise / 2 - energy)
+
+
+class Judge:
+    """Derivatives of a number by differences of it: value(setup, near) -> (number, state)."""
+
+    def __init__(self, setup: Setup, value: Callable[[Setup, Any], tuple[Balls, Any]]) -> None:
+        self.setup, self.value = setup, value
+        with ctx.workdps(DIGITS):
+            self.at, self.near = value(setup, None)
+
+    def slope(self, name: str, direction: Balls) -> float:
+        """The derivative along `direction` of one parameter, as a float."""
+        with ctx.workdps(DIGITS):
+            h = arb(STEP)
+            ends = [
+                self.value(self.setup.moved(name, s * h * direction), self.near) for s in (1, -1)
+            ]
+            return float((ends[0][0] - ends[1][0]) / (2 * h))
+
+
+def press(contact: cr.Contact, setup: Setup, near: Oracle | None) -> Oracle:
+    if near is None:
+        return Oracle(setup, exact(contact.loads), arb(contact.approach), 5)
+    return Oracle(setup, near.loads, near.approach, 3)
+
+
+def cube_root(values: Balls) -> Balls:
+    return np.vectorize(lambda v: arb(0) if v == 0 else v.root(3), otypes=[object])(values)
+
+
+def mid(values: Balls) -> Balls:
+    return np.vectorize(lambda v: v.mid(), otypes=[object])(values)
+
+
+def solve(matrix: Balls, right: Balls) -> Balls:
+    column = arb_mat(len(right), 1, list(right))
+    return np.array(arb_mat(matrix.tolist()).solve(column, algorithm="approx").entries())
+
+
+def sheared(contact: cr.Contact, holding: str, force: float) -> Callable[[Setup, Any], Sheared]:
+    """From a setup, whose first force is Q, and a state near it to the friction state at Q / f."""
+    state, scene = cr.shear(contact, force=abs(force)), contact.scene
+    nu, on = scene.material.poisson_ratio, np.flatnonzero(contact.loads)
+    travel = (2 - nu) / (2 * (1 - nu)) * (scene.friction or 1.0)
+
+    def solved(setup: Setup, near: Sheared | None) -> Sheared:
+        oracle = press(contact, setup, None if near is None else near.oracle)
+        start, steps = (
+            (exact(state.displacements[on] / travel), 6) if near is None else (near.eta, 3)
+        )
+        return oracle.friction(setup.forces[0] / setup.friction, start, steps)
+
+    return solved
+
+
+def assert_slopes(judge: Judge, gradient: cr.Gradient, tolerance: float, seed: int = 0) -> None:
+    """Every derivative against differences, arrays along random directions of signs.
+
+    tolerance : over the largest term of each
+    """
+    rng, scene = np.random.default_rng(seed), gradient.contact.scene
+    sizes = {
+        "heights": gradient.contact.approach,
+        "tip_radii": float(scene.asperities.tip_radii.min()),
+        "positions": float(np.ptp(scene.asperities.positions)) / 20,
+    }
+    for name, size in sizes.items():
+        slopes = getattr(gradient, name)
+        for _ in range(2):
+            v = rng.choice([-1.0, 1.0], size=slopes.shape) * size
+            close(judge.slope(name, exact(v)), slopes * v, tolerance, name)
+    held = gradient.load if gradient.load is not None else gradient.approach
+    for name, slope in (
+        ("sphere_radius", gradient.sphere_radius),
+        ("contact_modulus", gradient.contact_modulus),
+        ("poisson_ratio", gradient.poisson_ratio),
+        ("friction", gradient.friction),
+        ("control", held),
+    ):
+        if slope is None:  # infinite, or none
+            continue
+        size = float(getattr(judge.setup, name))
+        close(judge.slope(name, arb(size)), np.array([slope * size]), tolerance, name)
+
+
+def close(found: float, terms: Any, tolerance: float, name: str) -> None:
+    """A difference, and the terms whose sum it should be."""
+    scale = max(np.abs(terms).max(), abs(found))
+    assert abs(found - terms.sum()) <= tolerance * scale, (name, found, terms.sum(), scale)

@@ -1,0 +1,161 @@
+"""Forward derivatives: against differences in 130 digits, and against gradients."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+from friction_scenes import FRICTION, with_friction
+from gradient_oracle import DIGITS, STEP, Setup, exact, press, sheared
+from scenes import NAMED
+
+import convexrough as cr
+
+
+def pressed(name: str, control: str) -> cr.Contact:
+    scene, approach = NAMED[name]
+    contact = cr.press(with_friction(scene), approach=approach)
+    return contact if control == "approach" else cr.press(contact.scene, load=contact.load)
+
+
+def direction(contact: cr.Contact, holding: str, force: float, seed: int = 0) -> cr.Direction:
+    """A change of everything at once, each by about its own size."""
+    rng, scene = np.random.default_rng(seed), contact.scene
+    n, f = len(scene), scene.friction or 1.0
+    control: Any = {holding: getattr(contact, holding) * 0.7}
+    return cr.Direction(
+        heights=contact.approach * rng.normal(size=n),
+        tip_radii=scene.asperities.tip_radii * rng.normal(size=n),
+        positions=0.0025 * rng.normal(size=(n, 2)) * (np.ptp(scene.asperities.positions) / 0.02),
+        sphere_radius=-0.3 * scene.sphere_radius,
+        contact_modulus=0.4 * scene.material.contact_modulus,
+        poisson_ratio=0.2,
+        friction=-0.6 * f,
+        force=0.8 * force,
+        **control,
+    )
+
+
+def moved(setup: Setup, along: cr.Direction, holding: str, by: Any) -> Setup:
+    """The setup, by so many times the direction."""
+    steps = {
+        name: exact(np.asarray(getattr(along, name), dtype=float))
+        for name in ("heights", "tip_radii", "positions")
+    }
+    for name in ("sphere_radius", "contact_modulus", "poisson_ratio", "friction"):
+        steps[name] = arb(float(getattr(along, name)))
+    steps["control"] = arb(float(getattr(along, holding)))
+    if len(setup.forces):
+        steps["forces"] = exact(np.array([along.force]))
+    return replace(setup, **{name: getattr(setup, name) + by * it for name, it in steps.items()})
+
+
+CASES = [
+    ("paper", "load", 0.5),
+    ("rough", "approach", 1e-6),
+    ("rough, closest", "load", 0.3),
+    ("rough, closest", "approach", 0.9),
+    ("steel", "approach", 0.5),
+]
+
+
+@pytest.mark.parametrize(("name", "holding", "fraction"), CASES)
+def test_everything_that_changes(name: str, holding: str, fraction: float) -> None:
+    contact = pressed(name, holding)
+    force = fraction * FRICTION * contact.load
+    along, solved = direction(contact, holding, force), sheared(contact, holding, force)
+    change = cr.shear(contact, force=force).change(along)
+    setup = Setup.of(contact, holding, [force])
+    on = np.flatnonzero(contact.loads)
+    with ctx.workdps(DIGITS):
+        h = arb(STEP)
+        near = solved(setup, None)
+        up, down = (solved(moved(setup, along, holding, s * h), near) for s in (1, -1))
+
+        def slope(number: Any) -> Any:
+            found = (number(up) - number(down)) / (2 * h)
+            return np.array([float(each) for each in np.atleast_1d(found)])
+
+        pairs = [
+            (slope(lambda s: s.oracle.loads), change.pressed.loads),
+            (slope(lambda s: s.oracle.gaps), change.pressed.gaps),
+            (slope(lambda s: s.oracle.P.sum()), change.pressed.load),
+            (slope(lambda s: s.forces), change.forces[on]),
+            (slope(lambda s: s.slips), change.slips[on]),
+            (slope(lambda s: s.displacement), change.displacement),
+        ]
+        if holding == "load":
+            pairs.append((slope(lambda s: s.oracle.approach), change.pressed.approach))
+    for true, found in pairs:
+        np.testing.assert_allclose(found, true, rtol=0, atol=2e-13 * np.abs(true).max())
+
+
+@pytest.mark.parametrize(("name", "holding", "fraction"), CASES)
+def test_forwards_and_backwards_agree(name: str, holding: Any, fraction: float) -> None:
+    contact, rng = pressed(name, holding), np.random.default_rng(9)
+    force = fraction * FRICTION * contact.load
+    state, along = cr.shear(contact, force=force), direction(contact, holding, force, seed=4)
+    change, n = state.change(along), len(contact.scene)
+    forces, slips = rng.normal(size=n), rng.normal(size=n) * contact.load / contact.approach
+    gradient = state.gradient(forces=forces, slips=slips, displacement=0.3, holding=holding)
+    terms = forces * change.forces + slips * change.slips
+    forwards = terms.sum() + 0.3 * change.displacement
+    parts = [
+        gradient.heights * along.heights,
+        gradient.tip_radii * along.tip_radii,
+        (gradient.positions * along.positions).ravel(),
+    ]
+    for each in ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "force", holding):
+        parts.append(np.atleast_1d(getattr(gradient, each) * getattr(along, each)))
+    whole = np.concatenate(parts)
+    assert whole.sum() == pytest.approx(
+        forwards, abs=1e-13 * max(np.abs(whole).max(), np.abs(terms).max())
+    )
+
+
+def test_a_backward_force_mirrors_a_forward_one() -> None:
+    contact = pressed("rough", "load")
+    force = 0.2 * contact.load
+    along = direction(contact, "load", force)
+    ahead = cr.shear(contact, force=force).change(along)
+    back = cr.shear(contact, force=-force).change(replace(along, force=-along.force))
+    np.testing.assert_allclose(back.forces, -ahead.forces, rtol=1e-12)
+    np.testing.assert_allclose(back.slips, -ahead.slips, rtol=1e-12)
+    assert back.displacement == pytest.approx(-ahead.displacement, rel=1e-13)
+
+
+def test_what_cannot_change() -> None:
+    contact = pressed("paper", "load")
+    with pytest.raises(cr.InputError, match="at most one of the two"):
+        contact.change(cr.Direction(load=1.0, approach=1.0))
+    with pytest.raises(cr.InputError, match="x and y of each"):
+        contact.change(cr.Direction(positions=[1.0, 2.0]))
+    with pytest.raises(cr.InputError, match="expected a Direction"):
+        contact.change({"heights": 1.0})  # type: ignore[arg-type]
+    with pytest.raises(cr.InputError, match="below f P"):
+        cr.shear(contact, force=FRICTION * contact.load).change(cr.Direction(heights=1e-9))
+
+
+def test_both_prescriptions_are_held_unless_told_otherwise() -> None:
+    by_load, by_approach = pressed("rough", "load"), pressed("rough", "approach")
+    rise = cr.Direction(heights=1e-9)
+    assert by_load.change(rise).approach == pytest.approx(-1e-9, rel=1e-12)
+    assert abs(by_load.change(rise).load) < 1e-12 * by_approach.change(rise).load
+    same = by_load.change(replace(rise, approach=0.0))
+    np.testing.assert_allclose(same.loads, by_approach.change(rise).loads, rtol=1e-10, atol=1e-25)
+
+
+def test_who_is_open_and_stays_open_changes_no_load() -> None:
+    contact = pressed("paper", "load")
+    rise = np.where(contact.loads > 0, 0.0, 1e-9)
+    change = contact.change(cr.Direction(heights=rise))
+    assert not change.loads.any()
+    np.testing.assert_allclose(change.gaps[contact.loads == 0], -1e-9)
+
+
+def test_the_oracle_is_at_the_state() -> None:
+    contact = pressed("rough", "load")
+    with ctx.workdps(DIGITS):
+        oracle = press(contact, Setup.of(contact, "load"), None)
+        assert abs(float(oracle.approach) / contact.approach - 1) < 1e-14

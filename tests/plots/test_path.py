@@ -1,0 +1,159 @@
+"""Figures of load paths: they show the numbers of the results, and nothing in them collides."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from drawn import discs, fits, words
+from matplotlib.colors import to_rgba
+from numpy.testing import assert_allclose
+from path_scenes import LARGEST, ONE, PAPER, ROUGH, TWO, follow
+from scenes import MATERIAL, PAPER_APPROACH
+
+import convexrough as cr
+from convexrough import plots
+from convexrough.plots.words import LOOKS
+
+P = LARGEST["paper"]
+UNITS: Any = dict(length_unit="µm", force_unit="mN")
+
+
+@cache
+def limits() -> dict[str, cr.Shakedown]:
+    swing = 0.5 * P * np.array([1.0, -1.0])
+    p, q = cr.elliptic_path(
+        load=0.0, load_amplitude=0.09 * P, force_amplitude=0.09 * P, phase=0.8, friction=0.5
+    )
+    return {
+        "constant": cr.shakedown(PAPER, loads=P, force_amplitudes=swing),
+        "about a mean": cr.shakedown(PAPER, loads=P, forces=0.1 * P, force_amplitudes=swing),
+        "ellipse": cr.shakedown(ROUGH, loads=0.9 * P, load_amplitudes=p, force_amplitudes=q),
+        "elastic": cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="elastic"),
+        "vector": cr.shakedown(
+            PAPER, loads=P, force_amplitudes=np.column_stack((swing, 0 * swing)), kind="vector"
+        ),
+    }
+
+
+@cache
+def losses() -> cr.PhaseLosses:
+    return cr.phase_losses(
+        PAPER,
+        load=0.7 * P,
+        load_amplitude=0.2 * P,
+        force_amplitude=0.14 * P,
+        phases=np.linspace(0, np.pi, 7),
+        factors=[0.5, 1.0],
+        chords=8,
+    )
+
+
+@pytest.mark.parametrize("points", [ONE, TWO, ONE[:1]])
+def test_figures_of_a_path_fit(points: list[tuple[float, float]]) -> None:
+    for figure in plots.path_figures(follow("paper", points), **UNITS).values():
+        fits(figure)
+
+
+def test_the_path_and_its_memory_are_drawn() -> None:
+    path = follow("paper", ONE)
+    figures = plots.path_figures(path)
+    plane, loop, cost = figures["path"].axes
+    lines = {line.get_label(): line.get_xydata() for line in plane.lines}
+    last = path.curves[-1]
+    vertices = np.array([[float(each) for each in row] for row in (last.levels, last.heights)])
+    assert_allclose(lines["memory at 7"], vertices.T / P)
+    assert loop.lines[-1].get_ydata()[-1] == pytest.approx(path.applied[-1] / (0.5 * P))
+    assert cost.lines[0].get_ydata()[-1] == pytest.approx(1.0)
+    place = figures["path_stick_slip"].axes[3]
+    assert discs(place, "sliding") == int((path.status[3] == "sliding").sum())
+
+
+def test_what_a_closed_path_settles_to() -> None:
+    found = cr.steady(PAPER, loads=[0.9 * P, 0.5 * P], forces=[0.2 * P, -0.2 * P])
+    figure = plots.steady_figures(found, **UNITS)["steady"]
+    fits(figure)
+    plane, place = figure.axes
+    dot = plane.lines[-1].get_xydata()
+    assert_allclose(dot, [[found.level / (0.9 * P), found.force_level / (0.45 * P)]], atol=1e-15)
+    for word in LOOKS:
+        assert discs(place, word) == int((found.status == word).sum())
+
+
+def test_losses_against_phase_are_drawn() -> None:
+    found = losses()
+    figure = plots.phase_figures(found, **UNITS)["phase_losses"]
+    fits(figure)
+    (axes,) = figure.axes
+    half, _, whole, *_ = (line.get_ydata() for line in axes.lines)
+    unit = (found.energy / found.factors**3).max()
+    assert_allclose(half, found.energy[:7] * 8 / unit)
+    assert_allclose(whole, found.energy[7:] / unit)
+
+
+@pytest.mark.parametrize("name", ["constant", "about a mean", "ellipse", "elastic", "vector"])
+def test_limits_are_drawn(name: str) -> None:
+    found = limits()[name]
+    figures = plots.shakedown_figures(found, **UNITS)
+    assert set(figures) == {"shakedown"} | ({"shakedown_map"} if found.kind == "exact" else set())
+    for figure in figures.values():
+        fits(figure)
+    (said,) = [text for text in words(figures["shakedown"]) if ":" in text.get_text()][:1]
+    assert f"{found.kind}: {found.factor:.5g}" in said.get_text()
+
+
+@pytest.mark.parametrize("name", ["constant", "about a mean", "ellipse"])
+def test_the_map_changes_at_the_limits(name: str) -> None:
+    """Along the ray of the path, or up at its mean, one more slides at each asperity's factor."""
+    found = limits()[name]
+    figure = plots.shakedown_figures(found)["shakedown_map"]
+    axes = figure.axes[0]
+    counts = np.ma.filled(axes.collections[0].get_array().astype(float), np.nan)
+    n = counts.shape[0]
+    unit_t = np.ptp(found.force_amplitudes) / found.load  # over 2 f P0, f = 1/2
+    unit_p = np.ptp(found.load_amplitudes) / 2 / found.load
+    factors = found.factors[np.isfinite(found.factors)]
+    fixed = float(found.force) / (0.5 * found.load)
+    for factor in (0.5, 0.97, 1.03, 1.4):
+        at = factor * found.factor
+        x, y = (at * unit_p or fixed), at * unit_t
+        if y < 1:
+            here = counts[int(y * n), int(x * n)]
+            blur = 1.5 / n / max(unit_p, unit_t)
+            low, high = (int((factors < at + side * blur).sum()) for side in (-1, 1))
+            assert low <= here <= high
+
+
+@cache
+def many() -> cr.Scene:
+    asperities = cr.Asperities.hexagonal(
+        spacing=1.7e-4, tip_radius=1.36e-3, within=8.5e-3, height_std=2e-7, seed=3
+    )
+    return cr.Scene(1.0, asperities, MATERIAL, friction=0.5)
+
+
+def test_many_asperities_are_a_mosaic() -> None:
+    scene = many()
+    load = cr.press(scene, approach=PAPER_APPROACH).load
+    path = cr.load_path(scene, loads=[load, load], forces=[0.0, 0.2 * load])
+    figures = plots.path_figures(path, **UNITS)
+    for figure in figures.values():
+        fits(figure)
+    place = figures["path_stick_slip"].axes[1]
+    assert not any(discs(place, word) for word in LOOKS)
+    colours = np.asarray(place.images[0].get_array())
+    shown = colours[..., 3] > 0.5
+    dark = np.abs(colours - to_rgba(LOOKS["sliding"][0])).max(axis=-1) < 0.02
+    sliding = (path.status[1] == "sliding").sum() / np.count_nonzero(path.normal_loads[1])
+    assert dark.sum() / shown.sum() == pytest.approx(sliding, abs=0.05)
+    limit = cr.shakedown(scene, loads=load, force_amplitudes=[0.1 * load, -0.1 * load])
+    for figure in plots.shakedown_figures(limit, **UNITS).values():
+        fits(figure)
+
+
+def test_axes_of_ones_own() -> None:
+    curve = cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)[0]
+    axes = curve.plot()
+    assert_allclose(axes.lines[2].get_xydata(), [[0, 0], [0.75, 0], [1, 0.25]])
+    assert cr.MemoryCurve().plot().lines
+    assert losses().plot().get_xlabel().startswith("phase")
