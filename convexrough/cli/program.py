@@ -7,8 +7,12 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from threading import current_thread, main_thread
+from types import FrameType
 
 import click
 from click.shell_completion import shell_complete
@@ -51,29 +55,60 @@ for command in (run, verify, check, compare, new, paper, bench, gallery):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; errors are a message, never a traceback."""
+    with _interrupts() as interrupts:
+        try:
+            return _status(arguments)
+        except click.exceptions.Exit as end:
+            return end.exit_code
+        except click.ClickException as error:
+            error.show()
+            return error.exit_code
+        except (click.Abort, KeyboardInterrupt):
+            say_aside("interrupted")
+            return INTERRUPTED
+        except ConvexroughError as error:
+            for line in str(error).splitlines():
+                say_aside("error", line)
+            return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
+        except OSError as error:  # those of files are FileErrors
+            return _unheard(error)
+        except Exception:
+            if not interrupts:
+                raise
+            say_aside("interrupted")  # in compiled code, which made another error of it
+            return INTERRUPTED
+
+
+def _status(arguments: Sequence[str] | None) -> int:
+    """Of one command, or of a shell that asks for completions."""
+    if arguments is None and (asked := os.environ.get(COMPLETE)):
+        return shell_complete(program, {}, "convexrough", COMPLETE, asked)
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    with program.make_context("convexrough", given) as context:
+        status = int(program.invoke(context) or DONE)
+    if sys.stdout is not None:  # it is None where a shell closed it
+        sys.stdout.flush()
+    return status
+
+
+@contextmanager
+def _interrupts() -> Iterator[list[int]]:
+    """Signals of Ctrl-C while the body runs; each also raises KeyboardInterrupt, as ever."""
+    seen: list[int] = []
+    handler = signal.getsignal(signal.SIGINT)
+    if handler is not signal.default_int_handler or current_thread() is not main_thread():
+        yield seen
+        return
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        seen.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
     try:
-        if arguments is None and (asked := os.environ.get(COMPLETE)):
-            return shell_complete(program, {}, "convexrough", COMPLETE, asked)
-        given = sys.argv[1:] if arguments is None else list(arguments)
-        with program.make_context("convexrough", given) as context:
-            status = int(program.invoke(context) or DONE)
-        if sys.stdout is not None:  # it is None where a shell closed it
-            sys.stdout.flush()
-        return status
-    except click.exceptions.Exit as end:
-        return end.exit_code
-    except click.ClickException as error:
-        error.show()
-        return error.exit_code
-    except (click.Abort, KeyboardInterrupt):
-        say_aside("interrupted")
-        return INTERRUPTED
-    except ConvexroughError as error:
-        for line in str(error).splitlines():
-            say_aside("error", line)
-        return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
-    except OSError as error:  # those of files are FileErrors
-        return _unheard(error)
+        yield seen
+    finally:
+        signal.signal(signal.SIGINT, handler)
 
 
 def _unheard(error: OSError) -> int:

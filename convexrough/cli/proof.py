@@ -37,6 +37,9 @@ def write_proof(path: Path, work: Callable[[Callable[[str], object]], Proof], as
     except ProofError as error:
         say_aside("warning", str(error))
         return NOT_CERTIFIED
+    from convexrough.run.results import listed
+
     proof.save(path)
+    listed(path)
     click.echo(f"{proof.proved}\nwritten  {path}", err=as_json)
     return DONE

@@ -11,6 +11,7 @@ from convexrough.cli.options import PATH, html_option, output_options, proof_opt
 from convexrough.cli.proof import write_proof
 from convexrough.cli.speech import DONE, blamed_on, progress, say, say_aside, written
 from convexrough.errors import FileError
+from convexrough.whole import replacing
 
 
 @click.command()
@@ -87,10 +88,9 @@ def new(scene: Path) -> int:
     from importlib.resources import files
 
     template = files("convexrough.run").joinpath("new_scene.toml").read_text(encoding="utf-8")
-    try:
-        with scene.open("x", encoding="utf-8") as file:
-            file.write(template)
-    except OSError as error:
-        raise FileError(f"{scene}: cannot be written: {error.strerror or error}") from error
+    if scene.exists() or scene.is_symlink():
+        raise FileError(f"{scene}: cannot be written: File exists")
+    with replacing(scene) as temporary:
+        temporary.write_text(template, encoding="utf-8")
     click.echo(f"written  {scene}")
     return DONE

@@ -15,12 +15,13 @@ from numpy.typing import ArrayLike
 
 from convexrough import checker, checks
 from convexrough.arrays import Array
-from convexrough.errors import FileError, InputError, ProofError
+from convexrough.errors import InputError, ProofError
 from convexrough.progress import Announce
 from convexrough.proof.arguments import Argument, Trial
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz, mindlin
+from convexrough.whole import replacing
 
 
 class Sheared(Protocol):
@@ -47,16 +48,8 @@ class Proof(Record):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the file that `convexrough check` and `python checker.py` read, or none."""
-        path = Path(path)
-        temporary = path.with_name(f".{path.name}.{os.getpid()}")
-        try:
+        with replacing(Path(path)) as temporary:
             temporary.write_text(json.dumps(self.document, indent=0) + "\n", encoding="utf-8")
-            os.replace(temporary, path)
-        except OSError as error:
-            reason = error.strerror or error
-            raise FileError(f"{path}: cannot be written: {reason}") from error
-        finally:
-            temporary.unlink(missing_ok=True)
 
 
 def prove(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import platform
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -23,6 +22,7 @@ from convexrough.run.stage_tables import stage_tables
 from convexrough.run.stages import Findings
 from convexrough.run.summary import Summary, to_json
 from convexrough.version import __version__
+from convexrough.whole import remove_unfinished, replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,6 +40,8 @@ NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 def claim_folder(folder: Path, *, force: bool) -> list[Path]:
     """Make the folder and prove that it can be written to, before anything is computed.
 
+    What processes that were killed left unfinished there is removed.
+
     force : accept a folder that holds something. What an earlier run wrote there, and nobody has
         changed since, is removed; other files stay, unless new ones of the same names replace them
 
@@ -47,6 +49,7 @@ def claim_folder(folder: Path, *, force: bool) -> list[Path]:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        remove_unfinished(folder)
         if any(folder.iterdir()) and not force:
             raise FileError(
                 f"{folder}: not empty; --force replaces its results, --out takes another"
@@ -138,7 +141,7 @@ def _manifest(folder: Path) -> Summary:
 def _note(folder: Path, entries: Mapping[str, Any]) -> None:
     """Add to what the manifest of a folder of results says; the first time, begin one."""
     said = _manifest(folder) or {"schema": 1, "version": __version__, "files": {}}
-    with _replacing(folder / MANIFEST) as temporary:
+    with replacing(folder / MANIFEST) as temporary:
         temporary.write_text(to_json(said | dict(entries)) + "\n", encoding="utf-8")
 
 
@@ -199,23 +202,16 @@ def beside(path: Path) -> Iterator[Path]:
 
     The manifest says so, where the folder has one.
     """
-    with _replacing(path) as temporary:
+    with replacing(path) as temporary:
         yield temporary
+    listed(path)
+
+
+def listed(path: Path) -> None:
+    """Say in the manifest of a folder, where it has one, that this file is among the results."""
     files = _manifest(path.parent).get("files")
     if files is not None:
         _note(path.parent, {"files": {**files, path.name: digest(path)}})
-
-
-@contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:

@@ -1,0 +1,293 @@
+"""Commands that are killed, interrupted, out of room or in each other's way: what they leave.
+
+    PYTHONPATH=tests python tests/faults.py $(seq 0 419)    trials by number; prints those that fall
+
+Each trial is a process, forked from one that has imported everything, so that it starts at once and
+a moment drawn at random is one of its work. A full disk is a small tmpfs where one may be mounted,
+which takes root, and a limit on the size of files elsewhere. A folder that cannot be written to is
+one of a file system that is mounted so; without root there is none, and that trial is undisturbed.
+"""
+
+import contextlib
+import io
+import json
+import os
+import random
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import matplotlib
+from PIL import Image
+from scene_files import scene_text
+
+from convexrough import cli
+
+STAGES = """
+[friction]
+coefficient = 0.5
+[shear]
+fractions = [0.25, 0.5]
+[cycle]
+maximum = [0.3]
+loop_points = 40
+[history]
+fractions = [0.3, -0.3, 0.1]
+"""
+RUN = ["run", "new.toml", "--out", "out", "--html", "--proof"]
+
+#: Commands, all of which write to the folder out.
+COMMANDS = {
+    "run": RUN,
+    "run without figures": [*RUN, "--no-figures"],
+    "paper": ["paper", "--out", "out", "--html"],
+    "paper without figures": ["paper", "--out", "out", "--no-figures"],
+    "verify": ["verify", "new.toml", "loads.csv", "--out", "out", "--proof"],
+    "new": ["new", "out/fresh.toml"],
+}
+
+#: What happens to them.
+FAULTS = ("kill", "interrupt", "full", "small", "read only", "twice", "kill, again")
+
+#: What may be left of a file that was being written by a process that was killed.
+UNFINISHED = re.compile(r"\.(.+)\.(\d+)\.unfinished")
+
+
+class Trial(NamedTuple):
+    """What was tried, and what fell: "" where all is well."""
+
+    seed: int
+    how: str
+    status: int | None
+    fault: str
+
+
+def trial(seed: int, durations: dict[str, float], finished: dict[str, dict[str, bytes]]) -> Trial:
+    """The one of this number, in a folder of its own.
+
+    durations : [s] of each command undisturbed;  finished : what each writes
+    """
+    rng = random.Random(seed)
+    name = list(COMMANDS)[seed % len(COMMANDS)]
+    fault = FAULTS[seed // len(COMMANDS) % len(FAULTS)]
+    force = name not in ("verify", "new") and rng.random() < 0.5
+    arguments = [*COMMANDS[name], *(["--force"] if force else [])]
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        prepare(folder)
+        with _room(folder, fault, rng):
+            before = _earlier(folder, force, finished)
+            if fault == "read only" and mounts():
+                _remount(folder)
+            status, said = _tried(folder, arguments, fault, rng, durations[name])
+            found = contents(folder / "out")
+        what = _wrong(found, before, finished[name], fault, name)
+    allowed = (130, -signal.SIGKILL, 0, 2, 3)
+    if not what and (status not in allowed or "Traceback" in said):
+        what = f"status {status}: {said[-600:]}"
+    return Trial(seed, f"{name}, {fault}{', --force' if force else ''}", status, what)
+
+
+def prepare(folder: Path) -> None:
+    """What commands read; the loads are those that they would be."""
+    layout = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 0.02\nwithin = 0.006'
+    (folder / "new.toml").write_text(scene_text(layout, "approach = 2e-5", STAGES))
+    (folder / "old.toml").write_text(scene_text(layout, "approach = 1e-5", STAGES))
+    (folder / "loads.csv").write_text("load\n" + "1e-9\n" * 19)
+    (folder / "out").mkdir()
+
+
+def _earlier(folder: Path, force: bool, finished: dict[str, dict[str, bytes]]) -> dict[str, bytes]:
+    """Results of an earlier run, and something of the user's; where nothing is forced none."""
+    if not force:
+        return {}
+    with contextlib.suppress(OSError):  # no room for all of them
+        for name, data in finished["old"].items():
+            (folder / "out" / name).write_bytes(data)
+        (folder / "out" / "notes.txt").write_text("mine")
+    return contents(folder / "out")
+
+
+@contextlib.contextmanager
+def _room(folder: Path, fault: str, rng: random.Random) -> Iterator[None]:
+    """A folder out with little room, or none."""
+    if fault not in ("full", "read only") or not mounts():
+        yield
+        return
+    size = rng.choice([4, 12, 40, 120, 400]) if fault == "full" else 4096
+    out = str(folder / "out")
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", out], check=True)
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", out], check=True)
+
+
+def _remount(folder: Path) -> None:
+    """So that nothing more can be written."""
+    subprocess.run(["mount", "-o", "remount,ro", str(folder / "out")], check=True)
+
+
+def mounts() -> bool:
+    """Whether small file systems can be mounted here."""
+    return os.geteuid() == 0 and shutil.which("mount") is not None and _MOUNTED
+
+
+def _try_mount() -> bool:
+    with tempfile.TemporaryDirectory() as place:
+        command = ["mount", "-t", "tmpfs", "-o", "size=4k", "tmpfs", place]
+        if os.geteuid() != 0 or subprocess.run(command, capture_output=True).returncode:
+            return False
+        return subprocess.run(["umount", place], check=False).returncode == 0
+
+
+_MOUNTED = _try_mount()
+
+
+def _tried(
+    folder: Path, arguments: list[str], fault: str, rng: random.Random, duration: float
+) -> tuple[int, str]:
+    """Status of the command that it happens to (of the last one), and what they say."""
+    limit = rng.choice([0, 100, 1000, 5000, 20_000, 100_000]) if fault == "small" else None
+    running = [_forked(folder, arguments, limit)]
+    if fault == "twice":
+        time.sleep(rng.uniform(0, duration / 2))
+        running.append(_forked(folder, arguments, limit))
+    if fault in ("kill", "interrupt", "kill, again"):
+        time.sleep(rng.uniform(0, 1.05 * duration))
+        os.kill(running[0], signal.SIGINT if fault == "interrupt" else signal.SIGKILL)
+    status = max(_ended(process) for process in running)
+    if fault == "kill, again":
+        again = {"verify": [], "new": []}.get(arguments[0], ["--force"])
+        status = _ended(_forked(folder, [*arguments, *again], None))
+    return status, (folder / "said").read_text()
+
+
+def _ended(process: int) -> int:
+    return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+
+
+def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
+    """A process that runs the command; limit [bytes] of each file."""
+    if process := os.fork():
+        return process
+    status = 99
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        os.chdir(folder)
+        said = os.open("said", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+        os.dup2(said, 2)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        if limit is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        status = cli.main(arguments)
+    except BaseException:
+        import traceback
+
+        os.write(2, traceback.format_exc().encode())
+    finally:
+        os._exit(status)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """All files of a folder, by name."""
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def _wrong(
+    found: dict[str, bytes],
+    before: dict[str, bytes],
+    finished: dict[str, bytes],
+    fault: str,
+    name: str,
+) -> str:
+    """What a folder holds that it should not."""
+    for file, data in found.items():
+        killed = fault == "kill" or (fault == "kill, again" and name == "new")
+        if killed and UNFINISHED.fullmatch(file):
+            continue
+        if data == before.get(file):
+            continue
+        if file not in finished:
+            return f"{file} is left"
+        if why := _incomplete(file, data, finished[file]):
+            return f"{file}: {why}"
+    if before and found.get("notes.txt") != before.get("notes.txt"):
+        return "a file of the user's is gone"
+    refuses = name in ("verify", "new")  # a folder, or a file, that is there already
+    if fault == "kill, again" and not refuses and set(finished) - set(found):
+        return f"not there after another run: {set(finished) - set(found)}"
+    return ""
+
+
+def _incomplete(name: str, data: bytes, whole: bytes) -> str:
+    """Why a file is not what it should be: the same as undisturbed, but for times."""
+    kind = name.rpartition(".")[2]
+    try:
+        if kind in ("csv", "toml"):
+            return "" if data == whole else "not as undisturbed"
+        if kind == "json":
+            json.loads(data)
+        elif kind == "svg":
+            ElementTree.fromstring(data)
+        elif kind == "html":
+            return "" if data.rstrip().endswith(b"</html>") else "torn"
+        elif kind == "png":
+            with tempfile.TemporaryFile() as file:
+                file.write(data)
+                file.seek(0)
+                Image.open(file).verify()
+            return "" if data.endswith(b"IEND\xaeB`\x82") else "torn"
+    except (ValueError, SyntaxError, OSError, tomllib.TOMLDecodeError) as error:
+        return f"{type(error).__name__}: {error}"
+    return ""
+
+
+def undisturbed() -> tuple[dict[str, float], dict[str, dict[str, bytes]]]:
+    """How long each command takes, and what it writes; under "old" an earlier run's."""
+    durations: dict[str, float] = {}
+    finished: dict[str, dict[str, bytes]] = {}
+    every = COMMANDS | {"old": [*RUN[:1], "old.toml", *RUN[2:]]}
+    for name, arguments in [*every.items(), *every.items()]:  # the first time imports
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place)
+            prepare(folder)
+            if name not in finished:
+                said = io.StringIO()
+                quiet = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
+                with contextlib.chdir(folder), quiet[0], quiet[1]:
+                    cli.main(arguments)
+            else:
+                begin = time.monotonic()
+                _ended(_forked(folder, arguments, None))
+                durations[name] = time.monotonic() - begin
+            finished[name] = contents(folder / "out")
+    return durations, finished
+
+
+def main(seeds: Iterable[int]) -> Iterator[Trial]:
+    """Trials by number."""
+    matplotlib.use("agg")
+    durations, finished = undisturbed()
+    for seed in seeds:
+        yield trial(seed, durations, finished)
+
+
+if __name__ == "__main__":
+    seen: Counter[str] = Counter()
+    for done in main(map(int, sys.argv[1:])):
+        seen[f"{done.how.split(', ', 1)[1].replace(', --force', '')}: {done.status}"] += 1
+        if done.fault:
+            print(json.dumps(done._asdict()), flush=True)
+    print(json.dumps(seen | {"mounts": int(mounts())}))
