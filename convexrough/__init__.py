@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         InputError,
         ProofError,
         SolverError,
+        WorkerError,
     )
     from convexrough.normal.certificate import Certificate, certify
     from convexrough.paths.memory import MemoryCurve
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
     from convexrough.shearing.loop import Loop
     from convexrough.shearing.state import ShearState, onset_of_sliding, shear
     from convexrough.sphere.smooth import SmoothSphere, smooth
+    from convexrough.sweeps.sweep import sweep
+    from convexrough.sweeps.table import SweepTable, open_sweep
     from convexrough.vector_shear.cones import FrictionConic
     from convexrough.vector_shear.newton import FrictionNewton
     from convexrough.vector_shear.state import VectorShearState, shear_vector
@@ -52,7 +55,14 @@ if TYPE_CHECKING:
 #: Where each public name lives.
 _HOMES = {
     "contact": ("Contact", "press"),
-    "errors": ("ConvexroughError", "FileError", "InputError", "ProofError", "SolverError"),
+    "errors": (
+        "ConvexroughError",
+        "FileError",
+        "InputError",
+        "ProofError",
+        "SolverError",
+        "WorkerError",
+    ),
     "normal.certificate": ("Certificate", "certify"),
     "paths.memory": ("MemoryCurve",),
     "paths.path": ("LoadPath", "load_path"),
@@ -69,6 +79,8 @@ _HOMES = {
     "shearing.history": ("History", "history"),
     "shearing.state": ("ShearState", "onset_of_sliding", "shear"),
     "sphere.smooth": ("SmoothSphere", "smooth"),
+    "sweeps.sweep": ("sweep",),
+    "sweeps.table": ("SweepTable", "open_sweep"),
     "vector_shear.cones": ("FrictionConic",),
     "vector_shear.newton": ("FrictionNewton",),
     "vector_shear.state": ("VectorShearState", "shear_vector"),
@@ -104,8 +116,10 @@ __all__ = [
     "SmoothSphere",
     "SolverError",
     "Steady",
+    "SweepTable",
     "VectorShearState",
     "Verdict",
+    "WorkerError",
     "__version__",
     "certify",
     "certify_shear",
@@ -116,6 +130,7 @@ __all__ = [
     "load_path",
     "loops",
     "onset_of_sliding",
+    "open_sweep",
     "press",
     "read_scene",
     "shakedown",
@@ -124,6 +139,7 @@ __all__ = [
     "smooth",
     "solvers",
     "steady",
+    "sweep",
     "verify",
 ]
 
