@@ -82,7 +82,7 @@ def compute(batch: Batch, told_to_stop: Callable[[], bool] = never) -> Rows:
     with one_thread:
         press = batch.source.opened()
         for number in batch.numbers:
-            if told_to_stop() or time.monotonic() - began > MOST_SECONDS:
+            if told_to_stop() or (rows and time.monotonic() - began > MOST_SECONDS):
                 break
             rows.append(_row(press, number, batch))
     return _rows(batch, rows, time.monotonic() - began)

@@ -97,7 +97,7 @@ class Processes:
                 initializer=_begin,
                 initargs=(self._stopping,),
             )
-        with _script_hidden():
+        with _sheltered():
             return self._pool.submit(_compute_here, batch)
 
     def renew(self) -> bool:
@@ -189,13 +189,20 @@ def processors() -> int:
 
 
 @contextmanager
-def _script_hidden() -> Iterator[None]:
-    """New processes do not run the user's script again, which need not be guarded against it."""
+def _sheltered() -> Iterator[None]:
+    """New processes do not run the user's script, which need not be guarded, and no interrupt.
+
+    A terminal interrupts them, too, and what is blocked here they have blocked for ever.
+    """
     script = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
+    masks = hasattr(signal, "pthread_sigmask")  # not everywhere
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
     try:
         yield
     finally:
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         sys.modules["__main__"] = script
 
 

@@ -139,4 +139,4 @@ def measure(contact: Contact, measures: Sequence[str], stages: Stages) -> tuple[
     if contact.certificate.scope == "none":
         return values, "no certificate"
     unsure = it.undecided()
-    return values, f"{unsure} words undecided" if unsure else ""
+    return values, f"{unsure} undecided" if unsure else ""

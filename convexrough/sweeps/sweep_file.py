@@ -83,8 +83,9 @@ def plan_of(
         raise SceneFileError(str(path), mistakes)
     inputs = {each: digest(path.parent / each) for each in sorted(_summit_files(grid))}
     said = {"source": str(path), "text": text, "inputs": inputs}
+    swept = [list(each.items()) for each in (keys.together, keys.over, keys.draw)]  # in order
     identity = identified(
-        tables=tables, sweep=keys.model_dump(), measure=list(keys.measure), inputs=inputs
+        tables=tables, swept=swept, seeds=keys.seeds, measure=list(keys.measure), inputs=inputs
     )
     return Plan(Tables(grid, path), tuple(keys.measure), stages, identity, said)
 
@@ -120,8 +121,6 @@ def _mistakes_of_seeds(grid: Grid) -> Iterator[str]:
     random = bool(grid.draws) or bool(rough & (set(table) | swept))
     if grid.seeds is not None and not random:
         yield "[sweep] seeds: nothing is random: no height_std, no tip_radius_cv, no [sweep.draw]"
-    if grid.draws and grid.seeds is None:
-        yield "[sweep] seeds: missing, needed with [sweep.draw]"
 
 
 def _stages(tables: Mapping[str, Any]) -> Stages:

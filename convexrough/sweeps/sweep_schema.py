@@ -56,6 +56,8 @@ class SweepKeys(Table):
                 named[key] = where
                 check = _of_draw if where == "draw" else _of_values
                 yield from (f'{where}: "{key}": {each}' for each in check(values))
+        if self.draw and self.seeds is None:
+            yield "seeds: missing, needed with [sweep.draw]"
         if isinstance(self.together, Mapping):
             lengths = {len(it) for it in self.together.values() if isinstance(it, list)}
             if len(lengths) > 1:

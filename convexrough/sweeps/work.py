@@ -93,7 +93,8 @@ class Work:
                 f"a worker has version {rows.version} of convexrough, this is {__version__}"
             )
         self._lost = 0
-        yield rows
+        if len(rows):
+            yield rows
         if rows.stop < batch.stop:
             self._again.appendleft(batch.of(range(rows.stop, batch.stop)))
 
