@@ -32,7 +32,7 @@ def loss(levels: Levels, pieces: Iterable[Piece]) -> tuple[float, float]:
         value, doubt = _integral(levels, piece)
         weight = f * travel * float(1 - piece.sign * piece.slope)
         total += weight * value
-        error += weight * doubt
+        error += _times(weight, doubt)
     return total, error * (1 + SAFETY)
 
 
@@ -51,9 +51,15 @@ def _integral(levels: Levels, piece: Piece) -> tuple[float, float]:
         -twice * bottom.energy,
         -run * mean,
     )
-    error = over * top.approach_error + under * bottom.approach_error + run * mean_error
-    error += abs(twice) * (top.energy_error + bottom.energy_error)
+    error = _times(over, top.approach_error) + _times(under, bottom.approach_error)
+    error += _times(run, mean_error)
+    error += _times(abs(twice), top.energy_error + bottom.energy_error)
     return sum(terms), error + 8 * ROUNDOFF * sum(map(abs, terms))
+
+
+def _times(share: float, error: float) -> float:
+    """Nothing of an error is nothing, also where that is infinite."""
+    return share * error if share else 0.0
 
 
 def _mean(high: Level, low: Level, apart: float) -> tuple[float, float]:

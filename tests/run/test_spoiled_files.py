@@ -99,3 +99,26 @@ def test_a_spoiled_header_of_an_array(tmp_path: Path, before: bytes, after: byte
     (tmp_path / "loads.npy").write_bytes(contents.replace(before, after))
     with pytest.raises(cr.FileError, match=r"loads\.npy: not an \.npy file"):
         read_table(tmp_path / "loads.npy", required=("load",))
+
+
+STEADY = "[friction]\ncoefficient = 0.5\n[steady]\nreference = 1e60\n"
+STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 12}\n"
+SHAKEDOWN = '[friction]\ncoefficient = 0.5\n[shakedown]\nloads = 1e-8\nkind = "elastic"\n'
+
+
+def test_a_steady_state_of_which_nothing_is_proved(tmp_path: Path, command: Any) -> None:
+    """Nothing times an infinite error is nothing: a warning of numpy's, and no number, was it."""
+    layout = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 0.02\nwithin = 0.006'
+    (tmp_path / "a.toml").write_text(scene_text(layout, more=STEADY))
+    outcome = command("run", "a.toml", "--no-figures")
+    assert outcome.status == 3
+    assert "nan" not in outcome.out
+
+
+@pytest.mark.parametrize("kind", ["elastic", "exact"])
+def test_a_shakedown_of_no_amplitudes(tmp_path: Path, command: Any, kind: str) -> None:
+    text = SHAKEDOWN.replace("elastic", kind) + "force_amplitudes = []\n"
+    (tmp_path / "a.toml").write_text(scene_text(more=text))
+    outcome = command("run", "a.toml", "--no-figures")
+    assert outcome.status == 2
+    assert "force_amplitudes: found none, expected a path that moves" in outcome.err
