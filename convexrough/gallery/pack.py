@@ -49,11 +49,11 @@ def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
         "left_out": {},
     }
     files: dict[str, bytes] = {}
-    for make in (_cones, _bristles):
+    for kind, make in (("cones", _cones), ("bristles", _bristles)):
         try:
             described, made = make(case, problem, own)
         except ConvexroughError as error:
-            about["left_out"][make.__name__.strip("_")] = str(error)
+            about["left_out"][kind] = str(error)
             continue
         about["programs"] |= described
         files |= made
