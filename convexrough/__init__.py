@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         InputError,
         ProofError,
         SolverError,
+        WorkerError,
     )
     from convexrough.gradients.change import ContactChange, Direction, ShearChange
     from convexrough.gradients.gradient import Gradient
@@ -49,6 +50,8 @@ if TYPE_CHECKING:
     from convexrough.shearing.loop import Loop
     from convexrough.shearing.state import ShearState, onset_of_sliding, shear
     from convexrough.sphere.smooth import SmoothSphere, smooth
+    from convexrough.sweeps.sweep import sweep
+    from convexrough.sweeps.table import SweepTable, open_sweep
     from convexrough.vector_shear.cones import FrictionConic
     from convexrough.vector_shear.newton import FrictionNewton
     from convexrough.vector_shear.state import VectorShearState, shear_vector
@@ -58,7 +61,14 @@ if TYPE_CHECKING:
 #: Where each public name lives.
 _HOMES = {
     "contact": ("Contact", "press"),
-    "errors": ("ConvexroughError", "FileError", "InputError", "ProofError", "SolverError"),
+    "errors": (
+        "ConvexroughError",
+        "FileError",
+        "InputError",
+        "ProofError",
+        "SolverError",
+        "WorkerError",
+    ),
     "gradients.change": ("ContactChange", "Direction", "ShearChange"),
     "gradients.gradient": ("Gradient",),
     "gradients.states": ("onset_gradient",),
@@ -80,6 +90,8 @@ _HOMES = {
     "shearing.history": ("History", "history"),
     "shearing.state": ("ShearState", "onset_of_sliding", "shear"),
     "sphere.smooth": ("SmoothSphere", "smooth"),
+    "sweeps.sweep": ("sweep",),
+    "sweeps.table": ("SweepTable", "open_sweep"),
     "vector_shear.cones": ("FrictionConic",),
     "vector_shear.newton": ("FrictionNewton",),
     "vector_shear.state": ("VectorShearState", "shear_vector"),
@@ -122,8 +134,10 @@ __all__ = [
     "SmoothSphere",
     "SolverError",
     "Steady",
+    "SweepTable",
     "VectorShearState",
     "Verdict",
+    "WorkerError",
     "__version__",
     "certify",
     "certify_shear",
@@ -136,6 +150,7 @@ __all__ = [
     "loops",
     "onset_gradient",
     "onset_of_sliding",
+    "open_sweep",
     "phase_losses",
     "press",
     "read_scene",
@@ -145,6 +160,7 @@ __all__ = [
     "smooth",
     "solvers",
     "steady",
+    "sweep",
     "verify",
 ]
 

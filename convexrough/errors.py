@@ -101,3 +101,7 @@ class ExtraError(ConvexroughError, ImportError):
     def __init__(self, extra: str) -> None:
         self.extra = extra
         super().__init__(f"needs {extra}: pip install 'convexrough[{extra}]'")
+
+
+class WorkerError(ConvexroughError):
+    """Those who should compute are gone, or are not the same program; what is done is kept."""

@@ -29,9 +29,9 @@ DIGITS, KEPT = 75, 50  # near Q = 0 a difference loses 12
 
 def tune(name: str) -> float:
     """The height with the gap, indentation or load that the name says, over approach or load."""
-    make, kind, near = name.split("-", 2)
-    build, which = grazing.FITTED[make]
-    low = build(kind, near, -1.0)  # far below all others
+    make, which = grazing.FITTED[name]
+    _, kind, near = name.split("-", 2)
+    low = make(-1.0)  # far below all others
     contact = cr.press(low.scene, approach=low.approach)
     exact = solve_exactly(low.scene, approach=low.approach, start=contact.loads, digits=DIGITS)
     with ctx.workdps(DIGITS):
@@ -112,7 +112,7 @@ def write(wanted: list[str]) -> None:
         PATH.write_text(json.dumps(stored, indent=0, sort_keys=True) + "\n")
 
     for name in wanted:
-        if name.split("-")[0] in grazing.FITTED and not name.endswith("dragged"):
+        if name in grazing.FITTED:
             stored["heights"][name] = tune(name).hex()
     save()
     for name in wanted:

@@ -31,8 +31,9 @@ from convexrough.cli.speech import (
     WRONG_INPUT,
     say_aside,
 )
+from convexrough.cli.sweep import sweep
 from convexrough.cli.verify import verify
-from convexrough.errors import ConvexroughError, SolverError
+from convexrough.errors import ConvexroughError, SolverError, WorkerError
 from convexrough.version import __version__
 
 #: What a shell sets that wants a script for completion, or the completions of a line.
@@ -49,7 +50,7 @@ def program() -> None:
     """
 
 
-for command in (run, verify, check, compare, new, paper, bench, gallery):
+for command in (run, verify, check, compare, sweep, new, paper, bench, gallery):
     program.add_command(command)
 
 
@@ -69,7 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except ConvexroughError as error:
             for line in str(error).splitlines():
                 say_aside("error", line)
-            return SOLVER_FAILED if isinstance(error, SolverError) else WRONG_INPUT
+            stopped = isinstance(error, (SolverError, WorkerError))
+            return SOLVER_FAILED if stopped else WRONG_INPUT
         except OSError as error:  # those of files are FileErrors
             return _unheard(error)
         except Exception:

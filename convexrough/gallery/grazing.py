@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 
 from convexrough.gallery.answers import tuned_height
@@ -27,7 +28,11 @@ KINDS = {
 }
 
 
-def grazing(kind: str, near: str, height: float) -> Recipe:
+#: In a word, on which side of touching.
+SIDES = {"gap": "open", "indentation": "in contact"}
+
+
+def _grazing(kind: str, near: str, height: float) -> Recipe:
     """Seven asperities of the paper's example, and one beside them, of this height."""
     points = [*hexagon(1), (0.0035, 0.0029)]
     scene = placed(points, TIP_RADIUS, [0.0] * 7 + [height])
@@ -38,17 +43,16 @@ def _ringed(kind: str, near: str, height: float) -> Recipe:
     """A short asperity amid six tall, blunt ones, which hold the sphere off it."""
     tips = [TIP_RADIUS, *[2.5 * TIP_RADIUS] * 6]
     scene = placed(hexagon(1), tips, [height] + [0.0] * 6)
-    why = (
-        f"a short asperity amid six tall ones, {near} of the approach from touching: {SIDES[kind]}"
-    )
+    side = SIDES[kind]
+    why = f"a short asperity amid six tall ones, {near} of the approach from touching: {side}"
     return Recipe("ringed", why, scene, approach=3e-5)
 
 
-#: In words, on which side of touching.
-SIDES = {"gap": "open", "indentation": "in contact"}
-
-#: Whose heights are fitted to 60 digits, by family; the fitted asperity is the last or the first.
-FITTED = {"grazing": (grazing, 7), "ringed": (_ringed, 0)}
+#: What makes a case from a height, which is fitted to 60 digits, and whose height that is.
+FITTED: dict[str, tuple[Callable[[float], Recipe], int]] = {
+    f"grazing-{kind}-{near}": (partial(_grazing, kind, near), 7) for kind in KINDS for near in NEAR
+}
+FITTED |= {f"ringed-{kind}-1e-9": (partial(_ringed, kind, "1e-9"), 0) for kind in SIDES}
 
 
 def _dragged() -> Recipe:
@@ -86,19 +90,11 @@ def _losing(stage: str) -> Recipe:
     return Recipe("losing-contact", why, scene, load=load, fraction=fraction)
 
 
-def _fitted(make: str, kind: str, near: str) -> Recipe:
-    recipe, _ = FITTED[make]
-    return recipe(kind, near, tuned_height(f"{make}-{kind}-{near}"))
+def _fitted(name: str) -> Recipe:
+    make, _ = FITTED[name]
+    return make(tuned_height(name))
 
 
-RECIPES: Recipes = {
-    f"grazing-{kind}-{near}": partial(_fitted, "grazing", kind, near)
-    for kind in KINDS
-    for near in NEAR
-}
-RECIPES |= {
-    f"ringed-{kind}-1e-9": partial(_fitted, "ringed", kind, "1e-9")
-    for kind in ("gap", "indentation")
-}
+RECIPES: Recipes = {name: partial(_fitted, name) for name in FITTED}
 RECIPES |= {f"losing-contact-{stage}": partial(_losing, stage) for stage in STAGES}
 RECIPES["ringed-dragged"] = _dragged

@@ -64,11 +64,15 @@ def _ending(part: float, what: str) -> Recipe:
 
 
 def _unequal(crowding: float) -> Recipe:
-    """A large contact amid six small ones, for which shells must be fitted to the loads."""
+    """A large contact amid six small ones, for which shells must be fitted to the loads.
+
+    That of the large one is (0.9 * 0.8 + 0.1 / 2) r, so its convexity number reaches 1 at a
+    crowding of 0.77 pi / 1.6 (docs/theory/certificate.md, "Which box", 3).
+    """
     large, small = 0.8 * crowding * SPACING, 0.2 * crowding * SPACING
     tips = [25 * TIP_RADIUS, *[TIP_RADIUS] * 6]
     scene, approach = manufactured(hexagon(1), tips, [large] + [small] * 6, [0.0] * 7)
-    why = f"a large contact amid small ones, crowding {crowding:g}: fitted shells end at 1.41"
+    why = f"a large contact amid small ones, crowding {crowding:g}: fitted shells end at 1.512"
     return Recipe("convexity", why, scene, approach=approach)
 
 
@@ -93,7 +97,7 @@ RECIPES: Recipes = {
 }
 RECIPES |= {
     f"convexity-fitted-{word}": partial(_unequal, crowding)
-    for word, crowding in (("below", 1.4), ("above", 1.43))
+    for word, crowding in (("below", 1.51), ("above", 1.513))
 }
 RECIPES |= {
     "convexity-end-below": partial(_ending, 0.998, "just convex"),

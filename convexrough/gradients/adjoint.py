@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.gradients.system import Solution, System
@@ -87,7 +88,7 @@ class Friction(NamedTuple):
         return np.sign(self.deflections)
 
     @property
-    def slides(self) -> Array:
+    def slides(self) -> NDArray[np.bool_]:
         """(n,) whether it slides, or is about to."""
         return np.asarray(self.widths == 1.0)
 
@@ -99,6 +100,7 @@ class Pulled(NamedTuple):
     local: Array
     pairs: list[Pair]
     total: float = 0.0
+    solution: Solution | None = None
 
     def plus(self, other: Pulled) -> Pulled:
         """Of the sum of two numbers."""
@@ -181,6 +183,7 @@ def through_friction(
         local=ceilings * C - state.slopes * state.deflections * zeta,
         pairs=[Pair(-moved, state.increments)],
         total=-solution.shift,
+        solution=solution,
     )
 
 

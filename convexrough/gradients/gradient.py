@@ -7,10 +7,10 @@ sphere's radius and the modulus (docs/theory/scene-derivatives.md, "To the scene
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -19,11 +19,20 @@ from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact
 from convexrough.drawn import Drawn
 from convexrough.errors import InputError
-from convexrough.gradients.adjoint import Adjoint, Holding
+from convexrough.gradients.adjoint import Adjoint, Holding, Pulled, through_pressing
+from convexrough.gradients.doubts import Doubt, height_errors
+from convexrough.gradients.system import TOLERANCE, Solution
 from convexrough.influence import Influence
 from convexrough.influence.choice import couple
 from convexrough.record import Along, Record, Table
 from convexrough.shearing.problem import TangentialProblem
+from convexrough.sphere.smooth import smooth
+
+#: What a derivative may be by, one number or one for each asperity, but for positions.
+PARAMETERS = (
+    *("heights", "tip_radii", "sphere_radius", "contact_modulus", "poisson_ratio"),
+    *("load", "approach", "friction", "force", "maximum", "minimum", "forces"),
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,7 +60,7 @@ class Gradient(Table, Drawn):
     5.907e-10 2.717e-06
     """
 
-    _along: ClassVar[Along] = {("asperity",): ("heights", "tip_radii")}
+    _along: ClassVar[Along] = {("asperity",): ("heights", "tip_radii", "height_errors")}
 
     contact: Contact
     holding: Holding
@@ -82,6 +91,51 @@ class Gradient(Table, Drawn):
         moved = moved - origin.offsets[:, None] * points / far
         return frozen(among_zeros(moved, origin.places, len(scene)))
 
+    @cached_property
+    def height_errors(self) -> Array:
+        """(n,) proved bounds on |heights - those of the true state|.
+
+        Infinite where nothing is proved of the state, in gross sliding, and for onsets. They are
+        for the scene whose data are the given float64 numbers, and count all rounding.
+        """
+        origin = self.origin
+        problem = pressed(self.contact)
+        errors = height_errors(problem, origin.doubts, origin.pressing, origin.total)
+        return frozen(errors / problem.units.length)
+
+    @cached_property
+    def normalised(self) -> Gradient:
+        """That of `Cycle.energy_normalised` = W / W0, for the gradient of a cycle's energy.
+
+        W0 is in proportion to c_t f^2 P^(5/3) E*^(-2/3) R^(-1/3), P the total load, which follows
+        where the approach is held.
+        """
+        contact, scene = self.contact, self.contact.scene
+        if self.maximum is None or self.minimum is None or self.friction is None:
+            expected = "the gradient of a cycle, whose energy a smooth sphere's stands beside"
+            raise InputError("normalised", found="another number", expected=expected)
+        assert scene.friction is not None  # there is a cycle
+        W0, nu = smooth(scene, load=contact.load).energy_scale, scene.material.poisson_ratio
+        value = self.value / W0
+        by_load = -5.0 / 3.0 * value / contact.load
+        explicit = {
+            "sphere_radius": value / 3.0 / scene.sphere_radius,
+            "contact_modulus": 2.0 / 3.0 * value / scene.material.contact_modulus,
+            "poisson_ratio": -value / ((1.0 - nu) * (2.0 - nu)),
+            "friction": -2.0 * value / scene.friction,
+            "load": by_load,
+        }
+        found: dict[str, Any] = {"value": value, "origin": self.origin.combined(1.0 / W0)}
+        following = total_load(contact) if self.holding == "approach" else None
+        if following is not None:
+            found["origin"] = self.origin.combined(1.0 / W0, by_load, following.origin)
+        for name in PARAMETERS:
+            if (slope := getattr(self, name)) is not None:
+                found[name] = slope / W0 + explicit.get(name, 0.0)
+                if following is not None and (follows := getattr(following, name)) is not None:
+                    found[name] = found[name] + by_load * follows
+        return replace(self, **found)
+
     def _rows(self) -> Iterator[tuple[str, str]]:
         """But for what it was made from, and for parameters that it has not."""
         return (row for row in super()._rows() if row[0] != "origin" and row[1] != "None")
@@ -93,6 +147,9 @@ class Origin(Record):
 
     J, lengths and the load are in the scene's units, A in the problem's own. Arrays are (n,), of
     the asperities at `places` in the scene; left and right are (m, n).
+
+    pressing : of the pressed state, with sum lambda = total where the load is held
+    doubts   : about the weights on loads that it was solved for; None where nothing is known
     """
 
     contact: Contact
@@ -102,6 +159,9 @@ class Origin(Record):
     left: Array
     right: Array
     prescribed: float
+    pressing: Solution
+    total: float | None
+    doubts: tuple[Doubt, ...] | None
 
     @classmethod
     def of(
@@ -109,9 +169,15 @@ class Origin(Record):
         contact: Contact,
         adjoint: Adjoint,
         holding: Holding,
+        *,
+        doubts: Sequence[Doubt] | None = (),
+        approach: float = 0.0,
         places: Indices | None = None,
     ) -> Origin:
-        """places : of the arrays of the adjoint; default the loaded asperities"""
+        """doubts : about weights on loads;  approach : the weight on it
+
+        places : of the arrays of the adjoint; default the loaded asperities
+        """
         problem = pressed(contact)
         units = problem.units
         return cls(
@@ -122,6 +188,31 @@ class Origin(Record):
             left=frozen(np.stack([pair.left for pair in adjoint.pairs])),
             right=frozen(np.stack([pair.right for pair in adjoint.pairs])),
             prescribed=adjoint.prescribed / (units.force if holding == "load" else units.length),
+            pressing=adjoint.solution,
+            total=-approach if holding == "load" else None,
+            doubts=None if doubts is None else tuple(doubts),
+        )
+
+    def combined(self, own: float, factor: float = 0.0, other: Origin | None = None) -> Origin:
+        """Of J times a number, and another J, whose weights are exact, times another."""
+        one, two = self.pressing, self.pressing if other is None else other.pressing
+        doubts = self.doubts
+        if doubts is not None:
+            doubts = tuple(replace(each, factor=own * each.factor) for each in doubts)
+        far = self if other is None else other  # with a factor of 0
+        return replace(
+            self,
+            offsets=frozen(own * self.offsets + factor * far.offsets),
+            local=frozen(own * self.local + factor * far.local),
+            left=frozen(np.concatenate((own * self.left, factor * far.left))),
+            right=frozen(np.concatenate((self.right, far.right))),
+            prescribed=own * self.prescribed + factor * far.prescribed,
+            pressing=Solution(
+                own * one.values + factor * two.values,
+                own * one.shift + factor * two.shift,
+                np.abs(own * one.defect) + np.abs(factor * two.defect),
+            ),
+            doubts=doubts,
         )
 
     @cached_property
@@ -209,6 +300,16 @@ def to_scene(
         minimum=minimum,
         forces=forces,
     )
+
+
+def total_load(contact: Contact, tolerance: float = TOLERANCE) -> Gradient:
+    """That of the total load, the approach held."""
+    problem = pressed(contact)
+    ones = np.full(len(problem), problem.units.force)
+    weights = Pulled(ones, np.zeros(len(problem)), [])
+    adjoint = through_pressing(problem, weights, "approach", tolerance)
+    origin = Origin.of(contact, adjoint, "approach")
+    return to_scene(origin, "approach", value=contact.load, scaled=(contact.load,), cancels=False)
 
 
 def held(contact: Contact, holding: Holding | None) -> Holding:

@@ -19,6 +19,7 @@ from convexrough.gradients.adjoint import (
     through_pressing,
     through_rise,
 )
+from convexrough.gradients.doubts import Doubt, LossDoubt, StateDoubt
 from convexrough.gradients.gradient import Gradient, Origin, held, pressed, to_scene
 from convexrough.gradients.gross import excess_in_gross_sliding, last_to_slide
 from convexrough.gradients.system import TOLERANCE, System
@@ -38,19 +39,21 @@ def cycle_gradient(
     loading = FirstLoading(contact)
     states, _ = loading.states(np.array([cycle.force_amplitude / problem.force_unit]))
     state = Friction.among(problem, states, 0)
+    doubts: list[Doubt] | None = None
     if limit := bool(problem.at_limit(states.totals)[0]):
         last = last_to_slide(problem, holding, "maximum", cycle.maximum)
         pulled = _in_gross_sliding(problem, state, last)
     else:
         beyond = excess(problem, state, System(problem, state.slopes, tolerance))
         pulled = through_loss(problem, state, beyond)
+        doubts = [LossDoubt(loading.energy_unit, state, beyond)]
     pulled = pulled.scaled(loading.energy_unit)
     adjoint = through_pressing(problem, pulled, holding, tolerance)
     by_force = pulled.total / (2.0 * problem.force_unit)
     W, nu = cycle.energy, contact.scene.material.poisson_ratio
     slid = by_force * (cycle.maximum - cycle.minimum)
     return to_scene(
-        Origin.of(contact, adjoint, holding),
+        Origin.of(contact, adjoint, holding, doubts=doubts),
         holding,
         value=W,
         scaled=(W,) if limit else (W, -slid),
@@ -101,9 +104,11 @@ def history_gradient(
         lost[i] += each.lost * loading.energy_unit
         rises[i] += each.moved * problem.travel_unit
 
+    zero = np.zeros(len(problem))
     spent = float(on_energy @ history.energy)
     far = float(on_moved @ history.displacements)
-    pulled, by_friction = Pulled(np.zeros(len(problem)), np.zeros(len(problem)), []), 2.0 * spent
+    pulled, by_friction = Pulled(zero, zero, []), 2.0 * spent
+    doubts: list[Doubt] = []
     by_lost, by_rise = np.zeros_like(lost), np.zeros_like(rises)  # dw/dT, dDelta/dT
     for i, total in enumerate(states.totals):
         state = Friction.among(problem, states, i)
@@ -111,10 +116,13 @@ def history_gradient(
         beyond = excess(problem, state, system)
         loss = through_loss(problem, state, beyond)
         pulled, by_lost[i] = pulled.plus(loss.scaled(lost[i])), loss.total
+        doubts.append(LossDoubt(lost[i], state, beyond))
         by_friction += rises[i] * beyond.rise - lost[i] * loss.total * total
         if rises[i]:
             rise = through_rise(problem, state, system)
             pulled, by_rise[i] = pulled.plus(rise.scaled(rises[i])), rise.total
+            assert rise.solution is not None
+            doubts.append(StateDoubt(rises[i], state, rise.solution, zero, -1.0))
     by_force = np.zeros(m)
     for each, i in zip(asked, back, strict=True):
         slope = each.lost * loading.energy_unit * by_lost[i]
@@ -124,7 +132,7 @@ def history_gradient(
     adjoint = through_pressing(problem, pulled, holding, tolerance)
     nu = contact.scene.material.poisson_ratio
     return to_scene(
-        Origin.of(contact, adjoint, holding),
+        Origin.of(contact, adjoint, holding, doubts=doubts),
         holding,
         value=spent + far,
         scaled=(by_friction, -spent - far),

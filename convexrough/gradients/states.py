@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -19,6 +21,7 @@ from convexrough.gradients.adjoint import (
     through_friction,
     through_pressing,
 )
+from convexrough.gradients.doubts import Doubt, GivenDoubt, StateDoubt
 from convexrough.gradients.gradient import Gradient, Origin, held, pressed, to_scene
 from convexrough.gradients.gross import last_to_slide, through_gross_sliding
 from convexrough.gradients.system import TOLERANCE, System
@@ -47,14 +50,20 @@ def contact_gradient(
     far = np.flatnonzero(on_gaps)
     pulled = Pulled(on_loads[touching] * units.force, np.zeros(len(problem)), [])
     whole = (D - float(on_gaps.sum())) * units.length
+    off = np.where(contact.loads > 0, 0.0, np.abs(on_loads)) * units.force
+    doubts: list[Doubt] | None = [GivenDoubt(1.0, off)]
     if len(far):
         away = couple(contact.scene, far, problem.influence.scale, contact.influence)
-        felt = away.onto(contact.scene.contact_points[touching]).apply(on_gaps[far])
-        pulled = pulled._replace(loads=pulled.loads + felt * units.length)
+        onto = away.onto(contact.scene.contact_points[touching])
+        pulled = pulled._replace(loads=pulled.loads + onto.apply(on_gaps[far]) * units.length)
+        sizes = np.abs(on_gaps[far])
+        off[touching] += onto.rounding(sizes).of(onto.apply(sizes)) * units.length
+        if (contact.status == "undecided").any():  # whose gap may not be there
+            doubts = None
     adjoint = through_pressing(problem, pulled, holding, tolerance, whole)
-    origin = Origin.of(contact, adjoint, holding)
+    origin = Origin.of(contact, adjoint, holding, doubts=doubts, approach=whole)
     if len(far):
-        origin = _with_gaps(contact, adjoint, holding, far, on_gaps[far] * units.length)
+        origin = _with_gaps(origin, adjoint, holding, far, on_gaps[far] * units.length)
     carried = float(on_loads @ contact.loads)
     return to_scene(
         origin,
@@ -67,10 +76,10 @@ def contact_gradient(
 
 
 def _with_gaps(
-    contact: Contact, adjoint: Adjoint, holding: Holding, far: Indices, weights: Array
+    origin: Origin, adjoint: Adjoint, holding: Holding, far: Indices, weights: Array
 ) -> Origin:
     """Weights on gaps besides: dg = A dP + dA P - dd - dD0 at each open asperity."""
-    problem = pressed(contact)
+    problem = pressed(origin.contact)
     places = np.union1d(problem.touching, far)
     here, there = np.searchsorted(places, problem.touching), np.searchsorted(places, far)
 
@@ -84,7 +93,8 @@ def _with_gaps(
         local=spread(adjoint.local, here),
         pairs=pairs,
     )
-    return Origin.of(contact, whole, holding, places)
+    both = Origin.of(origin.contact, whole, holding, doubts=origin.doubts, places=places)
+    return replace(both, total=origin.total)
 
 
 def state_gradient(
@@ -108,6 +118,7 @@ def state_gradient(
     moved, rise = sign * travel * on_slips[touching], sign * travel * X
 
     there = Friction.of_state(problem, state)
+    doubts: list[Doubt] | None = None
     if limit := bool(problem.at_limit(np.array([there.total]))[0]):
         last = last_to_slide(problem, holding, "force", state.force)
         pulled, by_force, by_friction = through_gross_sliding(
@@ -118,6 +129,9 @@ def state_gradient(
         pulled = through_friction(
             problem, there, system, increments=increments, slips=moved, rise=rise
         )
+        assert pulled.solution is not None
+        total = -rise - float(moved[there.slides].sum())
+        doubts = [StateDoubt(1.0, there, pulled.solution, moved, total)]
         beyond, slides = excess(problem, there, system), there.slides
         by_force = pulled.total
         by_friction = rise * beyond.rise + float(increments @ beyond.increments)
@@ -128,7 +142,7 @@ def state_gradient(
     length = X * state.displacement + float(on_slips @ state.slips)
     nu = contact.scene.material.poisson_ratio
     return to_scene(
-        Origin.of(contact, adjoint, holding),
+        Origin.of(contact, adjoint, holding, doubts=doubts),
         holding,
         value=carried + length,
         scaled=(carried,) if limit else (by_friction, -length),
@@ -185,7 +199,7 @@ def onset_gradient(
         pulled = margin.scaled(-problem.force_unit / margin.total)
     adjoint = through_pressing(problem, pulled, holding, tolerance)
     return to_scene(
-        Origin.of(contact, adjoint, holding),
+        Origin.of(contact, adjoint, holding, doubts=None),
         holding,
         value=onset,
         scaled=(onset,),

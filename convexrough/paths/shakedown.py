@@ -25,6 +25,7 @@ from convexrough.paths.elastic_shares import scalar_shares
 from convexrough.paths.levels import Levels
 from convexrough.paths.onset import last_to_touch, onsets
 from convexrough.paths.order import Order, order_of
+from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
@@ -110,12 +111,14 @@ def shakedown(
     force_amplitudes: ArrayLike,
     kind: Theory = "exact",
     influence: Kind | None = None,
+    announce: Announce | None = None,
 ) -> Shakedown:
     """The largest factor of a closed path around (loads, forces) that shakes down.
 
     loads, forces : P0 and Q0 [force]; Q0 is (2,) for "vector"
     load_amplitudes, force_amplitudes : (m,) p and q of the points of the path [force], a number
-        for all; q is (m, 2) for "vector". The other two kinds need p = 0.
+        for all; q is (m, 2) for "vector". Only "exact" allows p that is not 0
+    influence, announce : as in `load_path`
 
     Raises InputError for bad values, |Q0| >= f P0, or a path on which nothing moves.
 
@@ -144,7 +147,7 @@ def shakedown(
         given = "one point" if len(q) else "none"
         raise InputError("force_amplitudes", found=given, expected=expected)
     if kind == "exact":
-        found = _exact(scene, P0, float(t0), p, t, Levels(scene, P0, influence))
+        found = _exact(scene, P0, float(t0), p, t, Levels(scene, P0, influence, announce))
     elif np.any(p):
         expected = 'none: only "exact" holds where the normal load varies'
         raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)

@@ -108,11 +108,11 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
 
     path = Path(path)
     text = read_text(path, MOST_BYTES)
-    tables, mistakes = validate(_parse(path, text))
+    tables, mistakes = validate(parsed(path, text))
     if tables is None:
         raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
     shear, cycle, history, units = tables.shear, tables.cycle, tables.history, tables.units
-    scene, highest = _scene(path, tables)
+    scene, highest = build_scene(path, tables)
     layout, sources = tables.asperities, [path]
     if layout.pattern == "file":
         sources.append(path.parent / layout.path)
@@ -194,7 +194,8 @@ def _whose_loops(path: Path, table: Cycle, count: int) -> tuple[int, ...] | Lite
     return tuple(asked)
 
 
-def _parse(path: Path, text: str) -> dict[str, object]:
+def parsed(path: Path, text: str) -> dict[str, Any]:
+    """The tables of a file; FileError where it is no TOML or empty."""
     if key := _DOTTED.search(text):
         line = text.count("\n", 0, key.start()) + 1
         raise FileError(f"{path}: line {line}: a key of more than {MOST_PARTS} parts")
@@ -207,8 +208,16 @@ def _parse(path: Path, text: str) -> dict[str, object]:
     return contents
 
 
-def _scene(path: Path, tables: Document) -> tuple[Scene, float | None]:
-    """And what `SceneFile.highest_approach` says."""
+def build_scene(
+    path: Path, tables: Document, summits: Callable[..., Asperities] = read_summits
+) -> tuple[Scene, float | None]:
+    """The scene of checked tables, and what `SceneFile.highest_approach` says.
+
+    path    : of the file they are from, for messages and for what paths in it are relative to
+    summits : reads a file of asperities
+
+    Raises InputError for mistakes that show only here.
+    """
     material = tables.material
     ratio = material.poisson_ratio
     with _blamed_on(path, "material"):
@@ -230,8 +239,7 @@ def _scene(path: Path, tables: Document) -> tuple[Scene, float | None]:
     layout = tables.asperities
     with _blamed_on(path, "asperities"):
         if layout.pattern == "file":
-            summits = read_summits(path.parent / layout.path, tip_radius=layout.tip_radius)
-            return press_on(summits), None
+            return press_on(summits(path.parent / layout.path, tip_radius=layout.tip_radius)), None
         return _lattice(layout, tables, press_on)
 
 

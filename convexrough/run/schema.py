@@ -289,7 +289,7 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
         elif not isinstance(keys, dict):
             mistakes.append(f"[{name}]: found {_shown(keys)}, expected a table")
         else:
-            table, found = _validate_table(name, keys)
+            table, found = validate_table(name, keys, _TABLES[name])
             tables[name] = table
             mistakes += [f"[{name}] {mistake}" for mistake in found]
     for name in _REQUIRED:
@@ -302,24 +302,25 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
     return (None if mistakes else Document(**tables)), mistakes
 
 
-def _validate_table(name: str, keys: dict[str, Any]) -> tuple[Table | None, list[str]]:
-    model = _TABLES[name][0]
-    if keys.get("pattern") == "file":
-        model = _TABLES[name][-1]
+def validate_table(
+    name: str, keys: dict[str, Any], models: tuple[type[Table], ...]
+) -> tuple[Table | None, list[str]]:
+    """One table, or None and what is wrong in it; the last of the models is that of files."""
+    model = models[-1] if keys.get("pattern") == "file" else models[0]
     mistakes = list(model.mistakes_between(keys))
     try:
         table = model.model_validate(keys)
     except ValidationError as error:
-        return None, [_phrase(name, model, each) for each in error.errors()] + mistakes
+        return None, [_phrase(models, model, each) for each in error.errors()] + mistakes
     return table, mistakes + list(table.mistakes_within())
 
 
-def _phrase(name: str, model: type[Table], error: ErrorDetails) -> str:
+def _phrase(models: tuple[type[Table], ...], model: type[Table], error: ErrorDetails) -> str:
     """One mistake: the key, or element of its list, what was found, what is expected."""
     key, *inner = error["loc"]
     place = str(key) + "".join(f"[{i}]" for i in inner if isinstance(i, int))
     if error["type"] == "extra_forbidden":
-        if any(key in other.model_fields for other in _TABLES[name]):
+        if any(key in other.model_fields for other in models):
             return f"{place}: not used with this pattern"
         return f"{place}: unknown key, {nearest(place, model.model_fields)}"
     if error["type"] == "missing":

@@ -87,7 +87,9 @@ class Varying(NamedTuple):
                 )
         if self.shakedown is not None:
             with _blamed_on("shakedown"):
-                limit = shakedown(scene, **self.shakedown._asdict(), influence=influence)
+                limit = shakedown(
+                    scene, **self.shakedown._asdict(), influence=influence, announce=announce
+                )
         return Varied(path, closed, losses, limit)
 
 

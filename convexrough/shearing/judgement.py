@@ -95,6 +95,41 @@ def _judge(problem: TangentialProblem, states: States) -> Bounds:
     return bounds
 
 
+class Nearness(NamedTuple):
+    """How near one state is to the solution, in norms: steps 1 to 5; own units, (n,).
+
+    distance : || d ||_H;  carried : || t (P* - P) ||_H;  shifts : bounds on |tau|
+    uncertainty : of the displacement left to each asperity, but for the distance;  rise : (,)
+    """
+
+    distance: float
+    carried: float
+    shifts: Array
+    uncertainty: Array
+    rise: float
+    sliding: NDArray[np.bool_]
+    partial: NDArray[np.bool_]
+
+
+def nearness(problem: TangentialProblem, state: States) -> Nearness | None:
+    """Of a single state (1,); None where convexity proves nothing of it."""
+    if problem.certificate.scope == "none":
+        return None
+    given = _given(problem, state)
+    if not given.known.convexity_number < 1 or not given.known.sure.any():
+        return None
+    image = _image(given)
+    residual = _residual(given, image)
+    distance = _distance(given, image, residual)
+    bounds = _words(given, image, residual, distance)
+    if not bounds.proved[0]:
+        return None
+    uncertainty = residual.uncertainty[0] + given.remainder[0]
+    rise, words = float(bounds.rises[0]), (bounds.sliding[0], bounds.partial[0])
+    carried = float(image.carried_norm[0])
+    return Nearness(float(distance[0]), carried, image.shifts[0], uncertainty, rise, *words)
+
+
 class _Given(NamedTuple):
     """What the proofs start from: m states, A u of each, and its rounding."""
 

@@ -27,6 +27,9 @@ UNDECIDED = {"grazing-gap-1e-15": 1, "grazing-indentation-1e-15": 1, "convexity-
 #: Of the last of 50 digits.
 UNIT = Fraction(1, 10**49)
 
+#: 64 bristles are off by about 1 / 64^2, which a Newton step squares; the others are nearer.
+SQUARED = 64.0**-4
+
 SOLVERS = [
     solvers.Newton(),
     solvers.Conic(),
@@ -69,7 +72,7 @@ def test_the_stored_answer_is_computed_anew(name: str) -> None:
     assert gallery_answers.answer(cases.RECIPES[name]()) == stored
 
 
-@pytest.mark.parametrize("name", [n for n in NAMES if n.split("-")[0] in grazing.FITTED][::5])
+@pytest.mark.parametrize("name", grazing.FITTED)
 def test_heights_are_fitted_anew(name: str) -> None:
     assert gallery_answers.tune(name) == answers.tuned_height(name)
 
@@ -114,6 +117,20 @@ def test_words_and_bounds_when_pressed(name: str, operator: Any) -> None:
         assert (contact.status == "undecided").sum() == UNDECIDED.get(name, 0)
 
 
+@pytest.mark.parametrize(
+    ("threshold", "below", "above"),
+    [("bound-1", "global", "local"), ("fitted", "local", "none"), ("end", "global", "none")],
+)
+def test_proofs_end_where_the_cases_say(threshold: str, below: str, above: str) -> None:
+    """By shells alone, which is all that is known without a matrix; the last by Cholesky."""
+    operator = "dense" if threshold == "end" else "scattered"
+    scopes = [
+        pressed(f"convexity-{threshold}-{side}", operator).certificate.scope
+        for side in ("below", "above")
+    ]
+    assert scopes == [below, above]
+
+
 @each_case
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: solver.name)
 def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
@@ -130,7 +147,7 @@ def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
         return
     assert true_words(case, contact.status)
     assert within(contact.loads, case.loads, contact.certificate.load_errors)
-    assert case.judge(contact.loads).error < 1e-8
+    assert case.judge(contact.loads).error < SQUARED
 
 
 @each_case

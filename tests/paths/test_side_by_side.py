@@ -12,7 +12,7 @@ from scenes import random_scenes
 
 import convexrough as cr
 from convexrough.paths import conic_step
-from convexrough.paths.conic_step import Piece, pieces_of
+from convexrough.paths.conic_pieces import Piece, pieces_of
 from convexrough.paths.memory import MemoryCurve
 from convexrough.solvers.programs import RawAnswer
 

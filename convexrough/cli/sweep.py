@@ -1,0 +1,118 @@
+"""`sweep`: many scenes, by processes here or workers anywhere; or what is known of them so far."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from convexrough.cli.options import PATH, json_option
+from convexrough.cli.speech import (
+    DONE,
+    NOT_CERTIFIED,
+    SOLVER_FAILED,
+    progress,
+    say_aside,
+    written,
+)
+
+if TYPE_CHECKING:
+    from convexrough.run.summary import Summary
+    from convexrough.sweeps.engines import Engine
+    from convexrough.sweeps.table import SweepTable
+
+
+def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | None:
+    """K/N: the K-th of N parts, from 1."""
+    if value is None:
+        return None
+    k, _, n = value.partition("/")
+    if not (k.isdigit() and n.isdigit() and 1 <= int(k) <= int(n)):
+        raise click.BadParameter(f"{value}: expected K/N, whole numbers with K from 1 to N")
+    return int(k), int(n)
+
+
+@click.command()
+@click.argument("sweep", type=PATH, required=False)
+@json_option
+@click.option("--part", metavar="K/N", callback=_part, help="The K-th of N parts of the sweep.")
+@click.option("--resume", is_flag=True, help="Compute what is not in the folder yet.")
+@click.option("--scheduler", metavar="ADDRESS", help='Of Dask: tcp://..., a file, or "local".')
+@click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes; default: all.")
+@click.option("--summary", metavar="DIR", type=PATH, help="Only say what is in a folder.")
+@click.option("--out", metavar="DIR", type=PATH, help="Folder for results.")
+def sweep(
+    sweep: Path | None,
+    out: Path | None,
+    summary: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+    resume: bool,
+    part: tuple[int, int] | None,
+    as_json: bool,
+) -> int:
+    """Measure every scene of a sweep file.
+
+    Results go to the folder SWEEP-sweep unless --out names another: a manifest and parts, each
+    written once and whole. With --summary: quantiles of what is in a folder; with --out, too, a
+    table of them and figures.
+
+    Exit status: 0 all rows certified; 3 some undecided; 4 some scenes failed, or no worker is left.
+    """
+    if (sweep is None) == (summary is None):
+        raise click.UsageError("Either SWEEP, or --summary DIR.")
+    if summary is not None:
+        return _say_summary(summary, out, as_json)
+    if workers is not None and scheduler is not None:
+        raise click.UsageError("--workers and --scheduler exclude each other.")
+    from convexrough.sweeps.report import describe, failures, summarise, with_work
+    from convexrough.sweeps.running import run
+    from convexrough.sweeps.sweep_file import read_sweep
+
+    assert sweep is not None  # one of the two
+    plan = read_sweep(sweep)
+    folder = out or Path(f"{sweep.stem}-sweep")
+    with progress("starting") as show, _engine(workers, scheduler) as engine:
+        done = run(plan, engine, out=folder, resume=resume, part=part, announce=show)
+    said = with_work(summarise(done.table), done)
+    _say(said, describe(said), as_json)
+    for failed in failures(done.table):
+        say_aside("warning", failed)
+    return _status(said)
+
+
+def _engine(workers: int | None, scheduler: str | None) -> AbstractContextManager[Engine]:
+    from convexrough.sweeps.engines import dask, processes
+
+    return processes(workers) if scheduler is None else dask(scheduler)
+
+
+def _say_summary(folder: Path, out: Path | None, as_json: bool) -> int:
+    from convexrough.sweeps import report
+    from convexrough.sweeps.statistics import quantiles
+    from convexrough.sweeps.table import open_sweep
+
+    table: SweepTable = open_sweep(folder)
+    with progress(f"reading {folder}"):
+        said = report.summarise(table)
+        found = quantiles(table, at=report.AT)
+    lines = [*report.describe(said), "", *report.describe_quantiles(found)]
+    if out is not None:
+        with progress("writing results"):
+            lines += written(out, report.write_summary(out, table, found))
+    _say(report.with_quantiles(said, found), lines, as_json)
+    return _status(said)
+
+
+def _say(summary: Summary, lines: list[str], as_json: bool) -> None:
+    from convexrough.run.summary import to_json
+
+    click.echo(to_json(summary) if as_json else "\n".join(lines))
+
+
+def _status(summary: Summary) -> int:
+    if summary["sweep"]["failed"]:
+        return SOLVER_FAILED
+    return NOT_CERTIFIED if summary["sweep"]["undecided"] else DONE

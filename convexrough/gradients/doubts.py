@@ -1,0 +1,365 @@
+"""How far weights on loads can be off that friction states leave, and so derivatives by heights.
+
+The terms are those of docs/theory/gradient-bounds.md, "Weights of a loss" and "Weights of a state".
+Arrays are (N,), of the asperities of `bounds.Known`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array
+from convexrough.gradients.adjoint import Excess, Friction
+from convexrough.gradients.bounds import (
+    CUBE_ROOT,
+    FEW,
+    Known,
+    Moved,
+    Rest,
+    above,
+    norm,
+    respond,
+)
+from convexrough.gradients.system import Solution
+from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.shearing.judgement import LOCAL, Nearness, nearness
+from convexrough.shearing.normal_map import States, slips
+from convexrough.shearing.problem import TangentialProblem
+from convexrough.sphere import annulus
+
+#: Asperities with at least this part of the slope of a pressed contact count as sticking firmly. A
+#: heuristic: any part gives a bound.
+FIRM = 0.05
+
+
+class Weights(NamedTuple):
+    """How far weights on loads can be off: || dp ||_(1/h) of the sure, |dp| of the unsure."""
+
+    dual: float
+    unsure: Array
+
+
+@dataclass(frozen=True)
+class LossDoubt:
+    """Of the weights of w(T), times a factor."""
+
+    factor: float
+    state: Friction
+    beyond: Excess
+
+    def weights(self, known: Known, problem: TangentialProblem) -> Weights | None:
+        """None where nothing is proved."""
+        near = _near(problem, self.state)
+        if near is None or self.beyond.solution is None:
+            return None
+        there = _Widths.of(known, problem, self.state, near)
+        x, w = there.farthest, np.sqrt(known.slopes)
+        C, Y = there.ceilings, known.spread(self.beyond.deflections)
+        y = known.spread(self.beyond.increments)
+        felt = self.beyond.rise - known.influence.apply(y)
+        Y = np.where(known.loaded, Y, felt)
+        b = known.spread(problem.loads * self.state.widths**2 * (3.0 - self.state.widths) / 2.0)
+        slipped = np.where(known.spread(self.state.slopes) > 0, np.abs(y) + b, b)
+        per_width = 1.5 * there.most * x * (2.0 - x) + known.slopes * np.abs(Y)
+        per_load = x * x * (3.0 - x) / 2.0
+        per_load += CUBE_ROOT * known.slopes * there.sticks * np.abs(Y) / there.fewest
+        rest = there.respond(
+            known,
+            self.beyond.solution,
+            per_width,
+            per_load,
+            forces=y,
+            sizes=slipped,
+            loose=there.most + b + known.slopes * np.abs(Y),
+            total=0.0,
+        )
+        dual = known.of_loads(LOCAL / 6.0 * x**3 / w)
+        dual += there.norm((C * x * x + np.abs(Y)) / 2.0 * w)
+        dual += 0.5 * there.shifted(known, rest)
+        dual += 0.5 * _slips(known, problem, near, there)
+        slip = known.spread(np.abs(slips(problem, self.state.deflections)))
+        sizes = C * x**3 + slip + x * np.abs(Y)
+        dual += FEW * ROUNDOFF * known.dual(sizes)
+        unsure = np.where(known.unsure, sizes + C + np.abs(Y) + rest.unsure, 0.0)
+        if known.unsure.any():
+            u = known.spread(self.state.increments)
+            left = np.abs(self.state.rise - known.influence.apply(u))
+            off = above(known.influence, there.apart(known, u)) + near.rise
+            unsure += np.where(known.unsure, left + off, 0.0)
+        factor = abs(self.factor) * (1 + SAFETY)
+        return Weights(factor * dual, factor * unsure)
+
+
+@dataclass(frozen=True)
+class StateDoubt:
+    """Of what weights of increments, slips and the rise of a state leave, times a factor.
+
+    slips : (n,) the weights of those;  total : sum c zeta
+    """
+
+    factor: float
+    state: Friction
+    solution: Solution
+    slips: Array
+    total: float
+
+    def weights(self, known: Known, problem: TangentialProblem) -> Weights | None:
+        """None where nothing is proved, or a slip is weighted that may or may not be there."""
+        near = _near(problem, self.state)
+        if near is None or (self.slips[~near.sliding & ~near.partial] != 0).any():
+            return None
+        there = _Widths.of(known, problem, self.state, near)
+        w = np.sqrt(known.slopes)
+        y = known.spread(self.state.slopes * self.solution.values)
+        zeta = np.where(
+            known.loaded,
+            known.spread(self.solution.values),
+            self.solution.shift - known.influence.apply(y),
+        )
+        e = np.where(self.state.slides, np.abs(self.slips), 0.0)
+        rest = there.respond(
+            known,
+            self.solution,
+            known.slopes * np.abs(zeta),
+            CUBE_ROOT * known.slopes * there.sticks * np.abs(zeta) / there.fewest,
+            forces=y,
+            sizes=np.abs(y) + known.spread(e),
+            loose=np.abs(y) + known.slopes * np.abs(zeta),
+            total=self.total,
+        )
+        own = known.spread(e * problem.ceilings / problem.loads)
+        dual = known.of_loads(2.0 / 3.0 * own * CUBE_ROOT / there.fewest * w)
+        dual += there.norm(np.abs(zeta) * w) + there.shifted(known, rest)
+        dual += FEW * ROUNDOFF * known.dual(there.farthest * np.abs(zeta) + own)
+        unsure = np.where(known.unsure, 2.0 * np.abs(zeta) + rest.unsure + 2.0 * own, 0.0)
+        factor = abs(self.factor) * (1 + SAFETY)
+        return Weights(factor * dual, factor * unsure)
+
+
+@dataclass(frozen=True)
+class GivenDoubt:
+    """Of weights as given; off : (n,) of the scene, what rounding or a missing place makes of them.
+
+    factor is that of the others
+    """
+
+    factor: float
+    off: Array
+
+    def weights(self, known: Known, problem: TangentialProblem) -> Weights | None:
+        """Always known."""
+        off = abs(self.factor) * self.off[known.places]
+        return Weights(known.dual(off), np.where(known.unsure, off, 0.0))
+
+
+Doubt: TypeAlias = LossDoubt | StateDoubt | GivenDoubt
+
+
+def height_errors(
+    problem: TangentialProblem,
+    doubts: Sequence[Doubt] | None,
+    pressing: Solution,
+    total: float | None,
+) -> Array:
+    """(n,) bounds on dJ/dd of the asperities of the scene; infinite where nothing is proved.
+
+    doubts : about the weights on loads; None for weights that nothing is known of
+    total  : sum lambda, where the load is held
+    """
+    n, known = len(problem.scene), Known.of(problem)
+    weights = [] if known is None else [each.weights(known, problem) for each in doubts or ()]
+    if known is None or doubts is None or None in weights:
+        return np.full(n, np.inf)
+    found = [each for each in weights if each is not None]
+    multipliers = known.spread(problem.stiffest * pressing.values)
+    zeta = np.where(
+        known.loaded,
+        known.spread(pressing.values),
+        pressing.shift - known.influence.apply(multipliers),
+    )
+    fewest = np.where(known.unsure, 1.0, known.loads - known.errors)
+    per_load = CUBE_ROOT * known.slopes * np.abs(zeta) / fewest
+    rounding = FEW * ROUNDOFF * np.abs(multipliers)
+    each = per_load * known.errors + rounding
+    loose = known.slopes * np.abs(zeta) + np.abs(multipliers)
+    least = known.slopes * np.cbrt(fewest / (known.loads + known.errors))  # of c0*
+    firm = known.of_loads(per_load / np.sqrt(least))
+    firm += float(np.linalg.norm((rounding / np.sqrt(least))[known.sure]))
+    rest = respond(
+        known,
+        pressing,
+        Moved(firm, 0.0, np.where(known.unsure, loose, each)),
+        forces=multipliers,
+        sizes=np.abs(multipliers),
+        least=float(least[known.sure].sum()),
+        total=total,
+        residual=sum(each.dual for each in found),
+        residual_unsure=sum((each.unsure for each in found), np.zeros(len(known.places))),
+    )
+    errors = np.zeros(n)
+    errors[known.places] = rest.forces
+    return errors
+
+
+class _Widths(NamedTuple):
+    """How far widths x of slip annuli can be off.
+
+    |dx| <= per |delta| + rounding, and `errors`; delta is u* less the image of u, of which
+    || delta ||_h <= distance and |delta_i| <= each_i
+    farthest, sticks : most that x* and 1 - x* can be;  softest : least that c* can be
+    ceilings, most, fewest : most that C* and P* can be, and the least that P* can be
+    """
+
+    per: Array
+    rounding: Array
+    errors: Array
+    each: Array
+    distance: float
+    farthest: Array
+    sticks: Array
+    softest: Array
+    ceilings: Array
+    most: Array
+    fewest: Array
+    slopes: Array
+    sure: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls, known: Known, problem: TangentialProblem, state: Friction, near: Nearness
+    ) -> _Widths:
+        h, P, b = 1.0 / known.slopes, known.loads, known.errors
+        fewest, most = np.where(known.unsure, 1.0, P - b), P + b
+        shifts, u = known.spread(near.shifts), known.spread(np.abs(state.increments))
+        t = np.where(known.unsure, 1.0, np.minimum(u / np.maximum(P, fewest), 1.0))
+        settled = known.spread(near.sliding & state.slides)
+        thin = np.asarray(annulus.width_under(t))
+        s = 1.0 - thin
+
+        def about(distance: float) -> tuple[Array, Array, Array]:
+            """Bounds on |delta|, and on s* from both sides."""
+            each = distance * np.sqrt(known.slopes) + shifts
+            off = each / fewest + 4 * ROUNDOFF * t
+            low = np.cbrt(np.maximum(1.0 - t - off, 0.0)) - 4 * ROUNDOFF
+            return each, np.maximum(low, 0.0), np.cbrt(np.minimum(1.0 - t + off, 1.0))
+
+        def softest(low: Array) -> Array:
+            stuck = np.where(settled | known.unsure, 0.0, low)
+            return np.asarray(known.slopes * np.cbrt(fewest / most) * stuck)
+
+        # T itself is rounded: what that moves is du/dT times it.
+        distance = near.distance + float(np.sqrt(np.sum((shifts**2 * h)[known.sure])))
+        least = float(softest(about(distance)[1])[known.sure].sum())
+        if state.total:
+            swayed = np.sqrt((1.0 + known.coupling) / (1.0 - known.convexity_number))
+            distance += 8 * ROUNDOFF * state.total * (swayed / np.sqrt(least) if least else np.inf)
+        each, low, high = about(distance)
+        with np.errstate(divide="ignore"):
+            per = 1.0 / (fewest * (s * s + s * low + low * low))
+        wholly = np.maximum(high - s, s - low) + 4 * ROUNDOFF
+        errors = np.where(low > 0, np.minimum(per * each, wholly), wholly)
+        errors += np.where(low > 0, 4 * ROUNDOFF * t * per * fewest, 0.0)
+        rounding = np.abs(known.spread(state.widths) - thin) + 4 * ROUNDOFF * thin
+        rounding += np.where(low > 0, 4 * ROUNDOFF * t * per * fewest, 0.0)
+        per, errors, rounding = (
+            np.where(settled | known.unsure, 0.0, each) for each in (per, errors, rounding)
+        )
+        x = np.maximum(known.spread(state.widths), thin) + errors + rounding
+        return cls(
+            per=per,
+            rounding=rounding,
+            errors=errors,
+            each=each,
+            distance=distance,
+            farthest=np.where(known.unsure, 1.0, np.minimum(x, 1.0)),
+            sticks=np.where(settled, 0.0, np.minimum(s + errors + rounding, 1.0)),
+            softest=softest(low),
+            ceilings=np.where(known.unsure, 1.5 * most * h, most * h * 1.5),
+            most=most,
+            fewest=fewest,
+            slopes=known.slopes,
+            sure=known.sure,
+        )
+
+    def norm(self, weights: Array) -> float:
+        """Bound on the 2-norm of w dx, of those that are sure."""
+        weights = np.where(self.sure, weights, 0.0)
+        with np.errstate(invalid="ignore"):
+            scaled = np.where(weights > 0, weights * self.per * np.sqrt(self.slopes), 0.0)
+        whole = norm(scaled, weights * self.errors, self.distance)
+        return whole + float(np.linalg.norm(weights * self.rounding))
+
+    def apart(self, known: Known, increments: Array) -> Array:
+        """(N,) bounds on |u* - u|."""
+        size = np.abs(increments)
+        sure = size / np.maximum(self.fewest, known.loads) * known.errors + self.each
+        return np.where(known.unsure, self.most + size, sure)
+
+    def respond(
+        self,
+        known: Known,
+        solution: Solution,
+        per_width: Array,
+        per_load: Array,
+        *,
+        forces: Array,
+        sizes: Array,
+        loose: Array,
+        total: float,
+    ) -> Rest:
+        """`bounds.respond` for m = per_width |dx| + per_load |P* - P|, of the unsure `loose`."""
+        rounding = np.where(self.sure, FEW * ROUNDOFF * sizes, 0.0)
+        firmly = self.sure & (self.softest > FIRM * self.slopes)
+
+        def moved(which: NDArray[np.bool_], least: Array) -> float:
+            scaled = np.where(which, 1.0 / np.sqrt(np.where(which, least, 1.0)), 0.0)
+            found = self.norm(per_width * scaled) + known.of_loads(per_load * scaled)
+            return found + float(np.linalg.norm(rounding * scaled))
+
+        each = per_width * (self.errors + self.rounding) + per_load * known.errors + rounding
+        return respond(
+            known,
+            solution,
+            Moved(
+                moved(firmly, self.softest),
+                moved(self.sure & ~firmly, self.slopes),
+                np.where(known.unsure, loose, each),
+            ),
+            forces=forces,
+            sizes=sizes,
+            least=float(self.softest.sum()),
+            total=total,
+        )
+
+    def shifted(self, known: Known, rest: Rest) -> float:
+        """Bound on || x* dY ||_(1/h), dY = dbeta - A dy - r."""
+        x = np.where(self.sure, self.farthest, 0.0)
+        return float(x.max(initial=0.0)) * rest.values + rest.shift * known.dual(x)
+
+
+def _near(problem: TangentialProblem, state: Friction) -> Nearness | None:
+    numbers = np.array([state.total]), np.array([state.rise])
+    states = States(
+        numbers[0],
+        state.deflections[None],
+        state.increments[None],
+        numbers[1],
+        slips(problem, state.deflections)[None],
+    )
+    return nearness(problem, states)
+
+
+def _slips(known: Known, problem: TangentialProblem, near: Nearness, there: _Widths) -> float:
+    """Bound on || d slip ||_(1/h): d(Delta) - A du - dC where an asperity slides, or may."""
+    may = (known.spread(~near.partial) & known.sure).astype(np.float64)
+    if not may.any():
+        return 0.0
+    moved = near.carried + there.distance
+    found = near.rise * known.dual(may) + known.coupling * moved
+    found += known.of_loads(LOCAL * may / np.sqrt(known.slopes))
+    return found + known.dual(may * known.spread(near.uncertainty))

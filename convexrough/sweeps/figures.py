@@ -1,0 +1,99 @@
+"""Quantiles of what was measured against what was swept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from convexrough.arrays import Array
+from convexrough.plots.notebook import Figure
+from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, label, legend_above
+from convexrough.sweeps.batch import Columns
+
+#: Where the bands end, and the line between them.
+AT = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+#: Points of the other swept keys that have a band each; more are taken together.
+MOST_BANDS = 4
+
+#: A drawn key has as many different values as seeds: they are taken together in bins.
+BINS = 20
+
+#: Colour, line and marker of each band: no two alike in grey.
+LOOKS = ((ROUGH, "-", "o"), (UNSURE, "--", "s"), ("0.25", ":", "^"), ("#4f8a4f", "-.", "D"))
+
+
+def draw_quantiles(
+    columns: Columns, measured: str, over: str, others: Sequence[str], axes: Axes | None = None
+) -> Axes:
+    """Bands from 5 to 95 % and from 25 to 75 %, and the median, of all rows that did not fail.
+
+    columns : these two, `status`, and the other swept keys that are not drawn: a band for each
+        combination of their values if these are few, else one for all together
+    """
+    if axes is None:
+        axes = Figure(figsize=(0.65 * DOUBLE, 3.0), layout="constrained").subplots()
+    good = columns["status"] != "failed"
+    rows = {name: values[good] for name, values in columns.items()}
+    for (name, band), look in zip(_bands(rows, others), cycle(LOOKS), strict=False):
+        _draw_band(axes, band[over], band[measured], name, look)
+    label(axes, over.replace("_", " ").replace(".", ": "), measured.replace("_", " "))
+    if failed := int(np.count_nonzero(~good)):
+        axes.set_title(f"{failed:,} scenes failed", fontsize=TICK, loc="left")
+    _scale(axes, rows[over])
+    legend_above(axes, ncols=2)
+    return axes
+
+
+def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Columns]]:
+    """The rows of each band, and its name."""
+    if others:
+        rows = np.array([columns[key] for key in others]).T
+        different = np.unique(rows, axis=0)
+        if len(different) <= MOST_BANDS:
+            for values in different:
+                some = (rows == values).all(axis=1)
+                name = ", ".join(
+                    f"{key.partition('.')[2]} {_short(value)}"
+                    for key, value in zip(others, values, strict=True)
+                )
+                yield name, {key: column[some] for key, column in columns.items()}
+            return
+    yield "median", columns
+
+
+def _draw_band(axes: Axes, x: Any, y: Array, name: str, look: tuple[str, str, str]) -> None:
+    colour, line, marker = look
+    if len(x) == 0:
+        return
+    places, parts = _grouped(x, y)
+    known = [part[np.isfinite(part)] for part in parts]
+    rows = [np.quantile(part, AT) if len(part) else np.full(len(AT), np.nan) for part in known]
+    low, lower, middle, upper, high = np.array(rows).T
+    if max(map(len, known)) > 1:
+        axes.fill_between(places, low, high, color=colour, alpha=0.16, lw=0)
+        axes.fill_between(places, lower, upper, color=colour, alpha=0.30, lw=0)
+    axes.plot(places, middle, color=colour, ls=line, marker=marker, ms=3, lw=1.2, label=name)
+
+
+def _grouped(x: Any, y: Array) -> tuple[Any, list[Array]]:
+    """y at each x; or at the median of each bin, where there is one for each y or so."""
+    different, back = np.unique(x, return_inverse=True)
+    if len(different) <= max(BINS, len(y) // 4):
+        return different, [y[back == i] for i in range(len(different))]
+    bins = np.array_split(np.argsort(x), BINS)
+    return np.array([np.median(x[each]) for each in bins]), [y[each] for each in bins]
+
+
+def _scale(axes: Axes, x: Any) -> None:
+    if len(x) and x.dtype.kind != "U" and x.min() > 0 and x.max() > 30 * x.min():
+        axes.set_xscale("log")
+    axes.margins(x=0.02)
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,193 @@
+"""The table of a sweep: in a folder, part by part, or held as it was computed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from convexrough import checks, frames
+from convexrough.errors import ExtraError, InputError
+from convexrough.record import Record, in_words
+from convexrough.sweeps.batch import Columns, Rows
+from convexrough.sweeps.parts import Folder, Part, missing, once, open_folder, read_part
+
+if TYPE_CHECKING:
+    import dask.dataframe
+    import pandas
+    from matplotlib.axes import Axes
+
+#: Quantiles that are asked for where none are named.
+USUAL = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+#: [bytes] of one cell of a table in memory, with what a data frame takes beside it.
+CELL = 24
+
+
+def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
+    """The table of a sweep in a folder, finished or not. Nothing is read before it is asked for.
+
+    Raises FileError where there is no sweep.
+    """
+    found = open_folder(Path(folder))
+    return SweepTable(found.manifest, found)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepTable(Record):
+    """A row for each scene, in the order of the sweep; scenes not computed yet are not there.
+
+    manifest : what it is the table of;  folder : where it lies, None where it is held in memory
+
+    Columns: `scene`, its number; what is swept; `seed`, -1 where nothing is random; `status`,
+    "certified", "undecided" or "failed"; `message`, why; and what was measured, nan where that
+    failed.
+    """
+
+    manifest: Mapping[str, Any]
+    folder: Folder | None = None
+    held: Columns | None = None
+
+    @property
+    def columns(self) -> list[str]:
+        return list(self.manifest["columns"])
+
+    @property
+    def swept(self) -> list[str]:
+        """The keys that vary, drawn ones last."""
+        return self.columns[1 : self.columns.index("seed")]
+
+    @property
+    def points(self) -> list[str]:
+        """The swept keys that are not drawn: their values are the points of the grid."""
+        return [key for key in self.swept if key not in self.manifest["drawn"]]
+
+    @property
+    def measured(self) -> list[str]:
+        return self.columns[self.columns.index("message") + 1 :]
+
+    @property
+    def scenes(self) -> int:
+        """How many the sweep has."""
+        return int(self.manifest["scenes"])
+
+    @property
+    def complete(self) -> bool:
+        """Every scene is there."""
+        return len(self) == self.scenes
+
+    def __len__(self) -> int:
+        """How many rows there are."""
+        if self.held is not None:
+            return len(self.held["scene"])
+        return self.scenes - sum(map(len, missing(self._parts(), range(self.scenes))))
+
+    def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
+        """Some columns, default all, a part after the other: for what exceeds memory."""
+        self._refuse_unknown(names or ())
+        if self.held is not None:
+            yield {name: self.held[name] for name in names or self.columns}
+            return
+        for part, numbers in once(self._parts()):
+            yield read_part(part, numbers, names)
+
+    def read(self, names: Sequence[str] | None = None) -> Columns:
+        """Some columns, default all, as arrays.
+
+        Raises InputError where they do not fit in memory, and for names that are not there.
+        """
+        wanted = self.columns if names is None else list(names)
+        checks.fits_in_memory("rows", len(self), CELL * len(wanted))
+        blocks = list(self.blocks(wanted))
+        return {name: np.concatenate([block[name] for block in blocks]) for name in wanted}
+
+    def counts(self) -> dict[str, int]:
+        """How many rows have each status."""
+        words = dict.fromkeys(("certified", "undecided", "failed"), 0)
+        for block in self.blocks(["status"]):
+            for word in words:
+                words[word] += int(np.count_nonzero(block["status"] == word))
+        return words
+
+    def to_dataframe(self, columns: Sequence[str] | None = None) -> pandas.DataFrame:
+        """A data frame of pandas, of some columns or all.
+
+        Raises ExtraError where pandas is not installed, InputError where it does not fit in memory:
+        `to_dask` need not.
+        """
+        variables: frames.Variables = {
+            name: (("row",), values) for name, values in self.read(columns).items()
+        }
+        attributes = {name: self.manifest[name] for name in ("sweep", "version", "source")}
+        return frames.dataframe(variables, attributes)
+
+    def to_dask(self, columns: Sequence[str] | None = None) -> dask.dataframe.DataFrame:
+        """A data frame of Dask, of some columns or all: parts are read when they are needed.
+
+        Raises ExtraError where Dask is not installed, InputError where there are no parts.
+        """
+        try:
+            import dask.dataframe
+        except ImportError as error:
+            raise ExtraError("dask") from error
+        self._refuse_unknown(columns or ())
+        parts = list(once(self._parts())) if self.folder is not None else []
+        if not parts:
+            raise InputError("table", found="no parts", expected="rows in a folder")
+        names = self.columns if columns is None else list(columns)
+        first = _frame(parts[0], names)
+        return dask.dataframe.from_map(_frame, parts, names=names, meta=first.iloc[:0])
+
+    def plot(
+        self, measured: str | None = None, over: str | None = None, axes: Axes | None = None
+    ) -> Axes:
+        """Bands of quantiles of something measured against something swept.
+
+        Default: the first of each. What is swept beside it has bands of its own, if there are few.
+
+        Raises InputError where nothing is swept, and for names that are not there.
+        """
+        from convexrough.sweeps.figures import draw_quantiles  # it loads matplotlib
+
+        if not self.swept or not len(self):
+            expected = "rows, and a key in [sweep.over], [sweep.together] or [sweep.draw]"
+            raise InputError("table", found="nothing to draw", expected=expected)
+        measured = self.measured[0] if measured is None else measured
+        over = self.swept[0] if over is None else over
+        others = [key for key in self.points if key != over]
+        columns = self.read([over, *others, "status", measured])
+        return draw_quantiles(columns, measured, over, others, axes)
+
+    def _parts(self) -> list[Part]:
+        assert self.folder is not None  # or it is held
+        return self.folder.parts()
+
+    def _refuse_unknown(self, names: Iterable[str]) -> None:
+        for name in names:
+            if name not in self.columns:
+                expected = f"one of the table: {checks.nearest(name, self.columns)}"
+                raise InputError("column", found=repr(name), expected=expected)
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "rows", f"{len(self):,} of {self.scenes:,} scenes"
+        yield "status", ", ".join(f"{n:,} {word}" for word, n in self.counts().items() if n)
+        yield "swept", in_words(", ".join(self.swept))
+        yield "measured", in_words(", ".join(self.measured))
+        yield "source", in_words(self.manifest["source"])
+        yield "folder", in_words("none" if self.folder is None else self.folder.path)
+
+
+def joined(rows: Iterable[Rows]) -> Columns:
+    """All rows in the order of their scenes."""
+    blocks = [each.columns for each in sorted(rows, key=lambda each: each.first)]
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+
+def _frame(slice_of_part: tuple[Part, range], names: Sequence[str]) -> pandas.DataFrame:
+    part, numbers = slice_of_part
+    columns = read_part(part, numbers, names)
+    return frames.dataframe({name: (("row",), it) for name, it in columns.items()}, {})

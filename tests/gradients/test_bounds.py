@@ -1,0 +1,169 @@
+"""Bounds on derivatives by heights: at least the true error, and not by much more."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_scenes import FRICTION, in_doubt, with_friction
+from gradient_oracle import Judge, Setup, exact, press, sheared
+from scenes import NAMED
+
+import convexrough as cr
+from convexrough.arrays import Array
+
+
+def pressed(name: str, control: str) -> cr.Contact:
+    scene, approach = NAMED[name]
+    contact = cr.press(with_friction(scene), approach=approach)
+    return contact if control == "approach" else cr.press(contact.scene, load=contact.load)
+
+
+def loss(contact: cr.Contact, holding: str, force: float) -> Judge:
+    solved = sheared(contact, holding, force)
+
+    def value(setup: Setup, near: Any) -> tuple[Any, Any]:
+        state = solved(setup, near)
+        return state.loss, state
+
+    return Judge(Setup.of(contact, holding, [force]), value)
+
+
+def displacement(contact: cr.Contact, holding: str, force: float) -> Judge:
+    solved = sheared(contact, holding, force)
+
+    def value(setup: Setup, near: Any) -> tuple[Any, Any]:
+        state = solved(setup, near)
+        return state.displacement, state
+
+    return Judge(Setup.of(contact, holding, [force]), value)
+
+
+def approach(contact: cr.Contact, holding: str) -> Judge:
+    def value(setup: Setup, near: Any) -> tuple[Any, Any]:
+        oracle = press(contact, setup, near)
+        return (oracle.approach if holding == "load" else oracle.P.sum()), oracle
+
+    return Judge(Setup.of(contact, holding), value)
+
+
+def true_errors(judge: Judge, gradient: cr.Gradient, every: int = 5) -> tuple[Array, Array]:
+    """Of some asperities: what the derivatives are off, and the bounds on that."""
+    some = np.flatnonzero(gradient.contact.loads)[::every]
+    size, found = gradient.contact.approach, []
+    for i in some:
+        one = np.zeros(len(gradient.heights))
+        one[i] = size
+        found.append(judge.slope("heights", exact(one)) / size)
+    return np.abs(np.array(found) - gradient.heights[some]), gradient.height_errors[some]
+
+
+@pytest.mark.parametrize("name", ["paper", "rough, closest"])
+@pytest.mark.parametrize("holding", ["load", "approach"])
+@pytest.mark.parametrize("fraction", [1e-9, 0.1, 0.5, 0.99])
+def test_bounds_of_losses_and_displacements(name: str, holding: Any, fraction: float) -> None:
+    contact = pressed(name, holding)
+    force = fraction * FRICTION * contact.load
+    cycle, state = cr.cycle(contact, maximum=force), cr.shear(contact, force=force)
+    for judge, gradient in (
+        (loss(contact, holding, force), cycle.gradient()),
+        (displacement(contact, holding, force), state.gradient(displacement=1.0)),
+    ):
+        true, bounds = true_errors(judge, gradient, every=9)
+        assert (true <= bounds).all()
+        assert (bounds <= 1e-7 * np.abs(gradient.heights).max()).all()
+
+
+@pytest.mark.parametrize("name", ["rough", "steel"])
+@pytest.mark.parametrize("holding", ["load", "approach"])
+def test_bounds_of_contacts(name: str, holding: Any) -> None:
+    contact = pressed(name, holding)
+    weights: Any = {"approach": 1.0} if holding == "load" else {"load": 1.0}
+    gradient = contact.gradient(**weights)
+    true, bounds = true_errors(approach(contact, holding), gradient)
+    assert (true <= bounds).all()
+    assert (bounds <= 1e-11 * np.abs(gradient.heights).max()).all()
+
+
+@pytest.mark.parametrize("digits", [7, 10])
+@pytest.mark.parametrize("fraction", [1e-6, 0.3, 0.8])
+def test_doubt_about_the_loads_is_counted(digits: int, fraction: float) -> None:
+    """Of rounded loads, whose certificate knows."""
+    contact = pressed("rough", "approach")
+    doubtful = in_doubt(contact, digits, "approach")
+    force = fraction * FRICTION * contact.load
+    true = cr.cycle(contact, maximum=force).gradient().heights
+    found = cr.cycle(doubtful, maximum=force).gradient(holding="approach")
+    off = np.abs(found.heights - true)
+    assert off.max() > 10.0 ** (-digits - 1) * np.abs(true).max()
+    assert (off <= found.height_errors).all()
+    least = np.abs(true).max() * 10.0**-digits
+    assert (found.height_errors <= 1e6 * least).all()
+
+
+def test_bounds_go_with_the_force() -> None:
+    """Relative to the largest derivative they are the same down to any force."""
+    contact = pressed("rough", "load")
+    parts = []
+    for fraction in (1e-12, 1e-9, 1e-6, 1e-3):
+        gradient = cr.cycle(contact, maximum=fraction * contact.load).gradient()
+        parts.append(gradient.height_errors.max() / np.abs(gradient.heights).max())
+    assert max(parts) < 1.2 * min(parts)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_undecided_asperity_costs_the_root_of_its_doubt(side: float) -> None:
+    scene, depth = NAMED["rough"]
+    scene = with_friction(scene)
+    contact = cr.press(scene, approach=depth)
+    nearest = int(np.argmin(np.where(contact.loads > 0, np.inf, contact.gaps)))
+
+    def raised(by: float) -> cr.Contact:
+        a = scene.asperities
+        heights = a.heights.copy()
+        heights[nearest] += by
+        tall = replace(scene, asperities=cr.Asperities(a.positions, a.tip_radii, heights))
+        return cr.press(tall, approach=depth)
+
+    grazing = raised(contact.gaps[nearest] * (1 + side * 1e-15))
+    assert grazing.status[nearest] == "undecided"
+    doubt = grazing.certificate.gap_errors[nearest]
+    found = cr.cycle(grazing, maximum=0.2 * contact.load).gradient()
+    errors, largest = found.height_errors, np.abs(found.heights).max()
+    assert np.isfinite(errors).all()
+    assert errors.max() < 100 * np.sqrt(doubt / depth) * largest
+    for shift in (-0.4, 0.4):  # states that the loads do not tell apart
+        there = raised(contact.gaps[nearest] + shift * doubt)
+        other = cr.cycle(there, maximum=0.2 * contact.load).gradient().heights
+        assert (np.abs(other - found.heights) <= errors).all()
+
+
+def test_nothing_is_bounded_where_nothing_is_proved() -> None:
+    contact = pressed("paper", "load")
+    unproved = replace(contact, certificate=replace(contact.certificate, scope="none"))
+    assert np.isinf(unproved.gradient(approach=1.0).height_errors).all()
+    gross = cr.cycle(contact, maximum=FRICTION * contact.load).gradient()
+    assert np.isinf(gross.height_errors).all()
+    assert np.isinf(cr.onset_gradient(contact, 3).height_errors).all()
+
+
+@pytest.mark.parametrize("kind", ["lattice", "scattered"])
+def test_what_is_left_of_a_linear_system_is_counted(kind: Any) -> None:
+    scene, depth = NAMED["rough"]
+    dense = cr.press(with_friction(scene), approach=depth)
+    true = cr.cycle(dense, maximum=0.1 * dense.load).gradient().heights
+    contact = cr.press(with_friction(scene), approach=depth, influence=kind)
+    for tolerance in (1e-4, 1e-9):
+        found = cr.cycle(contact, maximum=0.1 * dense.load).gradient(tolerance=tolerance)
+        off = np.abs(found.heights - true)
+        assert (off <= found.height_errors).all()
+
+
+def test_histories_have_bounds_too() -> None:
+    contact = pressed("rough", "load")
+    past = cr.history(contact, forces=contact.load * np.array([0.3, -0.2, 0.1]))
+    gradient = past.gradient(energy=[0.0, 0.0, 1.0], displacements=[0.0, 1e-8, 0.0])
+    assert np.isfinite(gradient.height_errors).all()
+    assert gradient.height_errors.max() < 1e-6 * np.abs(gradient.heights).max()
+    cycle = cr.cycle(contact, maximum=0.2 * contact.load).gradient()
+    assert cycle.normalised.height_errors.max() < 1e-7 * np.abs(cycle.normalised.heights).max()

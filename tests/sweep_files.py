@@ -1,0 +1,110 @@
+"""Sweeps that several tests compute, and what it means that two tables are the same."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import convexrough as cr
+from convexrough.sweeps.sources import Press, Tables
+
+SMALL: dict[str, Any] = {
+    "sphere": {"radius": 1.0},
+    "material": {"contact_modulus": 1.0, "poisson_ratio": 0.3},
+    "asperities": {
+        "pattern": "hexagonal", "spacing": 0.0025, "tip_radius": 0.02, "within": 0.0102,
+    },
+    "normal": {"load": 3e-7},
+    "friction": {"coefficient": 0.5},
+    "cycle": {"maximum": [0.37]},
+    "sweep": {
+        "seeds": 4,
+        "measure": ["contacts", "load", "loss"],
+        "over": {"asperities.height_std": [0.0, 1e-6], "normal.load": [1e-7, 3e-7]},
+    },
+}  # fmt: skip
+
+
+def tables(**changed: Any) -> dict[str, Any]:
+    """Those of SMALL, with the keys of some of them changed; None takes a table out."""
+    found = {name: {**table} for name, table in SMALL.items()}
+    for name, keys in changed.items():
+        if keys is None:
+            del found[name]
+        else:
+            found[name] = {**found.get(name, {}), **keys}
+    return found
+
+
+def sweeping(**keys: Any) -> dict[str, Any]:
+    """SMALL with this table [sweep] alone."""
+    return {**tables(), "sweep": {"measure": ["contacts"], **keys}}
+
+
+def toml(contents: dict[str, Any]) -> str:
+    """Of tables, of values and of inline tables."""
+    lines = []
+    for name, table in contents.items():
+        lines.append(f"[{name}]")
+        for key, value in table.items():
+            if isinstance(value, dict):
+                inside = ", ".join(f'"{each}" = {_toml(it)}' for each, it in value.items())
+                lines.append(f"{key} = {{{inside}}}")
+            else:
+                lines.append(f"{key} = {_toml(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_toml(it)}" for key, it in value.items()) + "}"
+    return json.dumps(value)
+
+
+def same(one: cr.SweepTable, other: cr.SweepTable) -> bool:
+    """Bit for bit, nan for nan."""
+    first, second = one.read(), other.read()
+    return list(first) == list(second) and all(map(_equal, first.values(), second.values()))
+
+
+def _equal(one: Any, other: Any) -> bool:
+    if one.dtype.kind == "U":  # as wide as its longest
+        return one.tolist() == other.tolist()
+    return one.dtype == other.dtype and one.tobytes() == other.tobytes()
+
+
+def started(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+    """The command line as a process of its own, in a folder."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "convexrough", "sweep", *arguments],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, **environment},
+    )  # fmt: skip
+
+
+def numbers(table: cr.SweepTable, *names: str) -> list[Any]:
+    columns = table.read(names)
+    return [np.asarray(columns[name]).tolist() for name in names]
+
+
+@dataclass(frozen=True)
+class Deadly(Tables):
+    """Scenes of which one kills the process that computes it."""
+
+    worst: int = 0
+
+    def opened(self) -> Press:
+        press = super().opened()
+
+        def press_one(number: int) -> cr.Contact:
+            if number == self.worst:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return press(number)
+
+        return press_one

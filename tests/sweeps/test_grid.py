@@ -1,0 +1,222 @@
+"""Which scenes a sweep has, in which order, and what a file may say of them."""
+
+import itertools
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sweep_files import SMALL, sweeping, tables, toml
+
+import convexrough as cr
+from convexrough.sweeps.grid import Draw, Grid
+from convexrough.sweeps.sweep_file import Plan, plan_of, read_sweep
+
+
+def plan(contents: dict[str, Any]) -> Plan:
+    return plan_of(contents, Path("sweep.toml"))
+
+
+def mistakes(contents: dict[str, Any]) -> str:
+    with pytest.raises(cr.InputError) as caught:
+        plan(contents)
+    return str(caught.value)
+
+
+def test_rows_are_in_the_order_of_lists_then_grid_then_seeds() -> None:
+    together = (("sphere.radius", (1.0, 2.0)), ("material.poisson_ratio", (0.1, 0.2)))
+    over = (("normal.load", (1, 2, 3)), ("asperities.height_std", (0.0, 1.0)))
+    grid = Grid({"asperities": {}}, together, over, seeds=[7, 5])
+    assert grid.count == 2 * 3 * 2 * 2
+    found = [grid.point(i) for i in range(grid.count)]
+    expected = itertools.product([(1.0, 0.1), (2.0, 0.2)], (1, 2, 3), (0.0, 1.0), (7, 5))
+    for point, (both, load, height, seed) in zip(found, expected, strict=True):
+        assert tuple(point.values.values()) == (*both, load, height)
+        assert point.seed == seed
+
+
+def test_tables_are_those_of_the_file_with_the_values_set() -> None:
+    grid = plan(SMALL).source.grid  # type: ignore[attr-defined]
+    point = grid.tables_at(grid.count - 1)
+    assert point["asperities"] == {**SMALL["asperities"], "height_std": 1e-6, "seed": 3}
+    assert point["normal"] == {"load": 3e-7}
+    assert "sweep" not in point
+
+
+def test_a_sweep_of_any_length_is_counted_at_once() -> None:
+    grid = Grid(
+        {"asperities": {}}, over=(("normal.load", tuple(range(10))),) * 3, seeds=range(10**18)
+    )
+    assert grid.count == 10**21
+    assert grid.point(10**21 - 1).seed == 10**18 - 1
+
+
+def test_draws_belong_to_the_seed_alone() -> None:
+    def drawn(*draws: Draw) -> list[float]:
+        grid = Grid({"asperities": {}}, (), (("normal.load", (1, 2)),), draws, range(5))
+        return [grid.point(i).values["friction.coefficient"] for i in range(grid.count)]
+
+    friction = Draw("friction.coefficient", "uniform", 0.2, 0.6)
+    alone = drawn(friction)
+    assert alone[:5] == alone[5:]
+    assert len(set(alone)) == 5
+    assert all(0.2 <= value <= 0.6 for value in alone)
+    assert drawn(Draw("sphere.radius", "normal", 1.0, 0.1), friction) == alone
+
+
+@pytest.mark.parametrize(
+    ("law", "first", "second", "mean", "deviation"),
+    [("uniform", 1.0, 3.0, 2.0, 2 / np.sqrt(12)), ("normal", 5.0, 0.5, 5.0, 0.5),
+     ("lognormal", 2.0, 0.3, 2.0, 0.6)],
+)  # fmt: skip
+def test_draws_have_their_mean_and_deviation(
+    law: Any, first: float, second: float, mean: float, deviation: float
+) -> None:
+    values = np.array([Draw("a.b", law, first, second).value(seed) for seed in range(4000)])
+    assert values.mean() == pytest.approx(mean, abs=5 * deviation / np.sqrt(4000))
+    assert values.std() == pytest.approx(deviation, rel=0.06)
+
+
+def test_a_file_and_its_tables_are_one_sweep(tmp_path: Path) -> None:
+    path = tmp_path / "sweep.toml"
+    path.write_text(toml(SMALL))
+    assert tomllib.loads(path.read_text()) == SMALL
+    assert read_sweep(path).identity == plan(SMALL).identity
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        tables(sphere={"radius": 1.1}),
+        tables(sweep={"seeds": 5}),
+        tables(sweep={"measure": ["load"]}),
+        tables(sweep={"seeds": [0, 1, 2, 4]}),
+        tables(cycle={"maximum": [0.38]}),
+        tables(sweep={"over": {"normal.load": [1e-7, 3e-7], "asperities.height_std": [0.0, 1e-6]}}),
+    ],
+)
+def test_whatever_numbers_depend_on_is_in_the_hash(changed: dict[str, Any]) -> None:
+    assert plan(changed).identity != plan(SMALL).identity
+
+
+def test_the_contents_of_a_file_of_asperities_are_in_the_hash(tmp_path: Path) -> None:
+    contents = tables(asperities={"pattern": "file", "path": "a.csv"})
+    contents["asperities"] = {"pattern": "file", "path": "a.csv"}
+    contents["sweep"] = {"measure": ["load"], "over": {"normal.load": [1e-7]}}
+    identities = set()
+    for x in (0.0, 1e-4):
+        (tmp_path / "a.csv").write_text(f"x,y,tip_radius\n{x},0.0,0.02\n")
+        identities.add(plan_of(contents, tmp_path / "sweep.toml").identity)
+    assert len(identities) == 2
+
+
+WRONG = {
+    "no table": ({k: v for k, v in SMALL.items() if k != "sweep"}, "[sweep]: missing table"),
+    "a number": ({**SMALL, "sweep": 3}, "[sweep]: found 3, expected a table"),
+    "unknown key": (tables(sweep={"sede": 3}), '[sweep] sede: unknown key, did you mean "seeds"?'),
+    "unknown swept key": (
+        sweeping(over={"asperities.hieght_std": [1.0]}),
+        '[asperities] hieght_std: unknown key, did you mean "height_std"?',
+    ),
+    "unknown table": (
+        sweeping(over={"nromal.load": [1.0]}),
+        "[nromal]: unknown table, did you mean",
+    ),
+    "no table in a key": (sweeping(over={"load": [1.0]}), '"load": expected a table and a key'),
+    "empty grid": (sweeping(over={"normal.load": []}), '"normal.load": found [], expected a list'),
+    "no list": (sweeping(over={"normal.load": 3.0}), "found 3.0, expected a list of values"),
+    "a wrong value": (
+        sweeping(over={"normal.load": [1e-7, -1.0]}),
+        '[sweep.over] "normal.load"[1]: [normal] load: found -1.0, expected a positive number',
+    ),
+    "a value twice": (sweeping(over={"normal.load": [1e-7, 1e-7]}), "a value is there twice"),
+    "two ways of one key": (
+        sweeping(over={"normal.load": [1e-7]}, together={"normal.load": [2e-7]}),
+        '"normal.load": swept twice, in [sweep.together] too',
+    ),
+    "seed twice": (
+        sweeping(seeds=3, over={"asperities.seed": [1], "asperities.height_std": [1e-7]}),
+        "swept twice, by seeds too",
+    ),
+    "fractions swept": (
+        sweeping(over={"cycle.maximum": [[0.1]]}),
+        "the values of [cycle] are columns",
+    ),
+    "of unequal length": (
+        sweeping(together={"normal.load": [1e-7, 2e-7], "sphere.radius": [1.0]}),
+        "together: found [1, 2] values, expected as many of each key",
+    ),
+    "no seeds": (sweeping(seeds=0), "seeds: found 0, expected how many (1 or more)"),
+    "a truth value": (sweeping(seeds=True), "seeds: found True"),
+    "a seed twice": (sweeping(seeds=[1, 1]), "seeds: one is there twice"),
+    "nothing random": (sweeping(seeds=3), "seeds: nothing is random"),
+    "draws without seeds": (
+        sweeping(draw={"sphere.radius": {"uniform": [1, 2]}}),
+        "seeds: missing, needed with",
+    ),
+    "no law": (
+        sweeping(seeds=1, draw={"sphere.radius": {"gauss": [1, 2]}}),
+        "expected one of: uniform",
+    ),
+    "wrong order": (
+        sweeping(seeds=1, draw={"sphere.radius": {"uniform": [2, 1]}}),
+        "expected the lower one first",
+    ),
+    "a negative mean": (
+        sweeping(seeds=1, draw={"sphere.radius": {"lognormal": [-1, 1]}}),
+        "expected positive numbers",
+    ),
+    "one number": (
+        sweeping(seeds=1, draw={"sphere.radius": {"normal": [1]}}),
+        "expected two numbers",
+    ),
+    "unknown measure": (
+        tables(sweep={"measure": ["los"]}),
+        '"los" is not known, did you mean "loss"?',
+    ),
+    "no measure": (tables(sweep={"measure": []}), "measure: found [], expected a list of some of"),
+    "a measure twice": (tables(sweep={"measure": ["load", "load"]}), '"load" is named twice'),
+    "no cycle": (tables(cycle=None), "[cycle]: missing table, needed to measure loss"),
+    "no friction": (
+        {**tables(cycle=None, friction=None), "sweep": {"measure": ["onset"]}},
+        "[friction]: missing table, needed to measure onset",
+    ),
+    "columns of one name": (
+        tables(cycle={"maximum": [0.37, 0.37]}),
+        "two columns would be named loss_0.37",
+    ),
+    "a wrong scene": (tables(sphere={"radius": -1}), "[sphere] radius: found -1"),
+}
+
+
+@pytest.mark.parametrize(("contents", "said"), WRONG.values(), ids=WRONG)
+def test_mistakes(contents: dict[str, Any], said: str) -> None:
+    message = mistakes(contents)
+    assert said in message
+    assert all(line.startswith("sweep.toml: ") for line in message.splitlines())
+
+
+def test_all_mistakes_of_the_table_are_told_at_once() -> None:
+    both = mistakes(sweeping(seeds=0, over={"load": [1.0], "normal.load": []}))
+    assert len(both.splitlines()) == 3
+
+
+def test_what_is_wrong_ends_with_status_2(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(toml(tables(sweep={"sede": 3})))
+    for arguments in (["a.toml"], ["none.toml"], [], ["a.toml", "--part", "3/2"],
+                      ["a.toml", "--workers", "0"], ["--summary", "nowhere"],
+                      ["a.toml", "--workers", "1", "--scheduler", "local"]):  # fmt: skip
+        status, out, err = command("sweep", *arguments)
+        assert (status, out) == (2, ""), arguments
+        assert "Traceback" not in err
+    assert not (tmp_path / "a-sweep").exists()
+
+
+def test_a_trillion_scenes(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(toml(tables(sweep={"seeds": 10**12 // 4})))
+    status, _, err = command("sweep", "a.toml")
+    assert status == 2
+    assert "1,000,000,000,000, which take " in err
+    assert "years of one processor" in err
+    assert not (tmp_path / "a-sweep").exists()

@@ -1,0 +1,303 @@
+"""What is in the table of a sweep, and the forms in which it is had."""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import MATERIAL
+from sweep_files import SMALL, numbers, same, sweeping, tables, toml
+
+import convexrough as cr
+from convexrough.sweeps import measures, parts, running
+from convexrough.sweeps.statistics import quantiles
+
+
+@pytest.fixture(scope="module")
+def here() -> Iterator[Executor]:
+    """Computes in this process."""
+    with ThreadPoolExecutor(1) as executor:
+        yield executor
+
+
+ALL = tables(
+    shear={"fractions": [0.2, 0.5]},
+    cycle={"maximum": [0.37, 0.5], "minimum": [-0.37, 0.1]},
+    sweep={"measure": list(measures.MEASURES)},
+)
+
+
+def test_rows_are_those_of_single_scenes(here: Executor) -> None:
+    table = cr.sweep(ALL, executor=here)
+    rows = table.read()
+    assert list(rows) == table.columns
+    assert rows["scene"].tolist() == list(range(16))
+    assert set(rows["status"]) == {"certified"}
+    assert set(rows["message"]) == {""}
+    for i in (0, 5, 15):
+        asperities = cr.Asperities.hexagonal(
+            spacing=0.0025, tip_radius=0.02, within=0.0102,
+            height_std=rows["asperities.height_std"][i], seed=int(rows["seed"][i]),
+        )  # fmt: skip
+        scene = cr.Scene(1.0, asperities, MATERIAL, 0.5)
+        contact = cr.press(scene, load=rows["normal.load"][i])
+        P, proof = 0.5 * contact.load, contact.certificate
+        first, second = cr.cycles(contact, P * np.array([0.37, 0.5]), P * np.array([-0.37, 0.1]))
+        onsets = cr.onset_of_sliding(contact) / P
+        expected = {
+            "contacts": (contact.status == "contact").sum(),
+            "words_contact": (contact.status == "contact").sum(),
+            "words_open": (contact.status == "open").sum(),
+            "words_undecided": 0,
+            "load": contact.load,
+            "approach": contact.approach,
+            "certificate_load_error": proof.load_error,
+            "certificate_convexity_number": proof.convexity_number,
+            "certificate_model_error": contact.model_error,
+            "certificate_crowding": contact.crowding,
+            "displacement_0.2": cr.shear(contact, force=0.2 * P).displacement,
+            "displacement_0.5": cr.shear(contact, force=0.5 * P).displacement,
+            "onset_0": np.nanmin(onsets),
+            "onset_0.5": np.nanquantile(onsets, 0.5),
+            "onset_1": np.nanmax(onsets),
+            "loss_0.37": first.energy,
+            "loss_0.1_0.5": second.energy,
+            "loss_normalised_0.37": first.energy_normalised,
+            "loss_over_smooth_0.1_0.5": second.energy_normalised / second.smooth_normalised,
+            "loss_factor_0.37": first.loss_factor,
+            "stiffness_0.1_0.5": second.secant_stiffness,
+        }
+        for name, value in expected.items():
+            assert rows[name][i] == value, name
+
+
+def test_scenes_made_in_python(here: Executor) -> None:
+    base = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    scenes = [cr.Scene(R, base, MATERIAL, 0.5) for R in (0.9, 1.0, 1.1)]
+    loads = [1e-7, 2e-7, 3e-7]
+    table = cr.sweep(scenes, load=loads, cycle=[0.3], measure=["approach", "loss"], executor=here)
+    assert table.columns[1:5] == ["normal.load", "seed", "status", "message"]
+    assert numbers(table, "normal.load", "seed") == [loads, [-1, -1, -1]]
+    for i, scene in enumerate(scenes):
+        contact = cr.press(scene, load=loads[i])
+        row = {name: values[i] for name, values in table.read(["approach", "loss_0.3"]).items()}
+        loss = cr.cycle(contact, maximum=0.3 * 0.5 * contact.load).energy
+        assert row == {"approach": contact.approach, "loss_0.3": loss}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [({"measure": ["load"]}, "approach, load: found neither"),
+     ({"measure": ["loss"], "load": 1e-7}, "[cycle]: missing table, needed to measure loss"),
+     ({"load": 1e-7}, "measure: found (), expected a list"),
+     ({"load": [1e-7, 2e-7], "measure": ["load"]}, "expected 1 values"),
+     ({"load": 1e-7, "measure": ["loss"], "cycle": [1.2]}, "cycle[0]: found 1.2"),
+     ({"load": 1e-7, "measure": ["load"], "workers": 0}, "workers: found 0"),
+     ({"load": 1e-7, "measure": ["load"], "part": (3, 2)}, "part: found 3/2"),
+     ({"load": 1e-7, "measure": ["load"], "executor": 3}, "executor: found something of int")],
+)  # fmt: skip
+def test_wrong_arguments(arguments: dict[str, Any], said: str) -> None:
+    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    with pytest.raises(cr.InputError) as caught:
+        cr.sweep([cr.Scene(1.0, asperities, MATERIAL)], **arguments)
+    assert said in str(caught.value)
+
+
+def test_controls_belong_to_scenes() -> None:
+    with pytest.raises(cr.InputError, match=r"load: found given, expected in the tables"):
+        cr.sweep(SMALL, load=1e-7)
+    with pytest.raises(cr.InputError, match=r"scenes: found none"):
+        cr.sweep([], load=1e-7, measure=["load"])
+
+
+def test_a_scene_that_fails_has_a_row_that_says_why(here: Executor) -> None:
+    both = sweeping(over={"normal.load": [1e-7, 1e-30, 3e-7]}, together={})
+    both["asperities"] = {**both["asperities"], "tip_radius": [0.02] * 61}
+    both["sweep"]["over"]["asperities.within"] = [0.0102, 0.0052]  # of 61 and of 19 asperities
+    table = cr.sweep(both, executor=here)
+    status, message, contacts = numbers(table, "status", "message", "contacts")
+    assert status == ["certified", "failed"] * 3
+    assert "tip_radius: found shape (61,), expected 19 values" in message[1]
+    assert np.isnan(contacts[1::2]).all()
+    assert not np.isnan(contacts[::2]).any()
+
+
+def test_what_is_not_proved_is_said(here: Executor) -> None:
+    graze = sweeping(over={"normal.approach": [0.0, 5e-5]})
+    graze["normal"] = {}
+    table = cr.sweep(graze, executor=here)
+    assert numbers(table, "status", "message") == [
+        ["undecided", "certified"], ["1 undecided", ""]
+    ]  # fmt: skip
+
+
+def test_parquet_and_npz_hold_the_same(
+    here: Executor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parquet = cr.sweep(ALL, executor=here, out=tmp_path / "a")
+    monkeypatch.setattr(running, "best_format", lambda: "npz")
+    npz = cr.sweep(ALL, executor=here, out=tmp_path / "b")
+    kinds = [{path.suffix for path in (tmp_path / it / "parts").iterdir()} for it in "ab"]
+    assert kinds == [{".parquet"}, {".npz"}]
+    assert same(parquet, npz)
+    assert same(parquet, cr.sweep(ALL, executor=here))
+
+
+def test_names_of_parts_are_hashes_of_what_is_in_them(here: Executor, tmp_path: Path) -> None:
+    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+    assert table.folder is not None
+    first, *rest = table.folder.parts()
+    assert rest
+    table.read()
+    first.path.write_bytes(first.path.read_bytes()[:-1])
+    with pytest.raises(cr.FileError, match="damaged: not what was written"):
+        table.read()
+
+
+def test_data_frames(here: Executor, tmp_path: Path) -> None:
+    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+    frame = cr.open_sweep(tmp_path / "a").to_dataframe()
+    assert list(frame.columns) == table.columns
+    assert frame.index.name == "row"
+    assert frame["loss_0.37"].tolist() == numbers(table, "loss_0.37")[0]
+    lazy = table.to_dask(["normal.load", "loss_0.37"])
+    assert lazy.npartitions > 1
+    means = lazy.groupby("normal.load")["loss_0.37"].mean().compute(scheduler="synchronous")
+    expected = frame.groupby("normal.load")["loss_0.37"].mean()
+    assert means.to_dict() == pytest.approx(expected.to_dict(), rel=1e-15, abs=0)
+    with pytest.raises(cr.InputError, match="column: found 'los', expected one of the table: did"):
+        table.read(["los"])
+
+
+def test_quantiles_are_those_of_each_point(here: Executor, tmp_path: Path) -> None:
+    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+    found = quantiles(table, ["loss_0.37"], [0.1, 0.5])
+    frame = table.to_dataframe()
+    groups = frame.groupby(["asperities.height_std", "normal.load"])["loss_0.37"]
+    for i, (point, values) in enumerate(groups):
+        assert (found["asperities.height_std"][i], found["normal.load"][i]) == point
+        assert (found["scenes"][i], found["failed"][i]) == (4, 0)
+        assert found["0.1"][i] == np.quantile(values, 0.1)
+        assert found["0.5"][i] == np.quantile(values, 0.5)
+    assert i == 3
+
+
+def test_a_part_of_a_sweep(here: Executor, tmp_path: Path) -> None:
+    whole = cr.sweep(SMALL, executor=here)
+    for k in (2, 3, 1):
+        table = cr.sweep(SMALL, executor=here, out=tmp_path / "a", part=(k, 3))
+        assert table.complete == (k == 1)
+    assert same(table, whole)
+    second = cr.sweep(SMALL, executor=here, part=(2, 3))
+    assert numbers(second, "scene") == [list(range(5, 10))]
+
+
+def test_scenes_computed_twice_are_there_once(here: Executor, tmp_path: Path) -> None:
+    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+    assert table.folder is not None
+    for numbers_again in (range(1, 4), range(16)):
+        rows = cr.sweep(SMALL, executor=here).read()
+        some = slice(numbers_again.start, numbers_again.stop)
+        columns = {name: values[some] for name, values in rows.items()}
+        table.folder.write(running.Rows(numbers_again.start, columns, 0.0))
+    assert len(table) == 16
+    assert same(table, cr.sweep(SMALL, executor=here))
+
+
+def test_a_folder_of_another_sweep_is_refused(here: Executor, tmp_path: Path) -> None:
+    cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+    before = sorted(path.name for path in (tmp_path / "a/parts").iterdir())
+    with pytest.raises(cr.FileError) as caught:
+        cr.sweep(tables(sweep={"seeds": 5}), executor=here, out=tmp_path / "a", resume=True)
+    said = str(caught.value)
+    assert "holds another sweep, 16 scenes of sweep by version" in said
+    assert "this is 20 scenes of sweep" in said
+    with pytest.raises(cr.FileError, match="holds 16 of these 16 scenes already; --resume"):
+        cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b/thesis.tex").write_text("")
+    with pytest.raises(cr.FileError, match=r"holds thesis\.tex, and no sweep"):
+        cr.sweep(SMALL, executor=here, out=tmp_path / "b")
+    assert sorted(path.name for path in (tmp_path / "a/parts").iterdir()) == before
+
+
+def test_resuming_computes_what_is_missing_or_damaged_only(here: Executor, tmp_path: Path) -> None:
+    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+    assert table.folder is not None
+    gone, broken, *kept = table.folder.parts()
+    gone.path.unlink()
+    broken.path.write_bytes(b"")
+    (tmp_path / "a/parts" / f".{gone.path.name}.123").write_bytes(b"half")
+    (tmp_path / "a/parts/notes.txt").write_text("mine")
+    times = {part.path: part.path.stat().st_mtime_ns for part in kept}
+    said: list[str] = []
+    again = cr.sweep(SMALL, executor=here, out=tmp_path / "a", resume=True, announce=said.append)
+    missing = gone.stop - gone.first + broken.stop - broken.first
+    assert said[0] == (
+        f"found {16 - missing} scenes, 1 damaged parts removed, 1 unfinished files removed"
+    )
+    assert said[-1].startswith(f"{missing} of {missing} scenes, ")
+    assert {path: path.stat().st_mtime_ns for path in times} == times
+    assert not list((tmp_path / "a/parts").glob(".*"))
+    assert (tmp_path / "a/parts/notes.txt").read_text() == "mine"
+    assert same(again, cr.sweep(SMALL, executor=here))
+
+
+def test_the_parts_are_plain_parquet(here: Executor, tmp_path: Path) -> None:
+    dataset = pytest.importorskip("pyarrow.dataset")
+    cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+    rows = dataset.dataset(tmp_path / "a/parts").to_table(columns=["scene", "load"])
+    assert sorted(rows["scene"].to_pylist()) == list(range(16))
+
+
+def test_a_table_is_printed_on_one_screen(here: Executor, tmp_path: Path) -> None:
+    lines = repr(cr.sweep(SMALL, executor=here, out=tmp_path / "a")).split("\n")
+    assert lines[:3] == [
+        "SweepTable", "  rows      16 of 16 scenes", "  status    16 certified"
+    ]  # fmt: skip
+
+
+def test_the_command(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(toml(SMALL))
+    status, out, err = command("sweep", "a.toml", "--workers", "1")
+    assert (status, err) == (0, "")
+    assert "scenes      16\nrows        16\n  certified 16\n" in out
+    status, out, err = command("sweep", "a.toml", "--workers", "1", "--resume", "--json")
+    assert '"computed": 0' in out
+    status, out, err = command("sweep", "--summary", "a-sweep", "--out", "b")
+    assert status == 0
+    assert len([line for line in out.splitlines() if "loss_0.37" in line]) == 4 + 1
+    written = {path.name for path in (tmp_path / "b").iterdir()}
+    assert {"quantiles.csv", "loss_0.37-over-normal.load.png"} <= written
+
+
+def test_failed_scenes_are_named_and_change_the_status(command: Any, tmp_path: Path) -> None:
+    failing = sweeping(over={"asperities.within": [0.0102, 0.0052]})
+    failing["asperities"] = {**failing["asperities"], "tip_radius": [0.02] * 61}
+    (tmp_path / "a.toml").write_text(toml(failing))
+    status, _, err = command("sweep", "a.toml", "--workers", "1")
+    assert status == 4
+    assert err.startswith("convexrough: warning: scene 1: a.toml: [asperities] tip_radius")
+
+
+def test_missing_scenes_are_found_between_and_around_parts() -> None:
+    def part(first: int, stop: int) -> parts.Part:
+        return parts.Part(Path(), first, stop, "")
+
+    some = [part(5, 7), part(2, 4), part(6, 9)]
+    assert parts.missing(some, range(12)) == [range(2), range(4, 5), range(9, 12)]
+    assert parts.missing(some, range(3, 8)) == [range(4, 5)]
+    assert parts.missing([], range(3, 8)) == [range(3, 8)]
+    assert [numbers for _, numbers in parts.once(some)] == [range(2, 4), range(5, 7), range(7, 9)]
+
+
+def test_a_contact_with_nothing_loaded_has_numbers_all_the_same(here: Executor) -> None:
+    nothing = tables(normal=None)
+    nothing["normal"] = {"approach": -1e-6}
+    nothing["sweep"] = {"measure": ["contacts", "loss", "onset", "loss_factor"]}
+    table = cr.sweep(nothing, executor=here)
+    rows = {name: values[0] for name, values in table.read().items()}
+    assert (rows["status"], rows["contacts"], rows["loss_0.37"]) == ("certified", 0.0, 0.0)
+    assert np.isnan(rows["onset_0.5"])
