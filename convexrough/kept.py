@@ -18,3 +18,8 @@ class Keeper:
             kept[make] = make(self)
         made: Made = kept[make]
         return made
+
+    def kept(self, make: Callable[[Self], Made]) -> Made | None:
+        """What `keep` made before; None if it was not asked to."""
+        found: Made | None = self.__dict__.get("_kept", {}).get(make)
+        return found

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from convexrough.bench import sweeping
 from convexrough.bench.machine import busy
 from convexrough.bench.measure import CostRow, Row
 from convexrough.bench.suite import Bench, Panel, ShearRow
@@ -66,6 +67,8 @@ def _costs(bench: Bench) -> Iterator[Section]:
     yield Section("cost of a press", _cost_table(bench.cost), 1, _messages(bench.cost))
     if bench.shear:
         yield Section("cost of shear", _shear_table(bench.shear), 1, _messages(bench.shear))
+    if bench.sweeps:
+        yield Section("cost of a sweep", sweeping.table(bench.sweeps), 0, [])
 
 
 def renewed_page(page: Path, bench: Bench, figures: str) -> str:

@@ -26,6 +26,7 @@ from convexrough.bench.measure import (
 from convexrough.bench.plan import Plan, attempts
 from convexrough.bench.reference import Reference, measurable, refine
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
+from convexrough.bench.sweeping import SweepRow, measure_sweeps
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
 from convexrough.memory import MemoryRise
@@ -100,6 +101,7 @@ class Bench:
     cost: tuple[CostRow, ...]
     shear: tuple[ShearRow, ...]
     seconds: float
+    sweeps: tuple[SweepRow, ...] = ()
 
     def fitted(self, family: Family) -> list[CostRow]:
         """The presses of `FITTED_FROM` asperities and more."""
@@ -134,12 +136,17 @@ def run(plan: Plan, announce: Announce | None = None) -> Bench:
         for family, size in sizes:
             say(f"shear, {what}: {family}, about {size:,}")
             sheared.append(_shear_row(plan, what, family, size, sheared))
+    swept: list[SweepRow] = []
+    for size, scenes, workers in plan.sweeps:
+        say(f"sweep: {scenes:,} scenes of about {size:,}")
+        swept += measure_sweeps(size, scenes, workers)
     return Bench(
         machine=machine,
         quick=plan.quick,
         panels=tuple(panels),
         cost=tuple(cost),
         shear=tuple(sheared),
+        sweeps=tuple(swept),
         seconds=time.perf_counter() - began,
     )
 

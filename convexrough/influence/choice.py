@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import get_args
 
-from convexrough.arrays import Indices
+import numpy as np
+
+from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.influence.coupling import Influence, Kind
-from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.dense import DenseInfluence, inverse_between
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.scene.scene import Scene
@@ -35,7 +37,7 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     points, error = scene.contact_points[which], scene.point_error
     n = len(which)
     if kind == "dense" or (kind is None and n <= FEW_ASPERITIES):
-        return DenseInfluence.assemble(points, scale, error)
+        return DenseInfluence.assemble(points, scale, error, _shared(scene, which))
     if kind != "scattered" and scene.lattice is not None:
         return LatticeInfluence.assemble(points, scene.lattice, scale, error)
     if kind == "lattice":
@@ -45,3 +47,11 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     if kind is None and n <= FEW_SCATTERED:
         return DenseInfluence.assemble(points, scale, error)
     return ScatteredInfluence(points, scale, error)
+
+
+def _shared(scene: Scene, which: Indices) -> Array | None:
+    """1 / r_ij of some asperities, where their places keep it for several scenes."""
+    if scene.geometry != "summit":  # there contact is beside the summits
+        return None
+    known = scene.asperities.places.kept(inverse_between)
+    return None if known is None else known[np.ix_(which, which)]

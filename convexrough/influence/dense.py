@@ -19,6 +19,7 @@ from convexrough.influence.coupling import (
     inverse_distances,
 )
 from convexrough.roundoff import ROUNDOFF
+from convexrough.scene.places import Places
 
 
 def fits_densely(count: int) -> None:
@@ -32,6 +33,12 @@ def dense_matrix(points: Array, scale: float) -> Array:
     matrix = inverse_distances(points, points)
     matrix *= scale
     return matrix
+
+
+def inverse_between(places: Places) -> Array:
+    """(n, n) 1 / r_ij of all places: what scenes that stand there keep to share."""
+    fits_densely(len(places.positions))
+    return inverse_distances(places.positions, places.positions)
 
 
 def entry_error(point_error: float, nearest: float) -> float:
@@ -65,8 +72,15 @@ class DenseInfluence:
     prefers_single: ClassVar[bool] = False
 
     @classmethod
-    def assemble(cls, points: Array, scale: float, point_error: float = 0.0) -> DenseInfluence:
-        matrix = dense_matrix(points, scale)
+    def assemble(
+        cls, points: Array, scale: float, point_error: float = 0.0, inverse: Array | None = None
+    ) -> DenseInfluence:
+        """inverse : (n, n) 1 / r_ij, where that is known; it is overwritten"""
+        if inverse is None:
+            matrix = dense_matrix(points, scale)
+        else:
+            matrix = inverse
+            matrix *= scale
         largest = float(matrix.max(initial=0.0))
         nearest = scale / largest if largest > 0 else np.inf
         return cls(points, scale, matrix, point_error, entry_error(point_error, nearest))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.scene.lattice import Lattice
@@ -22,6 +22,7 @@ from convexrough.scene.patterns import (
     hexagonal_sites,
     square_sites,
 )
+from convexrough.scene.places import Places
 
 #: Of more asperities than this, a lattice is looked for before the nearest neighbours of all.
 MANY = 5000
@@ -62,15 +63,53 @@ class Asperities(Record):
         return len(self.positions)
 
     @cached_property
+    def places(self) -> Places:
+        """The positions, with what follows from them; the same of all that `roughened` makes."""
+        return Places(self.positions)
+
+    @property
     def lattice(self) -> Lattice | None:
         """What the summits lie on, each on a site of its own, if that is a lattice."""
-        return Lattice.through(self.positions)
+        return self.places.lattice
 
-    @cached_property
+    @property
     def distances(self) -> Array:
         """(n,) [length] distance of each summit from the axis."""
-        x, y = self.positions.T
-        return frozen(np.hypot(x, y))
+        return self.places.distances
+
+    def roughened(
+        self, *, height_std: float = 0.0, tip_radius_cv: float = 0.0, seed: int | None = None
+    ) -> Asperities:
+        """These asperities with random heights and tip radii, drawn as in `hexagonal`.
+
+        Many such surfaces cost less this way: what follows from their places is found once.
+
+        >>> regular = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+        >>> rough = [regular.roughened(height_std=1e-6, seed=seed) for seed in range(3)]
+        >>> print([f"{asperities.heights[0]:.1e}" for asperities in rough])
+        ['1.3e-07', '3.5e-07', '1.9e-07']
+        """
+        height_std = checks.non_negative("height_std", height_std)
+        tip_radius_cv = checks.non_negative("tip_radius_cv", tip_radius_cv)
+        if height_std == 0 and tip_radius_cv == 0:
+            return self
+        n, seed = len(self), checked_seed(seed)
+        width = np.sqrt(np.log1p(tip_radius_cv**2))
+        heights = self.heights + height_std * cut_normal(n, seed, stream=0)
+        radii = self.tip_radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
+        return Asperities._at(self.places, radii, heights)
+
+    @classmethod
+    def _at(cls, places: Places, tip_radii: Array, heights: Array) -> Asperities:
+        """Asperities at places that are known to be good."""
+        n, least = len(places.positions), checks.SMALLEST
+        radii = checks.array("tip_radii", tip_radii, length=n, sign="positive", smallest=least)
+        tall = checks.array("heights", heights, length=n, smallest=least)
+        found = cls.__new__(cls)
+        found.__dict__.update(
+            positions=places.positions, tip_radii=radii, heights=tall, places=places
+        )
+        return found
 
     @classmethod
     def hexagonal(
@@ -137,13 +176,8 @@ class Asperities(Record):
         unit = unit[np.lexsort((angles, norms))]
         n = len(unit)
         radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
-        heights = np.zeros(n)
-        if height_std > 0 or tip_radius_cv > 0:
-            seed = checked_seed(seed)
-            heights = height_std * cut_normal(n, seed, stream=0)
-            width = np.sqrt(np.log1p(tip_radius_cv**2))
-            radii = radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
-        return cls(spacing * unit, radii, heights)
+        regular = cls(spacing * unit, radii)
+        return regular.roughened(height_std=height_std, tip_radius_cv=tip_radius_cv, seed=seed)
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:

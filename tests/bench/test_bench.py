@@ -34,6 +34,7 @@ TINY = replace(
     cycles=(("lattice", 61),),
     amplitudes=2,
     patience=0.0,
+    sweeps=((61, 20, (1,)),),
 )
 LONG = np.finfo(np.longdouble).eps < 1e-18
 extended = pytest.mark.skipif(not LONG, reason="no extended precision on this platform")
@@ -274,6 +275,7 @@ def test_command(command: Any, tmp_path: Path) -> None:
     names = {path.name for path in (tmp_path / "bench-results").iterdir()}
     assert names == {
         *("files.json", "bench.json", "work-precision.csv", "cost.csv", "shear.csv"),
+        "sweeps.csv",
         *("work-precision.png", "work-precision.svg", "cost.png", "cost.svg"),
     }
     with (tmp_path / "bench-results" / "work-precision.csv").open() as file:
@@ -312,6 +314,9 @@ def test_json(command: Any, tmp_path: Path) -> None:
     assert all(each["message"] for each in panel["rows"] if each["outcome"] != "answered")
     assert summary["cost"][0]["seconds"] > 0
     assert {each["what"] for each in summary["shear"]} == {"state", "loss curve"}
+    (swept,) = summary["sweeps"]
+    assert (swept["asperities"], swept["scenes"], swept["certified"]) == (61, 20, 20)
+    assert 0 < swept["alone"] < swept["seconds"]
 
 
 PAGE = f"# Title\n\nBefore.\n\n{page.BEGIN}\nold\n{page.END}\n\nAfter.\n"
