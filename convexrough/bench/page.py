@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from convexrough.bench import sweeping
 from convexrough.bench.machine import busy
 from convexrough.bench.measure import CostRow, Row
 from convexrough.bench.paths import PathRow
@@ -72,6 +73,8 @@ def _costs(bench: Bench) -> Iterator[Section]:
     if bench.paths:
         title = "cost of a load path of seven segments, with every bound and word"
         yield Section(title, _path_table(bench.paths), 1, _messages(bench.paths))
+    if bench.sweeps:
+        yield Section("cost of a sweep", sweeping.table(bench.sweeps), 0, [])
 
 
 def renewed_page(page: Path, bench: Bench, figures: str) -> str:

@@ -19,6 +19,7 @@ class Plan:
     work     : where every solver is compared;  cost : where the default one is timed
     shear    : sizes of one shear state;  cycles : sizes of a loss curve, of `amplitudes` points
     paths    : sizes of a load path
+    sweeps   : size, scenes, and numbers of processes
     patience : [s] to repeat a measurement for;  longest : [s] what would take longer is left out
     """
 
@@ -31,6 +32,7 @@ class Plan:
     patience: float
     longest: float
     quick: bool
+    sweeps: tuple[tuple[int, int, tuple[int, ...]], ...] = ()
 
 
 def full_plan() -> Plan:
@@ -52,6 +54,7 @@ def full_plan() -> Plan:
         patience=1.0,
         longest=20.0,
         quick=False,
+        sweeps=((61, 10_000, (1, 2)), (250, 2_000, (1, 2)), (700, 500, (1, 2))),
     )
 
 
@@ -70,6 +73,7 @@ def quick_plan() -> Plan:
         patience=0.1,
         longest=4.0,
         quick=True,
+        sweeps=((61, 300, (1,)),),
     )
 
 

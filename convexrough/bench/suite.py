@@ -27,6 +27,7 @@ from convexrough.bench.paths import PathRow, measure_path
 from convexrough.bench.plan import Plan, attempts
 from convexrough.bench.reference import Reference, measurable, refine
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
+from convexrough.bench.sweeping import SweepRow, measure_sweeps
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
 from convexrough.memory import MemoryRise
@@ -102,6 +103,7 @@ class Bench:
     shear: tuple[ShearRow, ...]
     paths: tuple[PathRow, ...]
     seconds: float
+    sweeps: tuple[SweepRow, ...] = ()
 
     def fitted(self, family: Family) -> list[CostRow]:
         """The presses of `FITTED_FROM` asperities and more."""
@@ -140,6 +142,10 @@ def run(plan: Plan, announce: Announce | None = None) -> Bench:
     for family, size in plan.paths:
         say(f"load path: {family}, about {size:,}")
         followed.append(measure_path(family, scene(family, REFINEMENTS[size])))
+    swept: list[SweepRow] = []
+    for size, scenes, workers in plan.sweeps:
+        say(f"sweep: {scenes:,} scenes of about {size:,}")
+        swept += measure_sweeps(size, scenes, workers)
     return Bench(
         machine=machine,
         quick=plan.quick,
@@ -147,6 +153,7 @@ def run(plan: Plan, announce: Announce | None = None) -> Bench:
         cost=tuple(cost),
         shear=tuple(sheared),
         paths=tuple(followed),
+        sweeps=tuple(swept),
         seconds=time.perf_counter() - began,
     )
 

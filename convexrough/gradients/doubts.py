@@ -27,7 +27,7 @@ from convexrough.gradients.bounds import (
 )
 from convexrough.gradients.system import Solution
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.judgement import LOCAL, Nearness, nearness
+from convexrough.shearing.judgement import LOCAL, StateErrors, state_errors
 from convexrough.shearing.normal_map import States, slips
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.sphere import annulus
@@ -231,7 +231,7 @@ class _Widths(NamedTuple):
 
     @classmethod
     def of(
-        cls, known: Known, problem: TangentialProblem, state: Friction, near: Nearness
+        cls, known: Known, problem: TangentialProblem, state: Friction, near: StateErrors
     ) -> _Widths:
         h, P, b = 1.0 / known.slopes, known.loads, known.errors
         fewest, most = np.where(known.unsure, 1.0, P - b), P + b
@@ -342,7 +342,7 @@ class _Widths(NamedTuple):
         return float(x.max(initial=0.0)) * rest.values + rest.shift * known.dual(x)
 
 
-def _near(problem: TangentialProblem, state: Friction) -> Nearness | None:
+def _near(problem: TangentialProblem, state: Friction) -> StateErrors | None:
     numbers = np.array([state.total]), np.array([state.rise])
     states = States(
         numbers[0],
@@ -351,10 +351,10 @@ def _near(problem: TangentialProblem, state: Friction) -> Nearness | None:
         numbers[1],
         slips(problem, state.deflections)[None],
     )
-    return nearness(problem, states)
+    return state_errors(problem, states)
 
 
-def _slips(known: Known, problem: TangentialProblem, near: Nearness, there: _Widths) -> float:
+def _slips(known: Known, problem: TangentialProblem, near: StateErrors, there: _Widths) -> float:
     """Bound on || d slip ||_(1/h): d(Delta) - A du - dC where an asperity slides, or may."""
     may = (known.spread(~near.partial) & known.sure).astype(np.float64)
     if not may.any():

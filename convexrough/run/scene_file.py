@@ -208,13 +208,33 @@ def parsed(path: Path, text: str) -> dict[str, Any]:
     return contents
 
 
+class Layouts(NamedTuple):
+    """Where the asperities of a scene are from.
+
+    summits : reads a file of them;  regular : a pattern, before anything is random
+    """
+
+    summits: Callable[..., Asperities]
+    regular: Callable[[str, float, float | tuple[float, ...], float], Asperities]
+
+
+def _regular(
+    pattern: str, spacing: float, tip_radius: float | tuple[float, ...], within: float
+) -> Asperities:
+    make = Asperities.hexagonal if pattern == "hexagonal" else Asperities.square
+    return make(spacing=spacing, tip_radius=tip_radius, within=within)
+
+
+READ = Layouts(read_summits, _regular)
+
+
 def build_scene(
-    path: Path, tables: Document, summits: Callable[..., Asperities] = read_summits
+    path: Path, tables: Document, layouts: Layouts = READ
 ) -> tuple[Scene, float | None]:
     """The scene of checked tables, and what `SceneFile.highest_approach` says.
 
     path    : of the file they are from, for messages and for what paths in it are relative to
-    summits : reads a file of asperities
+    layouts : where the asperities are from
 
     Raises InputError for mistakes that show only here.
     """
@@ -239,26 +259,25 @@ def build_scene(
     layout = tables.asperities
     with _blamed_on(path, "asperities"):
         if layout.pattern == "file":
-            return press_on(summits(path.parent / layout.path, tip_radius=layout.tip_radius)), None
-        return _lattice(layout, tables, press_on)
+            return press_on(
+                layouts.summits(path.parent / layout.path, tip_radius=layout.tip_radius)
+            ), None
+        return _lattice(layout, tables, press_on, layouts)
 
 
 def _lattice(
-    layout: Lattice, tables: Document, press_on: Callable[[Asperities], Scene]
+    layout: Lattice, tables: Document, press_on: Callable[[Asperities], Scene], layouts: Layouts
 ) -> tuple[Scene, float | None]:
     """The scene as far as `within`, or else as far as any asperity could touch."""
-    pattern = Asperities.hexagonal if layout.pattern == "hexagonal" else Asperities.square
+    tips = layout.tip_radius
+    tip_radius = tuple(tips) if isinstance(tips, list) else tips
 
     def scene(within: float) -> Scene:
-        asperities = pattern(
-            spacing=layout.spacing,
-            tip_radius=layout.tip_radius,
-            within=within,
-            height_std=layout.height_std,
-            tip_radius_cv=layout.tip_radius_cv,
-            seed=layout.seed,
+        asperities = layouts.regular(layout.pattern, layout.spacing, tip_radius, within)
+        rough = asperities.roughened(
+            height_std=layout.height_std, tip_radius_cv=layout.tip_radius_cv, seed=layout.seed
         )
-        return press_on(asperities)
+        return press_on(rough)
 
     def farthest(approach: float) -> float:
         return reach(

@@ -95,7 +95,7 @@ def _judge(problem: TangentialProblem, states: States) -> Bounds:
     return bounds
 
 
-class Nearness(NamedTuple):
+class StateErrors(NamedTuple):
     """How near one state is to the solution, in norms: steps 1 to 5; own units, (n,).
 
     distance : || d ||_H;  carried : || t (P* - P) ||_H;  shifts : bounds on |tau|
@@ -111,7 +111,7 @@ class Nearness(NamedTuple):
     partial: NDArray[np.bool_]
 
 
-def nearness(problem: TangentialProblem, state: States) -> Nearness | None:
+def state_errors(problem: TangentialProblem, state: States) -> StateErrors | None:
     """Of a single state (1,); None where convexity proves nothing of it."""
     if problem.certificate.scope == "none":
         return None
@@ -127,7 +127,7 @@ def nearness(problem: TangentialProblem, state: States) -> Nearness | None:
     uncertainty = residual.uncertainty[0] + given.remainder[0]
     rise, words = float(bounds.rises[0]), (bounds.sliding[0], bounds.partial[0])
     carried = float(image.carried_norm[0])
-    return Nearness(float(distance[0]), carried, image.shifts[0], uncertainty, rise, *words)
+    return StateErrors(float(distance[0]), carried, image.shifts[0], uncertainty, rise, *words)
 
 
 class _Given(NamedTuple):

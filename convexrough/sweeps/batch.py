@@ -27,6 +27,9 @@ FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgErro
 
 Columns = dict[str, NDArray[Any]]
 
+#: Status, message, and what was measured.
+Row = tuple[str, str, list[float]]
+
 
 @dataclass(frozen=True)
 class Batch:
@@ -94,11 +97,7 @@ def refused(batch: Batch, message: str) -> Rows:
     return _rows(batch, [("failed", message, values)] * len(batch.numbers), 0.0)
 
 
-Row = tuple[str, str, list[float]]
-
-
 def _row(press: Press, number: int, batch: Batch) -> Row:
-    """The status, the message and what was measured."""
     try:
         values, unsure = measure(press(number), batch.measures, batch.stages)
     except FAILURES as error:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from convexrough.arrays import Array
 from convexrough.plots.notebook import Figure
-from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, label, legend_above
+from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, legend_above
 from convexrough.sweeps.batch import Columns
 
 #: Where the bands end, and the line between them.
@@ -41,7 +41,8 @@ def draw_quantiles(
     rows = {name: values[good] for name, values in columns.items()}
     for (name, band), look in zip(_bands(rows, others), cycle(LOOKS), strict=False):
         _draw_band(axes, band[over], band[measured], name, look)
-    label(axes, over.replace("_", " ").replace(".", ": "), measured.replace("_", " "))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.get_offset_text().set_fontsize(TICK)
     if failed := int(np.count_nonzero(~good)):
         axes.set_title(f"{failed:,} scenes failed", fontsize=TICK, loc="left")
     _scale(axes, rows[over])

@@ -90,11 +90,16 @@ def _onset_quantiles(it: Sheared) -> list[float]:
 
 @dataclass(frozen=True)
 class Measure:
-    """values : one for each column; suffixes name them;  stage : the table that it needs, or "" """
+    """What is measured under one name.
+
+    values : one for each column; suffixes name them;  stage : the table that it needs, or ""
+    units  : "force", "length", "work" or "stiffness" of all columns, or of each; "" of a number
+    """
 
     values: Callable[[Sheared], Iterator[float] | Sequence[float]]
     stage: str = ""
     suffixes: tuple[str, ...] = ()
+    units: str | tuple[str, ...] = ""
 
     def columns(self, name: str, stages: Stages) -> list[str]:
         if self.stage in ("cycle", "shear"):
@@ -102,34 +107,53 @@ class Measure:
         return [f"{name}_{each}" for each in self.suffixes] or [name]
 
 
-def _of_cycles(value: Callable[[Cycle], float]) -> Measure:
-    return Measure(lambda it: [value(each) for each in it.cycles], "cycle")
+def _of_cycles(value: Callable[[Cycle], float], units: str = "") -> Measure:
+    return Measure(lambda it: [value(each) for each in it.cycles], "cycle", units=units)
 
 
 #: By name. Energies, forces and lengths are in the scene's units.
 MEASURES = {
     "contacts": Measure(lambda it: [float((it.contact.status == "contact").sum())]),
     "words": Measure(_counts, suffixes=("contact", "open", "undecided")),
-    "load": Measure(lambda it: [it.contact.load]),
-    "approach": Measure(lambda it: [it.contact.approach]),
+    "load": Measure(lambda it: [it.contact.load], units="force"),
+    "approach": Measure(lambda it: [it.contact.approach], units="length"),
     "certificate": Measure(
-        _certificate, suffixes=("load_error", "convexity_number", "model_error", "crowding")
+        _certificate,
+        suffixes=("load_error", "convexity_number", "model_error", "crowding"),
+        units=("force", "", "", ""),
     ),
-    "displacement": Measure(lambda it: [state.displacement for state in it.states], "shear"),
+    "displacement": Measure(
+        lambda it: [state.displacement for state in it.states], "shear", units="length"
+    ),
     "onset": Measure(_onset_quantiles, "friction", tuple(f"{part:g}" for part in QUANTILES)),
-    "loss": _of_cycles(lambda cycle: cycle.energy),
+    "loss": _of_cycles(lambda cycle: cycle.energy, "work"),
     "loss_normalised": _of_cycles(lambda cycle: cycle.energy_normalised),
     "loss_over_smooth": _of_cycles(
         lambda cycle: cycle.energy_normalised / (cycle.smooth_normalised or np.nan)
     ),
     "loss_factor": _of_cycles(lambda cycle: cycle.loss_factor),
-    "stiffness": _of_cycles(lambda cycle: cycle.secant_stiffness),
+    "stiffness": _of_cycles(lambda cycle: cycle.secant_stiffness, "stiffness"),
 }
 
 
 def columns(measures: Sequence[str], stages: Stages) -> list[str]:
     """The names of the measured columns, in the order of the measures."""
     return [each for name in measures for each in MEASURES[name].columns(name, stages)]
+
+
+def units(measures: Sequence[str], stages: Stages, length: str, force: str) -> dict[str, str]:
+    """What each measured column is in, where the names of both units are known."""
+    if not (length and force):
+        return {}
+    names = {"": "", "length": length, "force": force}
+    names |= {"work": f"{force} {length}", "stiffness": f"{force}/{length}"}
+    found: dict[str, str] = {}
+    for name in measures:
+        own = MEASURES[name].columns(name, stages)
+        kinds = MEASURES[name].units
+        each = [kinds] * len(own) if isinstance(kinds, str) else kinds
+        found |= {column: names[kind] for column, kind in zip(own, each, strict=True) if kind}
+    return found
 
 
 def measure(contact: Contact, measures: Sequence[str], stages: Stages) -> tuple[list[float], str]:

@@ -19,7 +19,9 @@ from convexrough.progress import Announce
 from convexrough.run.results import NUMERICAL
 from convexrough.sweeps.batch import MOST_SCENES, Batch, Rows, compute
 from convexrough.sweeps.engines import Engine
+from convexrough.sweeps.measures import units
 from convexrough.sweeps.parts import Folder, best_format, make_folder, missing
+from convexrough.sweeps.sources import Tables
 from convexrough.sweeps.sweep_file import Plan
 from convexrough.sweeps.table import SweepTable, joined
 from convexrough.sweeps.work import Work
@@ -96,7 +98,7 @@ def manifest(plan: Plan) -> dict[str, Any]:
 
     each : scenes that differ by their seed alone
     """
-    grid = getattr(plan.source, "grid", None)
+    grid = plan.source.grid if isinstance(plan.source, Tables) else None
     return {
         "schema": 1,
         "version": __version__,
@@ -106,6 +108,7 @@ def manifest(plan: Plan) -> dict[str, Any]:
         "columns": plan.columns,
         "drawn": [] if grid is None else [draw.key for draw in grid.draws],
         "measure": list(plan.measures),
+        "units": _units(plan),
         "format": best_format(),
         **plan.said,
         "versions": {
@@ -113,6 +116,25 @@ def manifest(plan: Plan) -> dict[str, Any]:
             **{name: metadata.version(name) for name in NUMERICAL},
         },
     }
+
+
+#: Keys of a scene file that are lengths and forces.
+LENGTHS = (
+    *("sphere.radius", "normal.approach", "asperities.spacing", "asperities.tip_radius"),
+    *("asperities.within", "asperities.height_std"),
+)
+FORCES = ("normal.load",)
+
+
+def _units(plan: Plan) -> dict[str, str]:
+    """What columns are in, where the file names its units."""
+    if not isinstance(plan.source, Tables):
+        return {}
+    named = plan.source.grid.tables.get("units", {})
+    length, force = named.get("length", ""), named.get("force", "")
+    keys = {key: length for key in plan.source.grid.keys if key in LENGTHS and length}
+    keys |= {key: force for key in plan.source.grid.keys if key in FORCES and force}
+    return keys | units(plan.measures, plan.stages, length, force)
 
 
 def _share(count: int, part: tuple[int, int] | None) -> range:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,16 @@ from convexrough.contact import Contact, press, solve
 from convexrough.errors import SceneFileError
 from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
-from convexrough.run.scene_file import build_scene
-from convexrough.run.tables import read_summits
+from convexrough.run.scene_file import READ, Layouts, build_scene
 from convexrough.scene.scene import Scene
 from convexrough.solvers import named
 from convexrough.sweeps.grid import Grid
+
+if TYPE_CHECKING:
+    from convexrough.run.schema import Document
+
+#: Layouts of asperities that are kept for the scenes to come.
+KEPT = 8
 
 #: From the number of a scene to its contact.
 Press = Callable[[int], Contact]
@@ -79,15 +84,12 @@ class Tables:
         return self
 
     def opened(self) -> Press:
-        from convexrough.run.schema import validate
-
-        summits = cache(read_summits)
+        layouts = Layouts(*map(lru_cache(KEPT), READ))
+        document = _Documents(self)
 
         def press_one(number: int) -> Contact:
-            tables, mistakes = validate(self.grid.tables_at(number))
-            if tables is None:
-                raise SceneFileError(str(self.path), mistakes)
-            scene, highest = build_scene(self.path, tables, summits)
+            tables = document.at(number)
+            scene, highest = build_scene(self.path, tables, layouts)
             problem = NormalProblem.assemble(
                 scene,
                 approach=tables.normal.approach,
@@ -98,6 +100,31 @@ class Tables:
             return solve(problem, named(tables.solver.name))
 
         return press_one
+
+
+class _Documents:
+    """The checked tables of one scene after the other: those that differ by a seed, once."""
+
+    def __init__(self, source: Tables) -> None:
+        self._source = source
+        self._last: tuple[dict[str, Any], Document] | None = None
+
+    def at(self, number: int) -> Document:
+        """Raises SceneFileError."""
+        from convexrough.run.schema import Lattice, validate
+
+        point = self._source.grid.point(number)
+        if self._last is not None and self._last[0] == point.values:
+            known = self._last[1]
+            layout = known.asperities
+            if isinstance(layout, Lattice):
+                layout = layout.model_copy(update={"seed": point.seed})
+            return replace(known, asperities=layout)
+        tables, mistakes = validate(self._source.grid.with_values(*point))
+        if tables is None:
+            raise SceneFileError(str(self._source.path), mistakes)
+        self._last = (point.values, tables)
+        return tables
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,8 @@ class SweepTable(Record):
 
         Raises InputError where nothing is swept, and for names that are not there.
         """
-        from convexrough.sweeps.figures import draw_quantiles  # it loads matplotlib
+        from convexrough.plots.style import label, literal  # it loads matplotlib
+        from convexrough.sweeps.figures import draw_quantiles
 
         if not self.swept or not len(self):
             expected = "rows, and a key in [sweep.over], [sweep.together] or [sweep.draw]"
@@ -160,7 +161,16 @@ class SweepTable(Record):
         over = self.swept[0] if over is None else over
         others = [key for key in self.points if key != over]
         columns = self.read([over, *others, "status", measured])
-        return draw_quantiles(columns, measured, over, others, axes)
+        axes = draw_quantiles(columns, measured, over, others, axes)
+        label(axes, literal(self._said(over)), literal(self._said(measured)))
+        return axes
+
+    def _said(self, name: str) -> str:
+        """A column in words, with its unit."""
+        table, _, key = name.rpartition(".") if name in self.swept else ("", "", name)
+        unit = self.manifest["units"].get(name, "")
+        words = f"{table}: {key}" if table else key
+        return f"{words} ({unit})".replace("_", " ") if unit else words.replace("_", " ")
 
     def _parts(self) -> list[Part]:
         assert self.folder is not None  # or it is held

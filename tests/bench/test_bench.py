@@ -35,6 +35,7 @@ TINY = replace(
     paths=(("lattice", 61), ("rough", 61)),
     amplitudes=2,
     patience=0.0,
+    sweeps=((61, 20, (1,)),),
 )
 LONG = np.finfo(np.longdouble).eps < 1e-18
 extended = pytest.mark.skipif(not LONG, reason="no extended precision on this platform")
@@ -275,6 +276,7 @@ def test_command(command: Any, tmp_path: Path) -> None:
     names = {path.name for path in (tmp_path / "bench-results").iterdir()}
     assert names == {
         *("files.json", "bench.json", "work-precision.csv", "cost.csv", "shear.csv", "paths.csv"),
+        "sweeps.csv",
         *("work-precision.png", "work-precision.svg", "cost.png", "cost.svg"),
     }
     with (tmp_path / "bench-results" / "work-precision.csv").open() as file:
@@ -317,6 +319,9 @@ def test_json(command: Any, tmp_path: Path) -> None:
     assert (paper["touching"], paper["presses"], paper["undecided"]) == (37, 9, 0)
     assert paper["order"] == rough["order"] == "proved at the levels used"
     assert 0 < paper["error"] < 1e-11
+    (swept,) = summary["sweeps"]
+    assert (swept["asperities"], swept["scenes"], swept["certified"]) == (61, 20, 20)
+    assert 0 < swept["alone"] < swept["seconds"]
 
 
 def test_a_path_takes_at_most_three_presses_for_each_segment() -> None:
