@@ -329,6 +329,15 @@ def test_without_order_no_exact_limit_is_claimed() -> None:
     assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
 
 
+def test_a_negative_share_has_no_closed_form() -> None:
+    """The shaded asperity is pushed back by a shear force on all: nothing is claimed."""
+    scene = shaded()
+    load = cr.press(scene, approach=1.4).load
+    swing = [0.1 * load, -0.1 * load]
+    found = cr.shakedown(scene, loads=load, force_amplitudes=swing, kind="elastic")
+    assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
+
+
 @pytest.mark.parametrize("kind", ["elastic", "vector"])
 def test_a_contact_that_is_not_proved_proves_no_limit(kind: str) -> None:
     """Where ring A is just grazed nobody can say which asperities there are."""
