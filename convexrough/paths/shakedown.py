@@ -230,7 +230,8 @@ def _elastic(contact: Contact, t0: float, t: Array) -> _Found:
     factor = min(float(each.min()), sliding)
     lower = min(float(limits(np.maximum(P - doubt, 0.0), np.abs(q) + off).min()), sliding)
     upper = min(float(limits(P + doubt, np.abs(q) - off).min()), sliding)
-    proved = bool(np.isfinite(off).all())
+    # A share that might be negative would be loaded while the others are unloaded.
+    proved = bool((q >= off).all())
     critical = np.arange(len(P)) == int(np.argmin(each)) if factor < sliding else np.ones(len(P))
     # At rest each asperity has room from -P_i - factor q_i low to P_i - factor q_i high.
     travelled = np.outer(factor * q / problem.units.force, (low, high))

@@ -67,23 +67,25 @@ def test_exact_limits_around_ellipses(angle: float, a: float, b: float) -> None:
     assert found.upper >= a * (1 - 1e-12)
 
 
+@pytest.mark.parametrize("asperity", [A, B])
 @pytest.mark.parametrize("angle", [None, 0, 45, 90])
-def test_paths_below_and_above_the_limit(angle: float | None) -> None:
-    """1 % below no asperity slides in a later cycle; 1 % above ring A does, by what L* says."""
+def test_paths_below_and_above_the_limit(angle: float | None, asperity: int) -> None:
+    """1 % below no asperity of a ring slides in a later cycle; 1 % above all do, as L* says."""
     p, q = (np.zeros(2), SWING) if angle is None else turned(angle)
     mean = P if angle is None else 0.9 * P
     limit = cr.shakedown(PAPER, loads=mean, load_amplitudes=p, force_amplitudes=q)
-    for factor, slides in ((0.99 * limit.factor, False), (1.01 * limit.factor, True)):
+    for part, slides in ((0.99, False), (1.01, True)):
+        factor = part * limit.factors[asperity]
         loads, forces = mean + factor * p, factor * q
         found = cr.steady(PAPER, loads=loads, forces=forces)
-        ring = found.status[A]
-        assert ring == ("sliding" if slides else "partial")
+        assert found.status[asperity] == ("sliding" if slides else "partial")
         twice = [np.tile(each, 3) for each in (loads, forces)]
         path = cr.load_path(PAPER, loads=twice[0], forces=twice[1])
         m = len(loads)
-        drift = path.drifts[m : 2 * m, A]
-        assert np.ptp(drift) == pytest.approx(found.slips[A], abs=1e-12 * path.displacements.max())
-        assert (found.slips[A] > 0) == slides
+        drift = path.drifts[m : 2 * m, asperity]
+        slip = found.slips[asperity]
+        assert np.ptp(drift) == pytest.approx(slip, abs=1e-12 * path.displacements.max())
+        assert (slip > 0) == slides
 
 
 @pytest.mark.parametrize(("name", "exact", "elastic"), [("rough", 0.3101185108701, 0.2238120185)])
@@ -326,6 +328,15 @@ def test_without_order_no_exact_limit_is_claimed() -> None:
     load = cr.press(scene, approach=1.4).load
     found = cr.shakedown(scene, loads=load, force_amplitudes=[0.1 * load, -0.1 * load])
     assert found.order == "fails"
+    assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
+
+
+def test_a_negative_share_has_no_closed_form() -> None:
+    """The shaded asperity is pushed back by a shear force on all: nothing is claimed."""
+    scene = shaded()
+    load = cr.press(scene, approach=1.4).load
+    swing = [0.1 * load, -0.1 * load]
+    found = cr.shakedown(scene, loads=load, force_amplitudes=swing, kind="elastic")
     assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
 
 
