@@ -26,6 +26,7 @@ from convexrough.cli.speech import (
     WRONG_INPUT,
     say_aside,
 )
+from convexrough.cli.summits import summits
 from convexrough.cli.verify import verify
 from convexrough.errors import ConvexroughError, SolverError
 from convexrough.version import __version__
@@ -44,7 +45,7 @@ def program() -> None:
     """
 
 
-for command in (run, verify, check, compare, new, paper, bench):
+for command in (run, verify, check, compare, new, summits, paper, bench):
     program.add_command(command)
 
 

@@ -13,6 +13,7 @@ from convexrough.plots.history import history_figures
 from convexrough.plots.path import path_figures, shakedown_figures, steady_figures
 from convexrough.plots.press import press_figures
 from convexrough.plots.shear import shear_figures
+from convexrough.plots.surface import provability_figure, surface_figures
 
 __all__ = [
     "cycle_figures",
@@ -20,7 +21,9 @@ __all__ = [
     "path_figures",
     "plot",
     "press_figures",
+    "provability_figure",
     "shakedown_figures",
     "shear_figures",
     "steady_figures",
+    "surface_figures",
 ]

@@ -27,12 +27,17 @@ from convexrough.plots.style import (
     Scale,
     ShearScale,
     label,
+    literal,
     say_no_contact,
 )
+from convexrough.plots.surface import draw_provability, draw_summits, draw_surface
 from convexrough.plots.verdict import draw_claim
 from convexrough.shearing.cycle import Cycle
 from convexrough.shearing.history import History
 from convexrough.shearing.state import ShearState
+from convexrough.surface.provability import Provability
+from convexrough.surface.summits import Summits
+from convexrough.surface.surface import Surface
 from convexrough.vector_shear.state import VectorShearState
 from convexrough.verdict import Verdict
 
@@ -44,7 +49,7 @@ def plot(
 
     result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
         Cycle: its loop, History: its path, Q against X; Verdict: map of who is not as claimed;
-        Comparison: what each solver took
+        Comparison: what each solver took; Surface, Summits: map; Provability: contacts by pruning
     axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
     length_unit, force_unit : only said, never converted
 
@@ -133,6 +138,24 @@ def _(comparison: Comparison, axes: Axes, length_unit: str, force_unit: str) -> 
     axes.set_yticks(range(len(names)), names, fontsize=TICK)
     few_ticks(axes.xaxis)
     label(axes, "time [s]", "")
+
+
+@_draw.register
+def _(surface: Surface, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_surface(axes, surface)
+
+
+@_draw.register
+def _(summits: Summits, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_summits(axes, summits.positions)
+    unit = f"  [{literal(summits.origin.unit)}]" if summits.origin.unit else ""
+    label(axes, f"$x${unit}", f"$y${unit}")
+    axes.set_aspect("equal")
+
+
+@_draw.register
+def _(curve: Provability, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_provability(axes, curve)
 
 
 def _against(axes: Axes, scale: ShearScale, x: Array, q: Array, **look: Any) -> None:

@@ -80,8 +80,10 @@ class SceneFile(Record, Stages):
         )
 
 
-def read_scene(path: str | os.PathLike[str]) -> SceneFile:
+def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = None) -> SceneFile:
     """Read and check a scene file.
+
+    asperities : to press on instead of those of the file
 
     Raises FileError where a file cannot be read or is no TOML, SceneFileError with every mistake in
     the tables, and InputError for mistakes that show only in building the scene.
@@ -98,14 +100,14 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
     if tables is None:
         raise SceneFileError(str(path), mistakes)
     shear, cycle, history, units = tables.shear, tables.cycle, tables.history, tables.units
-    scene, highest = _scene(path, tables)
+    scene, highest = _scene(path, tables, asperities)
     layout, sources = tables.asperities, [path]
-    if layout.pattern == "file":
+    if layout.pattern == "file" and asperities is None:
         sources.append(path.parent / layout.path)
     return SceneFile(
         path=path,
         text=text,
-        seed=None if layout.pattern == "file" else layout.seed,
+        seed=None if layout.pattern == "file" or asperities is not None else layout.seed,
         inputs={str(each): digest(each) for each in sources},
         scene=scene,
         approach=tables.normal.approach,
@@ -178,7 +180,9 @@ def _parse(path: Path, text: str) -> dict[str, object]:
     return contents
 
 
-def _scene(path: Path, tables: Document) -> tuple[Scene, float | None]:
+def _scene(
+    path: Path, tables: Document, asperities: Asperities | None
+) -> tuple[Scene, float | None]:
     """And what `SceneFile.highest_approach` says."""
     material = tables.material
     ratio = material.poisson_ratio
@@ -200,6 +204,8 @@ def _scene(path: Path, tables: Document) -> tuple[Scene, float | None]:
 
     layout = tables.asperities
     with _blamed_on(path, "asperities"):
+        if asperities is not None:
+            return press_on(asperities), None
         if layout.pattern == "file":
             summits = read_summits(path.parent / layout.path, tip_radius=layout.tip_radius)
             return press_on(summits), None
