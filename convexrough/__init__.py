@@ -5,7 +5,7 @@ import half done.
 
 In the examples of docstrings `cr` is this package and `np` numpy, `scene` is that of `Scene` and
 `contact` that of `press`: the source paper's, of which 37 of 61 asperities touch; `new_scene` is
-what `convexrough new` writes.
+what `convexrough new` writes, and `folder` is an empty folder.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from convexrough import gallery as gallery
     from convexrough import plots as plots
     from convexrough import solvers as solvers
+    from convexrough import surface as surface
     from convexrough import testing as testing
     from convexrough.contact import Contact, press
     from convexrough.errors import (
@@ -101,7 +102,7 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 #: Modules that are public whole; those not in `__all__` draw, or are for tests.
-_MODULES = ("compare", "fields", "gallery", "plots", "solvers", "testing")
+_MODULES = ("compare", "fields", "gallery", "plots", "solvers", "surface", "testing")
 
 __all__ = [
     "Asperities",

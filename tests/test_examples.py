@@ -25,8 +25,9 @@ SCRIPTS = [*sorted(FOLDER.glob("*.py")), *sorted(FOLDER.glob("course/*.py"))]
 
 
 @pytest.fixture(autouse=True)
-def _no_windows() -> Iterator[None]:
+def _as_a_script(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     plt.switch_backend("agg")
+    monkeypatch.syspath_prepend(FOLDER)  # as for a script: one example may begin with another
     yield
     plt.close("all")
 
@@ -42,7 +43,7 @@ def load(path: Path) -> Any:
 
 @pytest.mark.parametrize(
     "path",
-    [path for path in SCRIPTS if path.stem != "boundary_elements"],
+    [path for path in SCRIPTS if path.stem not in ("boundary_elements", "measured_surface")],
     ids=lambda path: path.stem,
 )
 def test_example(path: Path) -> None:
@@ -63,3 +64,14 @@ def test_boundary_elements() -> None:
     for ring in "FEDCBA":
         assert abs(errors[f"closest, load in ring {ring}"]) < 4e-3
     assert -0.08 < errors["summit, load in ring A"] < -0.07
+
+
+def test_measured_surface() -> None:
+    """What the picture of asperities costs on a map, as the example and the page on theory say."""
+    pairs = {name: (a, b) for name, a, b in load(FOLDER / "measured_surface.py").compare()}
+    errors = {name: a / b - 1 for name, (a, b) in pairs.items()}
+    for force, total in (("3", -0.044), ("10", -0.019), ("30", 0.090)):
+        assert errors[f"load {force}, load"] == pytest.approx(total, abs=0.01)
+        assert -0.20 < errors[f"load {force}, area"] < -0.05
+        assert -0.20 < errors[f"load {force}, heaviest"] < -0.05
+        assert 0.1 < errors[f"load {force}, contacts"] < 0.5

@@ -38,7 +38,14 @@ def results() -> dict[str, Any]:
     wrong[3] = 0.0
     state, cycle = cr.shear(contact, force=Q), cr.cycle(contact, maximum=Q)
     few = (solvers.Conic(), solvers.BristleQP())
+    surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).detrend("sphere")
+    summits = surface.summits()
     found = (
+        surface,
+        summits,
+        summits.origin,
+        surface.moments,
+        cr.surface.provability(summits, lambda left: on(left, surface), levels=[0.05, 0.2]),
         scene,
         scene.asperities,
         contact,
@@ -77,6 +84,11 @@ def results() -> dict[str, Any]:
     return {type(each).__name__: each for each in found}
 
 
+def on(asperities: cr.Asperities, surface: cr.surface.Surface) -> cr.Contact:
+    radius = 1e4 * surface.pixel[0]
+    return cr.press(cr.Scene(radius, asperities, MATERIAL), load=10.0)
+
+
 NAMES = tuple(results())
 WITH_TABLES = tuple(name for name in NAMES if hasattr(results()[name], "to_dataframe"))
 DRAWN = tuple(name for name in NAMES if hasattr(results()[name], "plot"))
@@ -89,7 +101,7 @@ def test_every_kind_is_here() -> None:
     assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "History",
                           "Verdict", "Comparison", "LoadPath", "Steady", "Shakedown",
                           "MemoryCurve", "PhaseLosses", "PathComparison",
-                          "Gradient"}  # fmt: skip
+                          "Gradient", "Surface", "Summits", "Provability"}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -210,6 +222,7 @@ def test_a_data_frame_has_the_arrays(name: str) -> None:
     frame = result.to_dataframe()
     rows = {"History": "step", "Loop": "point", "Comparison": "entry", "LoadPath": "point"}
     rows |= {"MemoryCurve": "vertex", "PhaseLosses": "ellipse", "PathComparison": "entry"}
+    rows |= {"Provability": "level"}
     assert frame.index.name == rows.get(name, "asperity")
     for column in frame.columns:
         if hasattr(result, column):
@@ -342,11 +355,14 @@ def test_the_loop_that_is_drawn_is_the_loop() -> None:
 PUBLIC = sorted({*cr.__all__} - {"__version__", "solvers"})  # functions and classes
 
 #: Where they live: modules whose docstrings' examples are run.
-MODULES = sorted({getattr(cr, name).__module__ for name in PUBLIC} - {"convexrough.errors"})
+MODULES = sorted(
+    {getattr(cr, name).__module__ for name in PUBLIC} - {"convexrough.errors"}
+    | {getattr(cr.surface, name).__module__ for name in cr.surface.__all__}
+)
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_examples_in_docstrings(module: str) -> None:
+def test_examples_in_docstrings(module: str, tmp_path: Path) -> None:
     scene = dataclasses.replace(paper(), friction=0.5)
     names = {
         "cr": cr,
@@ -354,6 +370,7 @@ def test_examples_in_docstrings(module: str) -> None:
         "scene": scene,
         "contact": results()["Contact"],
         "new_scene": NEW_SCENE,
+        "folder": tmp_path,
     }
     found = doctest.DocTestFinder().find(importlib.import_module(module), extraglobs=names)
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
@@ -366,3 +383,8 @@ def test_examples_in_docstrings(module: str) -> None:
 @pytest.mark.parametrize("name", [name for name in PUBLIC if not name.endswith("Error")])
 def test_every_public_name_has_an_example(name: str) -> None:
     assert "\n    >>> " in (getattr(cr, name).__doc__ or "")
+
+
+@pytest.mark.parametrize("name", cr.surface.__all__)
+def test_every_name_of_surfaces_has_an_example(name: str) -> None:
+    assert "\n    >>> " in (getattr(cr.surface, name).__doc__ or "")

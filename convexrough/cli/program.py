@@ -31,6 +31,7 @@ from convexrough.cli.speech import (
     WRONG_INPUT,
     say_aside,
 )
+from convexrough.cli.summits import summits
 from convexrough.cli.sweep import sweep
 from convexrough.cli.verify import verify
 from convexrough.errors import ConvexroughError, SolverError, WorkerError
@@ -50,7 +51,7 @@ def program() -> None:
     """
 
 
-for command in (run, verify, check, compare, sweep, new, paper, bench, gallery):
+for command in (run, verify, check, compare, sweep, new, summits, paper, bench, gallery):
     program.add_command(command)
 
 

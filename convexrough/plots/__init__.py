@@ -16,6 +16,7 @@ from convexrough.plots.path import path_figures
 from convexrough.plots.press import press_figures
 from convexrough.plots.shakedown import shakedown_figures
 from convexrough.plots.shear import shear_figures
+from convexrough.plots.surface import provability_figure, surface_figures
 
 __all__ = [
     "cycle_figures",
@@ -25,7 +26,9 @@ __all__ = [
     "phase_figures",
     "plot",
     "press_figures",
+    "provability_figure",
     "shakedown_figures",
     "shear_figures",
     "steady_figures",
+    "surface_figures",
 ]

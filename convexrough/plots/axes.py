@@ -39,12 +39,17 @@ from convexrough.plots.style import (
     Scale,
     ShearScale,
     label,
+    literal,
     say_no_contact,
 )
+from convexrough.plots.surface import draw_provability, draw_summits, draw_surface
 from convexrough.plots.verdict import draw_claim
 from convexrough.shearing.cycle import Cycle
 from convexrough.shearing.history import History
 from convexrough.shearing.state import ShearState
+from convexrough.surface.provability import Provability
+from convexrough.surface.summits import Summits
+from convexrough.surface.surface import Surface
 from convexrough.vector_shear.state import VectorShearState
 from convexrough.verdict import Verdict
 
@@ -58,7 +63,7 @@ def plot(
         Cycle: its loop, History: its path, Q against X; Gradient: map of who matters; Verdict:
         map of who is not as claimed; Comparison: what each solver took; LoadPath, MemoryCurve,
         Steady: the plane of loads; PhaseLosses: loss against phase; Shakedown: map of the factors;
-        PathComparison: what each way took
+        PathComparison: what each way took; Surface, Summits: map; Provability: contacts by pruning
     axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
     length_unit, force_unit : only said, never converted
 
@@ -192,6 +197,24 @@ def _(comparison: PathComparison, axes: Axes, length_unit: str, force_unit: str)
 @_draw.register
 def _(limit: Shakedown, axes: Axes, length_unit: str, force_unit: str) -> None:
     draw_factors(axes, limit, length_unit)
+
+
+@_draw.register
+def _(surface: Surface, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_surface(axes, surface)
+
+
+@_draw.register
+def _(summits: Summits, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_summits(axes, summits.positions)
+    unit = f"  [{literal(summits.origin.unit)}]" if summits.origin.unit else ""
+    label(axes, f"$x${unit}", f"$y${unit}")
+    axes.set_aspect("equal")
+
+
+@_draw.register
+def _(curve: Provability, axes: Axes, length_unit: str, force_unit: str) -> None:
+    draw_provability(axes, curve)
 
 
 def _against(axes: Axes, scale: ShearScale, x: Array, q: Array, **look: Any) -> None:

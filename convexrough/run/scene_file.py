@@ -94,8 +94,10 @@ class SceneFile(Record, Stages):
         )
 
 
-def read_scene(path: str | os.PathLike[str]) -> SceneFile:
+def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = None) -> SceneFile:
     """Read and check a scene file.
+
+    asperities : to press on instead of those of the file
 
     Raises FileError where a file cannot be read or is no TOML, SceneFileError with every mistake in
     the tables, and InputError for mistakes that show only in building the scene.
@@ -112,14 +114,14 @@ def read_scene(path: str | os.PathLike[str]) -> SceneFile:
     if tables is None:
         raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
     shear, cycle, history, units = tables.shear, tables.cycle, tables.history, tables.units
-    scene, highest = build_scene(path, tables)
+    scene, highest = build_scene(path, tables, asperities=asperities)
     layout, sources = tables.asperities, [path]
-    if layout.pattern == "file":
+    if layout.pattern == "file" and asperities is None:
         sources.append(path.parent / layout.path)
     return SceneFile(
         path=path,
         text=text,
-        seed=None if layout.pattern == "file" else layout.seed,
+        seed=None if layout.pattern == "file" or asperities is not None else layout.seed,
         inputs={str(each): digest(each) for each in sources},
         scene=scene,
         approach=tables.normal.approach,
@@ -229,12 +231,13 @@ READ = Layouts(read_summits, _regular)
 
 
 def build_scene(
-    path: Path, tables: Document, layouts: Layouts = READ
+    path: Path, tables: Document, layouts: Layouts = READ, asperities: Asperities | None = None
 ) -> tuple[Scene, float | None]:
     """The scene of checked tables, and what `SceneFile.highest_approach` says.
 
     path    : of the file they are from, for messages and for what paths in it are relative to
     layouts : where the asperities are from
+    asperities : in place of those of the tables
 
     Raises InputError for mistakes that show only here.
     """
@@ -258,6 +261,8 @@ def build_scene(
 
     layout = tables.asperities
     with _blamed_on(path, "asperities"):
+        if asperities is not None:
+            return press_on(asperities), None
         if layout.pattern == "file":
             return press_on(
                 layouts.summits(path.parent / layout.path, tip_radius=layout.tip_radius)

@@ -15,8 +15,8 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import FileError, InputError, TableError
 from convexrough.run.array_table import SPOILED, read_arrays
-from convexrough.run.text_table import bare, read_text_table, unit
 from convexrough.scene.asperities import Asperities
+from convexrough.text_table import bare, read_text_table, unit
 
 #: Columns that are read, and the check that each cell must pass.
 CHECKS: dict[str, Callable[[str, Any], float]] = {

@@ -12,7 +12,7 @@ from scene_files import scene_text
 import convexrough as cr
 from convexrough.run import scene_file
 from convexrough.run.tables import read_table
-from convexrough.run.text_table import STYLES, bare, unit
+from convexrough.text_table import STYLES, bare, unit
 
 #: [s] of processor time; what took the square of a length took minutes.
 SOON = 2.0

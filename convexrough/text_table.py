@@ -115,7 +115,7 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
     """
     lines: list[tuple[int, str]] = []
     comment, style = "", None
-    for number, line in _lines(path):
+    for number, line in lines_of(path):
         text = line.strip("\r\n")
         inner = text.strip()
         if not lines and style is None and re.fullmatch(r"sep=.", inner):  # Excel
@@ -128,7 +128,7 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
     if not lines:
         raise FileError(f"{path}: empty")
     texts = [text for _, text in lines]
-    style = _sniff(
+    style = sniff(
         texts[:SAMPLE], [Style(style.separator, mark) for mark in ".,"] if style else STYLES
     )
     rows = [_row(number, text, style) for number, text in lines]
@@ -140,7 +140,7 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
     return TextTable(*_trimmed(header, rows, style), style)
 
 
-def _lines(path: Path) -> Iterator[tuple[int, str]]:
+def lines_of(path: Path) -> Iterator[tuple[int, str]]:
     """Lines with their numbers. Bytes that are not UTF-8 are taken for Latin-1."""
     with path.open("rb") as raw:
         encoding = _encoding(path, raw)
@@ -171,7 +171,7 @@ def _encoding(path: Path, raw: BufferedReader) -> str:
     return "utf-8-sig"
 
 
-def _sniff(lines: Sequence[str], styles: Sequence[Style]) -> Style:
+def sniff(lines: Sequence[str], styles: Sequence[Style]) -> Style:
     """The style in which most lines have equally many cells, and most of these are numbers."""
 
     def score(style: Style) -> float:

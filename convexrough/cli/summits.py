@@ -1,0 +1,199 @@
+"""`summits`: from a measured surface to asperities, and how strongly to prune them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from convexrough.cli.options import PATH, Command, json_option
+from convexrough.cli.speech import DONE, NOT_CERTIFIED, blamed_on, progress, say_aside
+from convexrough.errors import InputError, SolverError
+
+if TYPE_CHECKING:
+    from convexrough.contact import Contact
+    from convexrough.run.scene_file import SceneFile
+    from convexrough.run.surface_report import Scanned
+    from convexrough.scene.asperities import Asperities
+    from convexrough.surface import Surface
+
+
+def map_options(command: Command) -> Command:
+    """How the file of a map is to be read."""
+    for option in (
+        click.option("--fill", is_flag=True, help="Fill holes in the map, and say how many."),
+        click.option("--detrend", type=click.Choice(["plane", "sphere", "none"]), default="plane",
+                     show_default=True, help="What is no roughness."),
+        click.option("--height-unit", metavar="UNIT", help="Of the heights, if not that."),
+        click.option("--unit", metavar="UNIT", help="Of the pixel and the heights: µm, mm, ..."),
+        click.option("--pixel", metavar="X[,Y]", help="Size of a pixel, where the file has none."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+def press_options(command: Command) -> Command:
+    """How the summits are pressed."""
+    for option in (
+        click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, with --load."),
+        click.option("--load", metavar="P", type=float, help="Press with this load."),
+        click.option("--approach", metavar="D", type=float, help="Or press by this approach."),
+        click.option("--radius", metavar="R", type=float, help="Press a sphere on the summits."),
+        click.option("--scene", metavar="SCENE", type=PATH, help="Press as this scene file says."),
+    ):
+        command = option(command)
+    return command
+
+
+@click.command()
+@click.argument("surface", type=PATH)
+@press_options
+@map_options
+@click.option("--fit", metavar="N", type=int, default=3, show_default=True,
+              help="Pixels across a paraboloid.")  # fmt: skip
+@click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
+              help="Least prominence of a hill, in parts of Sz.")  # fmt: skip
+@click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,
+              help="Table for a scene file; figures go beside it.")  # fmt: skip
+@click.option("--no-figures", is_flag=True, help="Write no PNG and SVG.")
+@click.option("--force", is_flag=True, help="Replace a table that is there.")
+@json_option
+def summits(
+    surface: Path,
+    out: Path,
+    prune: float,
+    fit: int,
+    no_figures: bool,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> int:
+    """Find the summits of a measured surface, and how far they can be trusted.
+
+    SURFACE is .npy, .npz, a matrix or x, y, height in text, or an instrument's file. Pressed by a
+    sphere about the middle of the map (--scene, or --radius with --approach or --load), contacts,
+    proof, crowding and model error are held against the pruning.
+
+    Exit status: 3 where the contact at the chosen pruning is not certified.
+    """
+    from convexrough.run import surface_files, surface_report
+    from convexrough.run.summary import to_json
+
+    how = {name: options.pop(name) for name in ("scene", "radius", "approach", "load", "modulus")}
+    _check_pressing(**how)
+    surface_files.claim_table(out, force=force)
+    with progress(f"reading {surface}") as show:
+        scan = _read(surface, **options)
+        show("finding summits")
+        with blamed_on(surface):
+            scanned = _scan(scan, prune, fit, how, show)
+    summary = surface_report.surface_summary(scanned)
+    with progress("writing"):
+        files = surface_files.write_summits(out, scanned, figures=not no_figures)
+    if as_json:
+        click.echo(to_json(summary))
+    else:
+        names = ", ".join(path.name for path in files)
+        lines = [*surface_report.describe_surface(scanned), "", f"written  {out.parent}: {names}"]
+        click.echo("\n".join(lines))
+    for doubt in surface_report.doubts_of_surface(scanned):
+        say_aside("warning", doubt)
+    if scanned.curve is None:
+        say_aside("hint", "--scene or --radius presses on them: how strong must the pruning be?")
+    return DONE if scanned.certified else NOT_CERTIFIED
+
+
+def _check_pressing(
+    scene: Path | None,
+    radius: float | None,
+    approach: float | None,
+    load: float | None,
+    modulus: float | None,
+) -> None:
+    others = (radius, approach, load, modulus)
+    if scene is not None and any(each is not None for each in others):
+        raise click.UsageError("--scene says how to press; --radius and the like are not needed.")
+    if scene is None and any(each is not None for each in others):
+        if radius is None or (approach is None) == (load is None):
+            raise click.UsageError("--radius needs exactly one of --approach and --load.")
+        if (load is None) != (modulus is None):
+            raise click.UsageError("--load and --modulus go together.")
+
+
+def _read(path: Path, *, pixel: str | None, detrend: str, **options: Any) -> Surface:
+    from convexrough.surface import read
+
+    size: Any = None
+    if pixel is not None:
+        try:
+            sides = [float(each) for each in pixel.split(",")]
+        except ValueError as error:
+            expected = "a number, or two with a comma"
+            raise InputError("--pixel", found=repr(pixel), expected=expected) from error
+        size = sides[0] if len(sides) == 1 else tuple(sides)
+    trend: Any = None if detrend == "none" else detrend
+    return read(path, pixel=size, detrend=trend, **options)
+
+
+def _scan(
+    surface: Surface,
+    prune: float,
+    fit: int,
+    how: dict[str, Any],
+    show: Callable[[str], object],
+) -> Scanned:
+    """All of it; in the unit of the scene, if that names one."""
+    from convexrough.run.surface_report import Scanned
+    from convexrough.surface import provability
+    from convexrough.surface.provability import LEVELS
+
+    chosen = surface.summits(prune, fit)
+    file: SceneFile | None = None
+    if how["scene"] is not None:
+        from convexrough.run.scene_file import read_scene
+
+        file = read_scene(how["scene"], asperities=chosen)
+        if surface.unit and file.units.length and surface.unit != file.units.length:
+            surface = surface.to_unit(file.units.length)
+            chosen = surface.summits(prune, fit)
+    maxima = surface.summits(0.0, fit)
+    if file is None and how["radius"] is None:
+        return Scanned(surface, maxima, chosen)
+    press = _pressing(file, **how)
+    curve = provability(maxima, press, levels=[*LEVELS, prune], announce=show)
+    try:
+        contact = press(chosen)
+    except SolverError:
+        contact = None
+    return Scanned(surface, maxima, chosen, curve, contact, file.units.length if file else "")
+
+
+def _pressing(
+    file: SceneFile | None,
+    *,
+    scene: Path | None,
+    radius: float,
+    approach: float | None,
+    load: float | None,
+    modulus: float | None,
+) -> Callable[[Asperities], Contact]:
+    from convexrough.contact import press
+    from convexrough.scene.material import Material
+    from convexrough.scene.scene import Scene
+
+    def as_in_file(asperities: Asperities) -> Contact:
+        assert file is not None
+        pressed = replace(file.scene, asperities=asperities)
+        return press(pressed, approach=file.approach, load=file.load, solver=file.solver,
+                     influence=file.influence)  # fmt: skip
+
+    def as_said(asperities: Asperities) -> Contact:
+        # Under a given approach no contact depends on the modulus; Poisson's ratio is for shear.
+        stuff = Material(1.0 if modulus is None else modulus, 0.3)
+        pressed = Scene(radius, asperities, stuff, geometry="closest")
+        return press(pressed, approach=approach, load=load)
+
+    return as_said if file is None else as_in_file

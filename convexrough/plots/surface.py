@@ -1,0 +1,258 @@
+"""Figures of a measured surface: its map with the summits, their histograms, and how to prune."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from convexrough.arrays import Array, Number
+from convexrough.contact import Contact
+from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.style import (
+    DASHED,
+    DOUBLE,
+    FAINT,
+    LABEL,
+    ROUGH,
+    SINGLE,
+    SMOOTH,
+    TICK,
+    UNSURE,
+    draw_circle,
+    draw_discs,
+    label,
+    literal,
+    quantity,
+    round_ticks,
+)
+from convexrough.sphere import hertz
+from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
+from convexrough.surface.summits import Summits
+from convexrough.surface.surface import Surface
+
+#: From so many summits on their dots are pixels inside a vector file.
+MANY = 1000
+
+#: The colour of a summit, bright on every grey.
+SUMMIT = "#ffd24a"
+
+#: Round a contact, so that it also stands out of dark valleys in print.
+RIM: dict[str, Any] = dict(edgecolors="white", linewidths=0.3, zorder=3)
+
+#: Parts of Sz that the axis of a pruning names.
+PRUNINGS = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5)
+
+#: Marks of what is proved: apart in shape, as colours are not in print.
+SCOPES = {"global": ("o", ROUGH), "local": ("s", ROUGH), "none": ("X", UNSURE),
+          "failed": ("^", UNSURE)}  # fmt: skip
+
+
+def surface_figures(
+    surface: Surface,
+    maxima: Summits,
+    summits: Summits,
+    curve: Provability | None = None,
+    contact: Contact | None = None,
+) -> Figures:
+    """The figures of a surface, by the stem of the file each belongs in.
+
+    "map"         : heights, summits, and those that touch where they are pressed
+    "histograms"  : of the summits, and where the spectral moments expect them
+    "provability" : contacts, crowding and model error by pruning, where there is a curve
+
+    maxima  : all summits of this surface;  summits : those left by pruning
+    contact : of the summits that are left
+    """
+    figures = Figures({"map": _map(surface, summits, contact)})
+    figures["histograms"] = _histograms(surface, maxima, summits)
+    if curve is not None:
+        figures["provability"] = provability_figure(curve, summits.origin.prune, surface.unit)
+    return figures
+
+
+def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
+    """The map in greys, its axes with their unit."""
+    width, height = surface.size
+    whole = (-width / 2, width / 2, -height / 2, height / 2)
+    image = axes.imshow(surface.heights, origin="lower", extent=whole, cmap="gray",
+                        interpolation="nearest", rasterized=True)  # fmt: skip
+    label(axes, _named("$x$", surface.unit), _named("$y$", surface.unit))
+    axes.xaxis.set_major_locator(round_ticks())
+    axes.yaxis.set_major_locator(round_ticks())
+    return image
+
+
+def draw_summits(axes: Axes, positions: Array) -> None:
+    """A dot at each summit, smaller where there are many."""
+    size = float(np.clip(60.0 / np.sqrt(len(positions) + 1), 0.4, 4.0))
+    axes.plot(*positions.T, "o", ms=size, mew=0.0, color=SUMMIT, rasterized=len(positions) > MANY)
+
+
+def draw_provability(axes: Axes, curve: Provability) -> None:
+    """How many summits touch, marked by what is proved of them."""
+    axes.plot(_place(curve.prune), curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
+    _draw_by_scope(axes, curve, curve.contacts.astype(np.float64), "contacts")
+    axes.set_yscale("log")
+    _name_prunings(axes, curve)
+    label(axes, "pruning  [% of $Sz$]", "number")
+
+
+def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
+    """Contacts, crowding and model error by pruning; shaded where they are not to be trusted.
+
+    chosen : the pruning that a dotted line marks
+    """
+    figure = Figure(figsize=(SINGLE, 5.0), layout="constrained")
+    upper, middle, lower = figure.subplots(3, 1)
+    draw_provability(upper, curve)
+    upper.legend(fontsize=TICK - 1, frameon=False, loc="lower left", handlelength=1.6)
+    for axes, values, limit, name in (
+        (middle, curve.crowding, OVERLAP, "crowding"),
+        (lower, 100 * curve.model_error, 100 * TOO_FAR, "model error  [%]"),
+    ):
+        _draw_by_scope(axes, curve, values, "")
+        axes.axhline(limit, color=UNSURE, lw=0.9, ls=DASHED)
+        _name_prunings(axes, curve)
+        axes.set_ylim(0.0, 1.1 * max(limit, float(np.nanmax(values, initial=0.0))))
+        label(axes, "", name)
+    lower.set_xlabel("pruning  [% of $Sz$]", fontsize=LABEL)
+    upper.set_xlabel("")
+    first = curve.trusted_from
+    until = float(curve.prune[-1]) if np.isnan(first) else first
+    for axes in (upper, middle, lower):
+        axes.axvspan(0.0, _place(until), color="0.92", lw=0.0, zorder=0)
+        axes.axvline(_place(chosen), color=SMOOTH, lw=0.9, ls=":")
+    word = "nowhere" if np.isnan(first) else f"from {100 * first:.3g} %"
+    tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
+    size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
+    upper.set_title(f"to be trusted: {word}{size}", fontsize=TICK, loc="left")
+    return figure
+
+
+def _place(prune: Number) -> Number:
+    """Where a pruning is along its axis: there is room for weak ones, and for 0."""
+    return np.sqrt(prune)
+
+
+def _name_prunings(axes: Axes, curve: Provability) -> None:
+    top = max(float(curve.prune[-1]), PRUNINGS[1])
+    axes.set_xlim(0.0, 1.02 * float(_place(top)))
+    shown = [each for each in PRUNINGS if each <= top]
+    axes.set_xticks([float(_place(each)) for each in shown], [f"{100 * each:g}" for each in shown])
+
+
+def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str) -> None:
+    axes.plot(_place(curve.prune), values, "-", lw=0.9, color=FAINT, zorder=1)
+    for scope, (mark, colour) in SCOPES.items():
+        chosen = curve.scope == scope
+        if chosen.any() and np.isfinite(values[chosen]).any():
+            said = f"{name}, proof: {scope}" if name else "_nothing"
+            axes.plot(_place(curve.prune[chosen]), values[chosen], mark, ls="", ms=4.5, mew=0.0,
+                      color=colour, label=said, clip_on=False, zorder=3)  # fmt: skip
+
+
+def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
+    """All of the map; or, where a contact is shown, as much as it needs."""
+    figure = Figure(figsize=(SINGLE + 0.9, 4.1), layout="constrained")
+    axes = figure.subplots()
+    image = draw_surface(axes, surface)
+    named = [(SUMMIT, f"summits ({len(summits):,})")]
+    positions = summits.positions
+    if contact is not None and contact.loads.any():
+        edge = _draw_contacts(axes, contact)
+        named.append((UNSURE, f"contacts ({np.count_nonzero(contact.loads):,})"))
+        inside = np.abs(positions).max(axis=1) <= edge
+        positions = positions[inside]
+        width, height = (min(edge, side / 2) for side in surface.size)
+        axes.set(xlim=(-width, width), ylim=(-height, height))
+    draw_summits(axes, positions)
+    bar = figure.colorbar(image, ax=axes, aspect=30, pad=0.02)
+    bar.ax.tick_params(labelsize=TICK)
+    bar.ax.set_title(_named("$z$", surface.unit), fontsize=TICK)
+    look: dict[str, Any] = dict(marker="o", ls="", ms=5.0, mec="0.4", mew=0.3)
+    handles = [Line2D([], [], color=colour, label=word, **look) for colour, word in named]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=TICK,
+                  frameon=False, handletextpad=0.3)  # fmt: skip
+    return figure
+
+
+def _draw_contacts(axes: Axes, contact: Contact) -> float:
+    """The contacts, that of the smooth sphere, and who is crowded most; half the width they need.
+
+    Discs are of true size, as long as that can be seen.
+    """
+    touching = contact.loads > 0
+    centres, radii = contact.scene.contact_points[touching], contact.contact_radii[touching]
+    modulus, radius = contact.scene.material.contact_modulus, contact.scene.sphere_radius
+    smooth = float(hertz.contact_radius(contact.load, modulus, radius))
+    edge = 1.2 * max(smooth, float((np.abs(centres).max(axis=1) + radii).max()))
+    shown = np.maximum(radii, edge * float(np.clip(0.1 / np.sqrt(len(radii)), 0.002, 0.01)))
+    draw_discs(axes, centres, shown, "_contacts", facecolors=UNSURE, **RIM)
+    draw_circle(axes, smooth, colour="white")
+    pairs, _ = crowded(contact)
+    for i, j in pairs[:1]:
+        place = contact.scene.asperities.positions[[i, j]].mean(axis=0)
+        box = dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.85)
+        axes.annotate(f"{i}, {j}", place, xytext=(7, 7), textcoords="offset points",
+                      fontsize=TICK - 1, bbox=box, zorder=5)  # fmt: skip
+    return edge
+
+
+def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
+    """Heights, tip radii and eccentricities, of all maxima and of those left."""
+    figure = Figure(figsize=(DOUBLE, 2.7), layout="constrained")
+    left, middle, right = figure.subplots(1, 3)
+    moments, level = surface.moments, summits.origin.level
+    edges = _bins(maxima.heights - level)
+    _draw_both(left, edges, maxima.heights - level, summits.heights - level)
+    mean, spread = moments.mean_height, moments.height_std
+    if spread > 0:  # else no Gaussian surface has these moments
+        z = np.linspace(edges[0], edges[-1], 200)
+        normal = np.exp(-(((z - mean) / spread) ** 2) / 2) / (spread * np.sqrt(2 * np.pi))
+        expected = moments.density * summits.origin.area * (edges[1] - edges[0])
+        left.plot(z, expected * normal, "--", lw=1.1, color=SMOOTH, label="by spectral moments")
+    left.xaxis.set_major_locator(round_ticks(4))
+    left.xaxis.get_offset_text().set_fontsize(TICK)
+    label(left, _named("height", surface.unit), "summits")
+
+    edges = 10 ** _bins(np.log10(maxima.tip_radii))
+    _draw_both(middle, edges, maxima.tip_radii, summits.tip_radii)
+    middle.set_xscale("log")
+    middle.axvline(1 / moments.mean_curvature, color=SMOOTH, ls="--", lw=1.1)
+    label(middle, _named("tip radius", surface.unit), "")
+    span = edges[-1] / edges[0]
+    powers = LogLocator(subs=(1.0,) if span > 50 else (1.0, 3.0), numticks=5)
+    middle.xaxis.set_major_locator(powers if span > 10 else round_ticks(4))
+    middle.xaxis.set_major_formatter("{x:g}")
+    middle.xaxis.set_minor_formatter(NullFormatter())
+
+    _draw_both(right, np.linspace(0.0, 1.0, 21), maxima.eccentricities, summits.eccentricities)
+    right.set_xlim(0.0, 1.0)
+    label(right, "eccentricity of the tip", "")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3,
+                  fontsize=TICK, frameon=False)  # fmt: skip
+    return figure
+
+
+def _draw_both(axes: Axes, edges: Array, maxima: Array, summits: Array) -> None:
+    bins = edges.tolist()
+    axes.hist(maxima, bins, histtype="step", lw=1.0, color=SMOOTH, label="all maxima")
+    axes.hist(summits, bins, color=ROUGH, alpha=0.75, label="summits left by pruning")
+
+
+def _bins(values: Array) -> Array:
+    """Edges for all of them, and about their one value where they are the same."""
+    low, high = float(values.min()), float(values.max())
+    size = max(abs(low), abs(high)) or 1.0
+    room = high - low if high - low > 1e-9 * size else size
+    count = int(np.clip(np.sqrt(len(values)), 8, 40))
+    return np.linspace(low - 0.02 * room, high + 0.02 * room, count + 1)
+
+
+def _named(name: str, unit: str) -> str:
+    return f"{name}  [{literal(unit)}]" if unit else name

@@ -1,0 +1,22 @@
+"""From a measured surface to asperities: read, detrend, find summits, hold them against theory."""
+
+from convexrough.surface.moments import Moments
+from convexrough.surface.provability import Provability, crowded, model_errors, provability
+from convexrough.surface.reading import read
+from convexrough.surface.self_affine import self_affine, self_affine_moments
+from convexrough.surface.summits import Origin, Summits
+from convexrough.surface.surface import Surface
+
+__all__ = [
+    "Moments",
+    "Origin",
+    "Provability",
+    "Summits",
+    "Surface",
+    "crowded",
+    "model_errors",
+    "provability",
+    "read",
+    "self_affine",
+    "self_affine_moments",
+]

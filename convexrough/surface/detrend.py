@@ -1,0 +1,91 @@
+"""What is no roughness: the plane or the sphere that fits a map best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.errors import InputError
+
+Trend = Literal["plane", "sphere"]
+TRENDS: tuple[Trend, ...] = ("plane", "sphere")
+
+#: Gauss's steps to the best sphere, of which a few are enough, and the last one's relative size.
+STEPS, ENOUGH = 50, 1e-12
+
+
+@dataclass(frozen=True, repr=False)
+class Removed:
+    """A plane or sphere that was taken from a map.
+
+    height    : [length] of it at the middle of the map
+    slopes    : along x and y, there
+    curvature : [1/length] of the sphere, positive for a hill; 0 for a plane
+    """
+
+    kind: Trend
+    height: float
+    slopes: tuple[float, float]
+    curvature: float = 0.0
+
+    @property
+    def radius(self) -> float:
+        """[length] of the sphere, negative for a bowl; infinite for a plane."""
+        return 1.0 / self.curvature if self.curvature else float("inf")
+
+    def __repr__(self) -> str:
+        tilt = f"slopes {self.slopes[0]:.3g} and {self.slopes[1]:.3g}"
+        if self.kind == "plane":
+            return f"plane, {tilt}"
+        return f"sphere of radius {self.radius:.6g}, {tilt} in the middle"
+
+
+def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
+    """The trend with the least sum of squares of heights above it, and its height at each pixel.
+
+    A sphere is
+
+        z = a + b x + c y + k (x^2 + y^2 + z^2) / 2,
+
+    its curvature k / sqrt(1 + b^2 + c^2 - 2 a k), upwards. So z = 2 q / (1 + sqrt(1 - 2 k q)) with
+    q = a + b x + c y + k (x^2 + y^2) / 2, and each of a, b, c, k moves z by its factor over
+    1 - k z. Gauss's method begins at the best paraboloid. Of a plane, k = 0, one step is exact.
+    Lengths are in halves of the map's size.
+
+    Raises InputError where no sphere fits.
+    """
+    rows, columns = heights.shape
+    x = (np.arange(columns) - (columns - 1) / 2) * pixel[0]
+    y = ((np.arange(rows) - (rows - 1) / 2) * pixel[1])[:, None]
+    size = max(float(x[-1]), float(y[-1, 0]))
+    x, y = x / size, y / size
+    level = float(heights.mean())
+    wanted = (heights - level) / size
+    z, shape = np.zeros_like(wanted), np.zeros(4)
+    terms = [np.ones_like(wanted), x + 0 * y, y + 0 * x]
+    for _ in range(1 if kind == "plane" else STEPS):
+        factors = terms if kind == "plane" else [*terms, (x * x + y * y + z * z) / 2]
+        step = _least_squares([each / (1 - shape[3] * z) for each in factors], wanted - z)
+        shape[: len(step)] += step
+        a, b, c, k = shape
+        q = a + b * x + c * y + k * (x * x + y * y) / 2
+        if (under := 1 - 2 * k * q).min() <= 0:
+            break
+        z = 2 * q / (1 + np.sqrt(under))
+        if kind == "plane" or np.abs(step).max() <= ENOUGH * np.abs(shape).max():
+            q0 = 2 * a / (1 + np.sqrt(1 - 2 * k * a))
+            slopes = (float(b / (1 - k * q0)), float(c / (1 - k * q0)))
+            curvature = float(0 - k / np.sqrt(b * b + c * c + 1 - 2 * a * k)) / size
+            removed = Removed(kind, level + size * float(q0), slopes, curvature)
+            return removed, level + size * z
+    expected = "one that spans the map; a plane always does"
+    raise InputError("detrend", found="no best sphere", expected=expected)
+
+
+def _least_squares(factors: list[Array], misfit: Array) -> Array:
+    """By the normal equations: few unknowns, all about 1, and many pixels."""
+    normal = [[float(np.vdot(one, other)) for other in factors] for one in factors]
+    return np.asarray(np.linalg.solve(normal, [float(np.vdot(each, misfit)) for each in factors]))

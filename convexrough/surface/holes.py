@@ -1,0 +1,42 @@
+"""Holes of a map, filled as a soap film would."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.linalg import spsolve
+
+from convexrough.arrays import Array
+
+#: Every pair of neighbours along a side, as (row, column) steps.
+SIDES = ((0, 1), (1, 0))
+
+
+def filled(heights: Array) -> Array:
+    """The map with each hole (nan) the mean of its neighbours: a harmonic function.
+
+    Such a function has no maximum of its own, so no filled pixel becomes a summit. At the edge of
+    the map the neighbours that are there count. Some pixel must not be a hole.
+    """
+    holes = np.isnan(heights)
+    number = np.full(heights.shape, -1)
+    number[holes] = np.arange(np.count_nonzero(holes))
+    known = np.where(holes, 0.0, heights)
+    neighbours, sums = np.zeros(heights.shape), np.zeros(heights.shape)
+    rows, columns = [], []
+    for down, right in SIDES:
+        ahead = np.s_[down:, right:]
+        behind = np.s_[: heights.shape[0] - down, : heights.shape[1] - right]
+        for here, there in ((ahead, behind), (behind, ahead)):
+            neighbours[here] += 1
+            sums[here] += known[there]
+            both = holes[here] & holes[there]
+            rows.append(number[here][both])
+            columns.append(number[there][both])
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    place = np.arange(np.count_nonzero(holes))
+    values = np.concatenate((neighbours[holes], -np.ones(len(row))))
+    where = (np.concatenate((place, row)), np.concatenate((place, column)))
+    mended = heights.copy()
+    mended[holes] = spsolve(coo_array((values, where)).tocsc(), sums[holes])
+    return mended

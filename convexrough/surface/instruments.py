@@ -1,0 +1,55 @@
+"""Files of instruments, by SurfaceTopography: the only module that knows it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from warnings import catch_warnings
+
+import numpy as np
+
+from convexrough.errors import FileError, InputError
+from convexrough.surface.grid import Grid
+
+
+def read_instrument(
+    path: Path, pixel: float | tuple[float, float] | None, unit: str | None
+) -> Grid:
+    """The first channel of heights of a file in any of the formats that SurfaceTopography knows.
+
+    pixel, unit : for formats that do not hold them
+
+    Raises FileError where it cannot read the file, or is not installed.
+    """
+    try:
+        with catch_warnings(action="ignore", category=ImportWarning):  # that there is no MPI
+            from SurfaceTopography import open_topography
+            from SurfaceTopography.Exceptions import ReadFileError
+    except ImportError as error:
+        advice = "needs SurfaceTopography: pip install 'convexrough[surface]'"
+        raise FileError(f"{path}: {advice}") from error
+    path.open("rb").close()  # so that a missing file is named as everywhere
+    try:
+        with open_topography(str(path)) as reader:
+            channel = reader.default_channel
+            given: dict[str, Any] = {}
+            if channel.physical_sizes is None and pixel is not None:
+                both = pixel if isinstance(pixel, (tuple, list)) else (pixel, pixel)
+                counts = zip(channel.nb_grid_pts, both, strict=True)
+                given["physical_sizes"] = tuple(count * size for count, size in counts)
+            topography = reader.topography(**given)
+    except ReadFileError as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise FileError(f"{path}: no format that SurfaceTopography knows: {reason}") from error
+    if topography.dim != 2:
+        raise InputError("file", found="a line scan", expected="a map", where=str(path))
+    heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
+    sizes = topography.physical_sizes
+    size = (
+        None
+        if sizes is None
+        else tuple(
+            float(length) / count for length, count in zip(sizes, heights.shape, strict=True)
+        )
+    )
+    return Grid(heights.T.copy(), size, str(topography.unit or ""), str(topography.unit or ""))

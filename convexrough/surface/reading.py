@@ -1,0 +1,170 @@
+"""`read`: a surface from a file, by its kind, in one unit of length."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array
+from convexrough.errors import FileError, InputError
+from convexrough.surface.detrend import Trend
+from convexrough.surface.grid import Grid, read_grid
+from convexrough.surface.holes import filled
+from convexrough.surface.length_units import factor, one_unit
+from convexrough.surface.surface import Surface, checked_pixel
+
+#: Names of files that are text.
+TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz")
+
+#: What the heights are called in an .npz with several arrays.
+HEIGHTS = ("heights", "height", "z")
+
+#: Rms slopes outside of these are of heights and pixels in different units.
+SLOPES = (1e-7, 10.0)
+
+#: Relative difference of two pixel sizes that are the same.
+SAME = 1e-6
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    pixel: float | tuple[float, float] | None = None,
+    unit: str | None = None,
+    height_unit: str | None = None,
+    detrend: Trend | None = "plane",
+    fill: bool = False,
+) -> Surface:
+    """A surface from .npy, .npz, a matrix or list in text, or what SurfaceTopography reads.
+
+    pixel  : size of a pixel, or those along x and y, [unit]; needed where the file has none
+    unit   : of the pixel, and of the heights unless `height_unit` is given; needed nowhere. A file
+        that names another is refused. Heights in another known unit are converted
+    detrend : the best "plane" or "sphere" to take away, or None
+    fill   : holes (nan, or masked) become as high as a soap film; else they are refused
+
+    An .npz holds `heights` and, if it likes, `pixel`, `unit` and `height_unit`. Text is a matrix,
+    with or without Gwyddion's comments on its size, or columns x, y and height on a grid. Other
+    files need the extra `surface`.
+
+    Raises FileError where the file cannot be read, as SurfaceTopography is not installed, say, and
+    InputError where it holds no usable map.
+
+    >>> np.savez(folder / "scan.npz", heights=np.random.default_rng(1).normal(size=(64, 64)))
+    >>> cr.surface.read(folder / "scan.npz", pixel=2.5, unit="µm").size
+    (160.0, 160.0)
+    """
+    path = Path(path)
+    try:
+        grid = _grid(path, pixel, unit)
+        return _surface(path, grid, pixel, unit, height_unit, detrend, fill)
+    except InputError as error:
+        raise error if error.where else error.within(str(path)) from error
+
+
+def _surface(
+    path: Path,
+    grid: Grid,
+    pixel: float | tuple[float, float] | None,
+    unit: str | None,
+    height_unit: str | None,
+    detrend: Trend | None,
+    fill: bool,
+) -> Surface:
+    length = one_unit("unit", unit, grid.unit)
+    upwards = one_unit("height_unit", height_unit, grid.height_unit)
+    if upwards and not length:
+        raise InputError(
+            "unit", found="none", expected=f"that of a pixel, as heights are {upwards}"
+        )
+    heights, holes = _mended(grid.heights, fill)
+    if upwards:
+        heights = heights * factor(upwards, length)
+    size = _pixel(grid.pixel, pixel)
+    surface = Surface(heights, size, length, filled=holes, source=str(path))
+    if not upwards and not SLOPES[0] <= surface.rms_slope <= SLOPES[1]:
+        found = f"rms slope {surface.rms_slope:.3g}"
+        expected = f"{SLOPES[0]:g} to {SLOPES[1]:g}; if heights have another unit, give height_unit"
+        raise InputError("heights", found=found, expected=expected)
+    return surface if detrend is None else surface.detrend(detrend)
+
+
+def _pixel(
+    found: tuple[float, float] | None, given: float | tuple[float, float] | None
+) -> tuple[float, float]:
+    if given is None:
+        if found is None:
+            expected = "its size, as the file does not say: pixel=, or --pixel"
+            raise InputError("pixel", found="none", expected=expected)
+        return checked_pixel(found)
+    if found is None:
+        return checked_pixel(given)
+    said, there = checked_pixel(given), checked_pixel(found)
+    if not np.allclose(said, there, rtol=SAME, atol=0):
+        expected = f"{there[0]:g} by {there[1]:g}, as the file says, or none given"
+        raise InputError("pixel", found=f"{said[0]:g} by {said[1]:g}", expected=expected)
+    return there
+
+
+def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
+    """Without holes, and how many there were."""
+    holes = int(np.count_nonzero(np.isnan(heights)))
+    if holes == 0:
+        return heights, 0
+    found = f"{holes:,} holes (nan) in {heights.size:,} pixels"
+    if holes == heights.size:
+        raise InputError("heights", found=found, expected="some heights")
+    if not fill:
+        raise InputError("heights", found=found, expected="none, or fill=True, --fill to fill them")
+    return filled(heights), holes
+
+
+def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | None) -> Grid:
+    """What is in a file, by its kind."""
+    kind = path.suffix.lower()
+    try:
+        if kind in TEXT:
+            return read_grid(path)
+        if kind in (".npy", ".npz"):
+            return _arrays(path)
+        from convexrough.surface.instruments import read_instrument  # heavy: only when asked
+
+        return read_instrument(path, pixel, unit)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except UnicodeError as error:
+        raise FileError(f"{path}: not text: {error}") from error
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        if isinstance(error, InputError):
+            raise
+        raise FileError(f"{path}: not an {kind} file: {error}") from error
+
+
+def _arrays(path: Path) -> Grid:
+    """The map of a .npy or .npz file."""
+    with path.open("rb") as raw:
+        loaded = np.load(raw, allow_pickle=False)
+        if isinstance(loaded, np.ndarray):
+            return Grid(_numbers(loaded))
+        with loaded:
+            named = {name: np.asarray(loaded[name]) for name in loaded.files}
+    maps = [name for name, values in named.items() if values.ndim == 2]
+    chosen = next((name for name in HEIGHTS if name in named), maps[0] if len(maps) == 1 else None)
+    if chosen is None:
+        found = ", ".join(named) or "none"
+        raise InputError("arrays", found=found, expected='one called "heights"', where=str(path))
+    size = np.atleast_1d(named["pixel"]).tolist() if "pixel" in named else None
+    both = None if size is None else checked_pixel(tuple(size) if len(size) > 1 else size[0])
+    words = [str(named[name]) if name in named else "" for name in ("unit", "height_unit")]
+    return Grid(_numbers(named[chosen]), both, *words)
+
+
+def _numbers(values: NDArray[np.generic]) -> Array:
+    if values.dtype.kind not in "iuf":
+        found = f"an array of {values.dtype}"
+        raise InputError("heights", found=found, expected="an array of real numbers")
+    return np.asarray(values, dtype=np.float64)

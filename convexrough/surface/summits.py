@@ -1,0 +1,230 @@
+"""Summits of a map as asperities that remember where they come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.drawn import Drawn
+from convexrough.errors import InputError
+from convexrough.record import Along, Record, Table
+from convexrough.scene.asperities import Asperities
+from convexrough.surface.detrend import Removed
+from convexrough.surface.hills import Hills
+from convexrough.surface.moments import Moments
+from convexrough.surface.tips import elliptic_load, fit_tips
+
+
+@dataclass(frozen=True, repr=False)
+class Origin(Record):
+    """The map that summits are from, and how they were found.
+
+    source, shape, pixel, unit, removed, filled : as those of `Surface`
+    level      : [length] mean height of the map;  max_height : [length] its Sz
+    moments    : of the map
+    prune      : part of Sz that a hill must be prominent;  fit : pixels across a paraboloid
+    maxima     : pixels higher than their eight neighbours
+    pruned     : of those, hills joined to taller ones
+    at_edge    : hills left out as they are too near to the edge of the map
+    without_top : hills left out as their paraboloid has no top
+
+    >>> cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits().origin.maxima
+    328
+    """
+
+    source: str
+    shape: tuple[int, int]
+    pixel: tuple[float, float]
+    unit: str
+    removed: tuple[Removed, ...]
+    filled: int
+    level: float
+    max_height: float
+    moments: Moments
+    prune: float = 0.0
+    fit: int = 3
+    maxima: int = 0
+    pruned: int = 0
+    at_edge: int = 0
+    without_top: int = 0
+
+    @property
+    def threshold(self) -> float:
+        """[length] the least prominence."""
+        return self.prune * self.max_height
+
+    @property
+    def area(self) -> float:
+        """[length^2] of the map where a summit can be."""
+        rows, columns = self.shape
+        margin = 2 * (self.fit // 2)
+        return (rows - margin) * self.pixel[1] * (columns - margin) * self.pixel[0]
+
+
+class Statistics(NamedTuple):
+    """Of summits, in the words of `Moments`."""
+
+    density: float
+    mean_curvature: float
+    mean_height: float
+    height_std: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Summits(Table, Asperities, Drawn):
+    """Asperities that are the summits of a map, the tallest first.
+
+    positions, tip_radii, heights : of the tops of paraboloids; the tip radius is 1 / sqrt(k1 k2)
+    prominences : (n,) [length] of the maximum above the highest pass to a taller one
+    largest_curvatures, smallest_curvatures : (n,) [1/length] k1 and k2, principal curvatures
+    deviations  : (n,) [length] root-mean-square distance of the pixels from the sphere that
+        stands for the tip
+    pixels      : (n, 2) row and column of the maximum
+    origin      : the map, and what was left out
+
+    >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits()
+    >>> scene = cr.Scene(1e4, summits, cr.Material(1.0, 0.3))
+    >>> cr.press(scene, load=10.0).certificate.scope
+    'global'
+    """
+
+    _along: ClassVar[Along] = {
+        ("asperity",): (
+            "x", "y", "heights", "tip_radii", "prominences", "largest_curvatures",
+            "smallest_curvatures", "eccentricities", "elliptic_loads", "deviations",
+        ),
+    }  # fmt: skip
+
+    prominences: Array
+    largest_curvatures: Array
+    smallest_curvatures: Array
+    deviations: Array
+    pixels: Indices
+    origin: Origin
+
+    def __init__(
+        self,
+        positions: ArrayLike,
+        tip_radii: ArrayLike,
+        heights: ArrayLike,
+        prominences: Array,
+        largest_curvatures: Array,
+        smallest_curvatures: Array,
+        deviations: Array,
+        pixels: Indices,
+        origin: Origin,
+    ) -> None:
+        super().__init__(positions, tip_radii, heights)
+        own = {
+            "prominences": prominences,
+            "largest_curvatures": largest_curvatures,
+            "smallest_curvatures": smallest_curvatures,
+            "deviations": deviations,
+            "pixels": pixels,
+        }
+        for name, values in own.items():
+            object.__setattr__(self, name, frozen(np.array(values)))
+        object.__setattr__(self, "origin", origin)
+
+    @property
+    def x(self) -> Array:
+        """(n,) [length]"""
+        return self.positions[:, 0]
+
+    @property
+    def y(self) -> Array:
+        """(n,) [length]"""
+        return self.positions[:, 1]
+
+    @property
+    def eccentricities(self) -> Array:
+        """(n,) sqrt(1 - k2 / k1): 0 for a sphere, towards 1 for a ridge."""
+        return frozen(np.sqrt(1 - self.smallest_curvatures / self.largest_curvatures))
+
+    @property
+    def elliptic_loads(self) -> Array:
+        """(n,) load of the tip with both curvatures over that of its sphere, same indentation."""
+        return frozen(elliptic_load(self.largest_curvatures / self.smallest_curvatures))
+
+    @property
+    def statistics(self) -> Statistics:
+        """Density, curvature and heights, to hold against `origin.moments`."""
+        return Statistics(
+            density=len(self) / self.origin.area,
+            mean_curvature=float(np.mean(self.largest_curvatures + self.smallest_curvatures) / 2),
+            mean_height=float(self.heights.mean()) - self.origin.level,
+            height_std=float(self.heights.std()),
+        )
+
+    def pruned(self, prune: float) -> Summits:
+        """Those that are left at a stronger pruning.
+
+        Raises InputError for a weaker one, and where none is left.
+        """
+        prune = checks.between("prune", prune, self.origin.prune, 1.0)
+        keep = self.prominences >= prune * self.origin.max_height
+        more = self.origin.pruned + int(np.count_nonzero(~keep))
+        return self._chosen(keep, replace(self.origin, prune=prune, pruned=more))
+
+    def _chosen(self, keep: NDArray[np.bool_], origin: Origin) -> Summits:
+        if not keep.any():
+            found = f"none of {origin.maxima:,} maxima is left"
+            raise InputError("summits", found=found, expected="at least one: prune less")
+        columns: dict[str, Any] = self.__getstate__() | {"origin": None}
+        chosen = {name: values[keep] for name, values in columns.items() if values is not None}
+        return Summits(**chosen, origin=origin)
+
+
+def find_summits(heights: Array, found: Hills, origin: Origin, prune: float, fit: int) -> Summits:
+    """`Surface.summits`, of the hills of a map that `origin` describes."""
+    prune = checks.between("prune", prune, 0.0, 1.0)
+    fit = _checked_fit(fit, origin.shape)
+    prominent = found.prominences >= prune * origin.max_height
+    reach = fit // 2
+    (rows, columns), pixels = origin.shape, found.pixels
+    inside = (pixels >= reach).all(axis=1) & (pixels < (rows - reach, columns - reach)).all(axis=1)
+    tried = pixels[prominent & inside]
+    tips = fit_tips(heights, tried, origin.pixel, fit)
+    origin = replace(
+        origin,
+        prune=prune,
+        fit=fit,
+        maxima=len(pixels),
+        pruned=int(np.count_nonzero(~prominent)),
+        at_edge=int(np.count_nonzero(prominent & ~inside)),
+        without_top=int(np.count_nonzero(~tips.whole)),
+    )
+    if not tips.whole.any():
+        found_text = (
+            f"none of {origin.maxima:,} maxima: {origin.pruned:,} pruned, {origin.at_edge:,} at "
+            f"the edge, {origin.without_top:,} without a top"
+        )
+        raise InputError("summits", found=found_text, expected="at least one")
+    whole, (dx, dy) = tips.whole, origin.pixel
+    middle = np.column_stack((tried[:, 1] - (columns - 1) / 2, tried[:, 0] - (rows - 1) / 2))
+    k1, k2 = tips.curvatures[whole].T
+    return Summits(
+        positions=(middle * (dx, dy) + tips.offsets)[whole],
+        tip_radii=1 / np.sqrt(k1 * k2),
+        heights=tips.heights[whole],
+        prominences=found.prominences[prominent & inside][whole],
+        largest_curvatures=k1,
+        smallest_curvatures=k2,
+        deviations=tips.deviations[whole],
+        pixels=tried[whole],
+        origin=origin,
+    )
+
+
+def _checked_fit(fit: int, shape: tuple[int, int]) -> int:
+    if not isinstance(fit, (int, np.integer)) or isinstance(fit, bool) or fit < 3 or fit % 2 == 0:
+        raise InputError("fit", found=repr(fit), expected="an odd number of pixels, at least 3")
+    if min(shape) < fit:
+        found = f"{shape[1]} by {shape[0]} pixels"
+        raise InputError("map", found=found, expected=f"at least the {fit} by {fit} of a fit")
+    return int(fit)

@@ -1,0 +1,201 @@
+"""A measured surface: heights over a grid of pixels, and what was removed from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.arrays import Array, frozen
+from convexrough.drawn import Drawn
+from convexrough.errors import InputError
+from convexrough.record import Record
+from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
+from convexrough.surface.hills import Hills, hills
+from convexrough.surface.length_units import factor, known_unit
+from convexrough.surface.moments import Moments, moments_of
+from convexrough.surface.summits import Origin, Summits, find_summits
+
+#: Pixels longer than wide by more than this show no summits: eight neighbours are none.
+MOST_ASPECT = 10.0
+
+#: Part of the largest height that rounding may leave of a map that was all trend.
+ROUNDING = 64 * np.finfo(float).eps
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface(Record, Drawn):
+    """Heights over a grid whose middle is the origin.
+
+    heights : (ny, nx) [length] x grows with the column, y with the row; taller is positive
+    pixel   : (dx, dy) [length]; one number for squares
+    unit    : of all lengths, "" where nobody said
+    removed : what was taken from the heights, in this order
+    filled  : how many pixels were holes
+    source  : the file, or what made it
+
+    Raises InputError for maps that are constant or have holes, and for pixels more than ten times
+    as long as wide.
+
+    >>> surface = cr.surface.Surface(np.random.default_rng(1).normal(size=(64, 64)), pixel=0.5)
+    >>> surface.size
+    (32.0, 32.0)
+    """
+
+    heights: Array
+    pixel: tuple[float, float]
+    unit: str
+    removed: tuple[Removed, ...]
+    filled: int
+    source: str
+
+    def __init__(
+        self,
+        heights: ArrayLike,
+        pixel: float | tuple[float, float],
+        unit: str = "",
+        removed: tuple[Removed, ...] = (),
+        filled: int = 0,
+        source: str = "",
+    ) -> None:
+        object.__setattr__(self, "heights", _checked(heights))
+        object.__setattr__(self, "pixel", checked_pixel(pixel))
+        for name, value in (("unit", unit), ("removed", removed), ("filled", filled)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "source", source)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """[length] along x and y."""
+        rows, columns = self.heights.shape
+        return columns * self.pixel[0], rows * self.pixel[1]
+
+    @property
+    def max_height(self) -> float:
+        """[length] Sz of ISO 25178-2: from the lowest pixel to the highest."""
+        return float(np.ptp(self.heights))
+
+    @property
+    def rms_height(self) -> float:
+        """[length] Sq of ISO 25178-2, about the mean."""
+        return float(np.std(self.heights))
+
+    @property
+    def rms_slope(self) -> float:
+        """Root mean square of the slope |grad z|, by differences of neighbours."""
+        return float(np.sqrt(2 * self.moments.m2))
+
+    @cached_property
+    def moments(self) -> Moments:
+        """Spectral moments, and the summits that a Gaussian surface with them would have."""
+        return moments_of(self.heights, self.pixel)
+
+    @cached_property
+    def hills(self) -> Hills:
+        """Every maximum, and its prominence: what any pruning begins with."""
+        return hills(self.heights)
+
+    def detrend(self, kind: Trend = "plane") -> Surface:
+        """Without the best plane, or the best sphere: the sphere of a scene is no roughness.
+
+        What is taken away is the last of `removed`. Raises InputError where nothing is left.
+
+        >>> ball = cr.surface.Surface(-np.hypot(*np.mgrid[-8:9, -8:9]) ** 2 / 200, pixel=1.0)
+        >>> print(ball.detrend("plane").detrend("sphere").removed[1].kind)
+        sphere
+        """
+        if kind not in TRENDS:
+            raise InputError("detrend", found=repr(kind), expected='"plane" or "sphere"')
+        trend, there = fitted(self.heights, self.pixel, kind)
+        left = self.heights - there
+        if np.ptp(left) <= ROUNDING * float(np.abs(self.heights).max()):
+            raise InputError("heights", found=f"nothing but a {kind}", expected="a rough surface")
+        return replace(self, heights=left, removed=(*self.removed, trend))
+
+    def to_unit(self, unit: str) -> Surface:
+        """The same surface with all lengths in another unit.
+
+        Raises InputError where the unit of this one is not known.
+
+        >>> scan = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, unit="µm")
+        >>> print(f"{scan.to_unit('mm').size[0]:g}")
+        0.256
+        """
+        into = known_unit("unit", unit)
+        if not self.unit or not into:
+            found = "none" if not self.unit else "none to convert to"
+            raise InputError("unit", found=found, expected="a unit of length of the map")
+        scale = factor(self.unit, into)
+        removed = [
+            replace(each, height=each.height * scale, curvature=each.curvature / scale)
+            for each in self.removed
+        ]
+        dx, dy = self.pixel
+        return replace(self, heights=self.heights * scale, pixel=(dx * scale, dy * scale),
+                       unit=into, removed=tuple(removed))  # fmt: skip
+
+    def summits(self, prune: float = 0.05, fit: int = 3) -> Summits:
+        """The summits, tallest hill first, as asperities about the middle of the map.
+
+        prune : hills less prominent than this part of `max_height` are joined to their taller
+            neighbours: Wolf pruning, ISO 25178-2
+        fit   : pixels across the square about each maximum to which a paraboloid is fitted
+
+        Hills whose maximum is so near to the edge that this square does not fit in the map, and
+        those whose paraboloid has no top in its square, are left out: `origin` counts them.
+
+        Raises InputError for maps smaller than the square, and where no summit is left.
+
+        >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(prune=0.05)
+        >>> len(summits), summits.origin.pruned
+        (129, 191)
+        """
+        origin = Origin(
+            source=self.source,
+            shape=(self.heights.shape[0], self.heights.shape[1]),
+            pixel=self.pixel,
+            unit=self.unit,
+            removed=self.removed,
+            filled=self.filled,
+            level=float(self.heights.mean()),
+            max_height=self.max_height,
+            moments=self.moments,
+        )
+        return find_summits(self.heights, self.hills, origin, prune, fit)
+
+
+def checked_pixel(pixel: float | tuple[float, float]) -> tuple[float, float]:
+    """Both sizes of a pixel, of a shape that has neighbours."""
+    both = pixel if isinstance(pixel, (tuple, list)) else (pixel, pixel)
+    if len(both) != 2:
+        raise InputError("pixel", found=f"{len(both)} numbers", expected="one, or that of x and y")
+    dx, dy = (checks.positive("pixel", each) for each in both)
+    if max(dx, dy) > MOST_ASPECT * min(dx, dy):
+        found = f"{dx:g} by {dy:g}"
+        raise InputError("pixel", found=found, expected=f"sides at most 1 to {MOST_ASPECT:g}")
+    return dx, dy
+
+
+def _checked(heights: ArrayLike) -> Array:
+    try:
+        if np.iscomplexobj(heights) or np.asarray(heights).dtype.kind in "USVO":
+            raise TypeError("no real numbers")
+        grid = np.array(heights, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError("heights", found=repr(heights)[:60], expected="numbers") from error
+    if grid.ndim != 2 or min(grid.shape) < 3:
+        expected = "rows and columns, at least 3 of each"
+        raise InputError("heights", found=f"shape {grid.shape}", expected=expected)
+    if holes := np.count_nonzero(np.isnan(grid)):
+        found = f"{holes:,} holes (nan) in {grid.size:,} pixels"
+        raise InputError("heights", found=found, expected="none, or leave to fill them")
+    if not (good := np.abs(grid) <= checks.LARGEST).all():
+        row, column = np.argwhere(~good)[0]
+        found = f"{grid[row, column]} in row {row}, column {column}"
+        raise InputError("heights", found=found, expected="finite numbers")
+    if np.ptp(grid) <= ROUNDING * float(np.abs(grid).max()):
+        raise InputError("heights", found=f"{grid[0, 0]:g} everywhere", expected="a rough surface")
+    return frozen(grid)

@@ -1,0 +1,95 @@
+"""The shape of a tip: a paraboloid through the pixels about a maximum, and what a sphere misses."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import elementwise
+from scipy.special import ellipe, ellipkm1
+
+from convexrough.arrays import Array, Indices
+
+
+class Tips(NamedTuple):
+    """Paraboloids about maxima, of which those that are not `whole` stand for nothing.
+
+    offsets    : (n, 2) [length] x and y of the top from the pixel of the maximum
+    heights    : (n,) [length] of the top
+    curvatures : (n, 2) [1/length] principal curvatures there, the larger first
+    deviations : (n,) [length] root-mean-square distance of the pixels from the sphere at the top
+    whole      : (n,) curved downwards in every direction, the top among the pixels
+    """
+
+    offsets: Array
+    heights: Array
+    curvatures: Array
+    deviations: Array
+    whole: NDArray[np.bool_]
+
+
+def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across: int) -> Tips:
+    """Least-squares paraboloids over `across` by `across` pixels about each maximum.
+
+    pixels : (n, 2) row and column, each at least across // 2 from the edges of the map
+    pixel  : along x and y [length]
+
+    z = z0 + g.r + r.H.r / 2 has its top at -H^-1 g, and there the principal curvatures of -H.
+    """
+    reach = across // 2
+    down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so that all are about 1
+    terms = np.column_stack((np.ones(len(u)), u, v, u * u / 2, u * v, v * v / 2))
+    around = heights[pixels[:, :1] + down, pixels[:, 1:] + right]
+    z0, gu, gv, huu, huv, hvv = np.linalg.pinv(terms) @ around.T
+    determinant = huu * hvv - huv**2
+    whole = (determinant > 0) & (huu < 0)
+    solid = np.where(whole, determinant, 1.0)
+    top = np.stack(((huv * gv - hvv * gu) / solid, (huv * gu - huu * gv) / solid))
+    whole &= (np.abs(top) <= reach).all(axis=0)
+
+    dx, dy = pixel
+    hxx, hxy, hyy = huu / dx**2, huv / (dx * dy), hvv / dy**2
+    middle, half = -(hxx + hyy) / 2, np.hypot((hxx - hyy) / 2, hxy)
+    product = np.where(whole, determinant, 1.0) / (dx * dy) ** 2
+    larger = np.where(whole, middle + half, 1.0)
+    curvatures = np.stack((larger, product / larger), axis=1)  # no difference of near equals
+    summits = z0 + (gu * top[0] + gv * top[1]) / 2
+    x, y = (right - top[0][:, None]) * dx, (down - top[1][:, None]) * dy
+    sphere = summits[:, None] - np.sqrt(product)[:, None] * (x * x + y * y) / 2
+    deviations = np.sqrt(np.mean((around - sphere) ** 2, axis=1))
+    return Tips(
+        np.stack((top[0] * dx, top[1] * dy), axis=1), summits, curvatures, deviations, whole
+    )
+
+
+def elliptic_load(ratio: Array) -> Array:
+    """(n,) load of a Hertz contact over that of the sphere of radius 1 / sqrt(k1 k2).
+
+    At the same indentation, on a flat. ratio : (n,) k1 / k2, at least 1
+
+    With b / a the ratio of the half axes of the contact and K, E elliptic integrals of
+    1 - (b / a)^2,
+
+        k1 / k2 = (E (a/b)^2 - K) / (K - E),
+
+    the indentation is F2 times that of the sphere under the same load, and load grows as
+    indentation^(3/2) (Johnson 1985, eqs 4.26 to 4.28).
+    """
+    flattened = np.array(np.maximum(ratio, 1.0), dtype=np.float64)
+    round_enough = flattened < 1 + 1e-7  # off by less than the square of that
+    wanted = np.where(round_enough, 2.0, flattened)
+
+    def excess(log_axes: Array, wanted: Array) -> Array:
+        squared = np.exp(2 * log_axes)
+        K, E = ellipkm1(squared), ellipe(1 - squared)
+        return np.log((E / squared - K) / (K - E)) - np.log(wanted)
+
+    low, high = np.log(1 / wanted) - 1.0, np.full_like(wanted, -1e-9)
+    axes = np.exp(elementwise.find_root(excess, (low, high), args=(wanted,)).x)
+    K, E = ellipkm1(axes**2), ellipe(1 - axes**2)
+    product = (E / axes**2 - K) * (K - E)
+    F1 = np.cbrt(4 / (np.pi * (1 - axes**2)) * axes**1.5 * np.sqrt(product))
+    F2 = 2 / np.pi * np.sqrt(axes) * K / F1
+    return np.where(round_enough, 1.0, F2**-1.5)

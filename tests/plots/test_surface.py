@@ -1,0 +1,84 @@
+"""The figures of a surface say what the surface says, and nothing in them collides."""
+
+import numpy as np
+import pytest
+from drawn import discs, fits, words
+from numpy.testing import assert_allclose
+from scenes import MATERIAL
+
+import convexrough as cr
+from convexrough.plots import provability_figure, surface_figures
+
+MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384, unit="µm")
+MAXIMA = MAP.summits(0.0)
+
+
+def press(asperities: cr.Asperities, load: float = 300.0) -> cr.Contact:
+    return cr.press(cr.Scene(1e4, asperities, MATERIAL, geometry="closest"), load=load)
+
+
+def said(figure: object) -> set[str]:
+    return {text.get_text() for text in words(figure)}  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("load", [1.0, 300.0, 1000.0])
+def test_figures_fit(load: float) -> None:
+    summits = MAXIMA.pruned(0.02)
+    curve = cr.surface.provability(MAXIMA, lambda left: press(left, load))
+    contact = press(summits, load)
+    figures = surface_figures(MAP, MAXIMA, summits, curve, contact)
+    assert set(figures) == {"map", "histograms", "provability"}
+    for figure in figures.values():
+        fits(figure)
+    touching = int((contact.loads > 0).sum())
+    chart = figures["map"].axes[0]
+    assert discs(chart, "_contacts") == touching
+    assert {f"summits ({len(summits):,})", f"contacts ({touching:,})"} <= said(figures["map"])
+    pairs, _ = cr.surface.crowded(contact)
+    named = {f"{i}, {j}" for i, j in pairs[:1]}
+    assert named <= said(figures["map"])
+
+
+def test_a_map_alone() -> None:
+    figures = surface_figures(MAP, MAXIMA, MAXIMA.pruned(0.05))
+    assert set(figures) == {"map", "histograms"}
+    for figure in figures.values():
+        fits(figure)
+    chart = figures["map"].axes[0]
+    assert chart.get_xlabel() == "$x$  [µm]"
+    assert_allclose(chart.get_xlim(), (-192, 192))
+    shown = chart.images[0].get_array()
+    np.testing.assert_array_equal(shown, MAP.heights)
+    dots = chart.lines[0].get_xydata()
+    np.testing.assert_array_equal(dots, MAXIMA.pruned(0.05).positions)
+
+
+def test_the_curve_is_drawn_where_it_is() -> None:
+    curve = cr.surface.provability(MAXIMA, press)
+    figure = provability_figure(curve, 0.05, "µm")
+    upper, middle, lower = figure.axes
+    at, contacts = upper.lines[1].get_data()
+    assert_allclose(np.square(at), curve.prune, atol=1e-15)
+    assert_allclose(contacts, curve.contacts)
+    assert_allclose(middle.lines[0].get_ydata(), curve.crowding)
+    assert_allclose(lower.lines[0].get_ydata(), 100 * curve.model_error)
+    title = upper.get_title(loc="left")
+    assert title.startswith(f"to be trusted: from {100 * curve.trusted_from:.3g} %")
+
+
+def test_histograms_count_every_summit() -> None:
+    summits = MAXIMA.pruned(0.05)
+    figure = surface_figures(MAP, MAXIMA, summits)["histograms"]
+    for axes in figure.axes:
+        bars = sum(patch.get_height() for patch in axes.patches if hasattr(patch, "get_height"))
+        assert bars == len(summits)
+
+
+def test_one_summit() -> None:
+    y, x = np.mgrid[:9, :9] - 4.0
+    one = cr.surface.Surface(-(x**2) - y**2, 1.0)
+    summits = one.summits()
+    assert len(summits) == 1
+    curve = cr.surface.provability(summits, lambda left: press(left, 1e-3), levels=[0.1])
+    for figure in surface_figures(one, summits, summits, curve, press(summits, 1e-3)).values():
+        fits(figure)

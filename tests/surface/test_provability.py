@@ -1,0 +1,107 @@
+"""How strongly to prune: the curve, and who is named."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import convexrough as cr
+from convexrough.errors import SolverError
+from convexrough.surface import crowded, model_errors, provability
+
+MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384)
+
+
+def press(asperities: cr.Asperities) -> cr.Contact:
+    scene = cr.Scene(1e4, asperities, cr.Material(1.0, 0.3), geometry="closest")
+    return cr.press(scene, load=300.0)
+
+
+def test_each_level_is_a_press() -> None:
+    summits = MAP.summits(0.0)
+    told: list[str] = []
+    curve = provability(summits, press, levels=[0.2, 0.0, 0.05, 0.05], announce=told.append)
+    assert curve.prune.tolist() == [0.0, 0.05, 0.2]
+    assert len(told) == 3
+    for i, prune in enumerate(curve.prune):
+        left = MAP.summits(float(prune))
+        contact = press(left)
+        assert curve.summits[i] == len(left)
+        assert curve.heights[i] == prune * MAP.max_height
+        assert curve.scope[i] == contact.certificate.scope
+        assert_allclose(curve.crowding[i], contact.crowding, rtol=1e-9)
+        assert_allclose(curve.model_error[i], contact.model_error, rtol=1e-6)
+        assert_allclose(curve.approaches[i], contact.approach, rtol=1e-9)
+        if contact.certificate.holds:
+            assert curve.contacts[i] == (contact.status == "contact").sum()
+            assert curve.undecided[i] == 0
+
+
+def test_stronger_pruning_leaves_the_model_room() -> None:
+    """Here the weakest pruning overlaps, and the default is the other way."""
+    curve = provability(MAP.summits(0.0), press)
+    assert curve.crowding[0] > 1
+    assert not curve.trusted[0]
+    assert curve.trusted[-1]
+    first = curve.prune.tolist().index(curve.trusted_from)
+    assert curve.trusted[first:].all()
+    assert not curve.trusted[first - 1]
+    assert (np.diff(curve.summits) < 0).all()
+
+
+def test_where_nothing_is_left_the_curve_ends() -> None:
+    curve = provability(MAP.summits(0.0), press, levels=[0.1, 0.95, 1.0])
+    assert curve.prune[-1] in (0.95, 1.0)
+    pruned = MAP.summits(0.1)
+    with pytest.raises(cr.InputError, match=r"prune: found 0\.05, expected a number from 0\.1"):
+        provability(pruned, press, levels=[0.05])
+
+
+def test_a_solver_that_fails_is_a_level_without_trust() -> None:
+    def fails(asperities: cr.Asperities) -> cr.Contact:
+        if len(asperities) > 100:
+            raise SolverError("no step", solver="newton")
+        return press(asperities)
+
+    curve = provability(MAP.summits(0.0), fails, levels=[0.0, 0.2])
+    assert curve.scope.tolist() == ["failed", "global"]
+    assert curve.trusted.tolist() == [False, True]
+    assert np.isnan(curve.crowding[0])
+    assert curve.trusted_from == 0.2
+    curve.plot().figure.canvas.draw()
+    never = provability(MAP.summits(0.0), fails, levels=[0.0])
+    assert np.isnan(never.trusted_from)
+
+
+@pytest.mark.parametrize("above", [0.2, 0.5, 1.0])
+def test_crowded_pairs_are_all_of_them(above: float) -> None:
+    contact = press(MAP.summits(0.0))
+    points, a = contact.scene.contact_points, contact.contact_radii
+    expected = {
+        (i, j): (a[i] + a[j]) / np.hypot(*(points[i] - points[j]))
+        for i, j in combinations(np.flatnonzero(a).tolist(), 2)
+    }
+    expected = {pair: value for pair, value in expected.items() if value > above}
+    pairs, values = crowded(contact, above=above)
+    assert {tuple(sorted(pair)) for pair in pairs.tolist()} == set(expected)
+    assert (np.diff(values) <= 0).all()
+    for (i, j), value in zip(pairs.tolist(), values, strict=True):
+        assert_allclose(value, expected[min(i, j), max(i, j)], rtol=1e-12)
+    if expected:
+        assert_allclose(values[0], contact.crowding, rtol=1e-12)
+
+
+def test_the_largest_model_error_is_that_of_the_contact() -> None:
+    contact = press(MAP.summits(0.0))
+    errors = model_errors(contact)
+    assert_allclose(errors.max(), contact.model_error, rtol=1e-6)
+    assert (errors[contact.loads == 0] == 0).all()
+    assert (errors[contact.loads > 0] > 0).all()
+
+
+def test_who_touches_alone_is_in_nobodys_way() -> None:
+    one = cr.press(cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), cr.Material(1, 0.3)), approach=1e-5)
+    pairs, values = crowded(one)
+    assert len(pairs) == len(values) == 0
+    assert model_errors(one).tolist() == [0.0]

@@ -1,0 +1,217 @@
+"""Files of maps as people have them, and as they should not be."""
+
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+from warnings import catch_warnings
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import convexrough as cr
+
+HEIGHTS = np.random.default_rng(3).normal(size=(7, 9))
+Y, X = np.mgrid[:7, :9]
+
+
+def raw(path: Path, **options: Any) -> cr.surface.Surface:
+    return cr.surface.read(path, detrend=None, **options)
+
+
+def text(folder: Path, content: str, name: str = "map.txt") -> Path:
+    path = folder / name
+    path.write_text(content, encoding="utf-8")
+    return path
+
+
+def matrix(heights: Any = HEIGHTS, separator: str = " ", ending: str = "\n") -> str:
+    return "".join(separator.join(map(repr, row)) + ending for row in np.asarray(heights).tolist())
+
+
+def test_arrays(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", HEIGHTS)
+    surface = raw(tmp_path / "a.npy", pixel=2.0, unit="um")
+    assert_array_equal(surface.heights, HEIGHTS)
+    assert (surface.pixel, surface.unit, surface.filled) == ((2.0, 2.0), "µm", 0)
+    assert surface.source == str(tmp_path / "a.npy")
+    np.savez(tmp_path / "a.npz", heights=HEIGHTS, pixel=[2.0, 3.0], unit="mm", height_unit="µm")
+    surface = raw(tmp_path / "a.npz")
+    assert (surface.pixel, surface.unit) == ((2.0, 3.0), "mm")
+    assert_allclose(surface.heights, 1e-3 * HEIGHTS, rtol=1e-15)
+    np.savez(tmp_path / "b.npz", whatever=HEIGHTS.astype(np.float32), other=np.zeros(3))
+    assert_array_equal(raw(tmp_path / "b.npz", pixel=1.0).heights, HEIGHTS.astype(np.float32))
+    np.save(tmp_path / "i.npy", (100 * HEIGHTS).astype(np.int16))
+    assert raw(tmp_path / "i.npy", pixel=50.0).heights.dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    ("separator", "ending"), [(" ", "\n"), ("\t", "\r\n"), (",", "\n"), (";", ";\n"), (", ", "\n")]
+)
+def test_matrices(tmp_path: Path, separator: str, ending: str) -> None:
+    path = text(tmp_path, matrix(separator=separator, ending=ending), "map.csv")
+    assert_array_equal(raw(path, pixel=1.0).heights, HEIGHTS)
+
+
+def test_decimal_commas_and_fortran(tmp_path: Path) -> None:
+    german = matrix(separator=";").replace(".", ",")
+    assert_array_equal(raw(text(tmp_path, german), pixel=1.0).heights, HEIGHTS)
+    fortran = "\n".join(" ".join(f"{v:.17e}".replace("e", "D") for v in row) for row in HEIGHTS)
+    assert_array_equal(raw(text(tmp_path, fortran), pixel=1.0).heights, HEIGHTS)
+
+
+def test_what_gwyddion_writes(tmp_path: Path) -> None:
+    head = "# Channel: Height\n# Width: 18.0 µm\n# Height: 21.0 µm\n# Value units: nm\n"
+    surface = raw(text(tmp_path, head + matrix(1e2 * HEIGHTS, "\t")))
+    assert (surface.pixel, surface.unit) == ((2.0, 3.0), "µm")
+    assert_allclose(surface.heights, 0.1 * HEIGHTS, rtol=1e-14)
+
+
+@pytest.mark.parametrize("header", ["x [mm], y [mm], z [µm]\n", "x,y,height\n", ""])
+def test_lists(tmp_path: Path, header: str) -> None:
+    rows = np.column_stack((10 * X.ravel() + 3, 20 * Y.ravel(), HEIGHTS.ravel()))
+    rows = np.random.default_rng(0).permutation(rows)
+    surface = raw(text(tmp_path, header + matrix(rows, ","), "list.csv"))
+    assert_allclose(surface.pixel, (10, 20), rtol=1e-12)
+    named = "µm" in header
+    assert surface.unit == ("mm" if named else "")
+    assert_allclose(surface.heights, HEIGHTS * (1e-3 if named else 1), rtol=1e-14)
+
+
+def test_lists_with_holes(tmp_path: Path) -> None:
+    rows = np.column_stack((X.ravel(), Y.ravel(), HEIGHTS.ravel()))[np.arange(63) != 30]
+    path = text(tmp_path, "x,y,z\n" + matrix(rows, ","), "list.csv")
+    with pytest.raises(cr.InputError, match=r"found 1 holes \(nan\) in 63 pixels, expected none"):
+        raw(path)
+    surface = raw(path, fill=True)
+    assert surface.filled == 1
+    around = HEIGHTS[[2, 4, 3, 3], [3, 3, 2, 4]]
+    assert_allclose(surface.heights[3, 3], around.mean())
+
+
+def test_a_file_is_levelled_unless_asked(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", HEIGHTS + 5 * X + 2 * Y)
+    surface = cr.surface.read(tmp_path / "a.npy", pixel=10.0)
+    assert surface.removed[0].kind == "plane"
+    assert_allclose(surface.removed[0].slopes, (0.5, 0.2), atol=0.05)
+    assert raw(tmp_path / "a.npy", pixel=10.0).removed == ()
+    assert surface.summits(0.0, 3).origin.removed == surface.removed
+
+
+HOLED = np.where(X == Y, np.nan, HEIGHTS)
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "message"),
+    [
+        (matrix(), {}, "pixel: found none, expected its size, as the file does not say"),
+        (matrix(HOLED), {"pixel": 1.0}, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
+        (matrix(np.full((7, 9), np.nan)), {"pixel": 1.0, "fill": True}, "expected some heights"),
+        (matrix(np.ones((7, 9))), {"pixel": 1.0}, "found 1 everywhere, expected a rough surface"),
+        (matrix(1e9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
+        (matrix(1e-9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
+        (matrix(), {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
+        (matrix(), {"pixel": 1.0, "unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
+        (matrix(), {"pixel": 1.0, "height_unit": "nm"}, "unit: found none, expected that of a pix"),
+        (
+            "# Width: 9 µm\n# Height: 7 µm\n" + matrix(),
+            {"unit": "nm"},
+            "unit: found nm, expected ",
+        ),
+        ("# Width: 9 µm\n# Height: 7 nm\n" + matrix(), {}, "units: found µm and nm, expected one"),
+        ("# Width: 9 m\n# Height: 7 m\n" + matrix(), {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
+        ("# Value units: V\n" + matrix(), {"pixel": 1.0, "unit": "m"}, "height_unit: found 'V'"),
+        (matrix().replace("\n", "\nx ", 1), {"pixel": 1.0}, "row 2, column 1: height: found 'x'"),
+        (matrix() + "1 2\n", {"pixel": 1.0}, "row 8: cells: found 2, expected 9, as in the first"),
+        ("a b c\n" + matrix(), {"pixel": 1.0}, "columns: found a, b, c, expected columns x, y and"),
+        (
+            "x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n",
+            {},
+            "x, y: found a place twice, expected each",
+        ),
+        ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected places"),
+        ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
+        ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
+        ("", {}, "empty"),
+        ("x,y,z\n", {}, "no rows below the header"),
+        ("1 2 3 4\n", {"pixel": 1.0}, "shape"),
+    ],
+)
+def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -> None:
+    path = text(tmp_path, content)
+    with pytest.raises(cr.ConvexroughError, match=message) as caught:
+        cr.surface.read(path, **options)
+    assert str(caught.value).count(str(path)) == 1
+
+
+def test_wrong_arrays(tmp_path: Path) -> None:
+    def refused(name: str, message: str, **options: Any) -> None:
+        with pytest.raises(cr.ConvexroughError, match=message) as caught:
+            raw(tmp_path / name, **options)
+        assert str(caught.value).count(str(tmp_path / name)) == 1
+
+    refused("missing.npy", "cannot be read: No such file")
+    np.save(tmp_path / "one.npy", HEIGHTS[0])
+    refused("one.npy", "expected rows and columns", pixel=1.0)
+    np.save(tmp_path / "words.npy", np.array([["a"]]))
+    refused("words.npy", "found an array of <U1", pixel=1.0)
+    np.save(tmp_path / "object.npy", np.array([[None]]), allow_pickle=True)
+    refused("object.npy", "not an .npy file", pixel=1.0)
+    np.savez(tmp_path / "two.npz", a=HEIGHTS, b=HEIGHTS)
+    refused("two.npz", 'arrays: found a, b, expected one called "heights"', pixel=1.0)
+    (tmp_path / "no.npz").write_bytes(b"PK\x03\x04 rubbish")
+    refused("no.npz", "not an .npz file", pixel=1.0)
+    (tmp_path / "no.csv").write_bytes(b"PK\x03\x04 rubbish")
+    refused("no.csv", "an archive or an Excel workbook", pixel=1.0)
+
+
+def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+    (tmp_path / "a.gwy").write_bytes(b"GWYP")
+    with pytest.raises(cr.FileError, match=r"a.gwy: needs SurfaceTopography: .*\[surface\]"):
+        cr.surface.read(tmp_path / "a.gwy")
+
+
+def topographies() -> Any:
+    with catch_warnings(action="ignore", category=ImportWarning):
+        return import_module("SurfaceTopography")
+
+
+@pytest.mark.skipif(find_spec("SurfaceTopography") is None, reason="the extra surface is missing")
+class TestInstruments:
+    """Round trips through formats that SurfaceTopography writes, too."""
+
+    def written(self, path: Path, heights: Any = HEIGHTS, unit: str = "µm") -> Path:
+        topography = topographies().Topography(heights.T, (18.0, 21.0), unit=unit)
+        {".nc": topography.to_netcdf, ".x3p": topography.to_x3p, ".gwy": topography.to_gwy}[
+            path.suffix
+        ](str(path))
+        return path
+
+    @pytest.mark.parametrize("kind", ["nc", "x3p", "gwy"])
+    def test_a_map_comes_back(self, tmp_path: Path, kind: str) -> None:
+        surface = raw(self.written(tmp_path / f"a.{kind}"), unit=None)
+        scale = {"m": 1e-6, "µm": 1.0}[surface.unit]
+        assert_allclose(surface.pixel, (2.0 * scale, 3.0 * scale), rtol=1e-9)
+        assert_allclose(surface.heights, scale * HEIGHTS, rtol=1e-6, atol=1e-7 * scale)
+
+    def test_its_unit_is_held_to(self, tmp_path: Path) -> None:
+        with pytest.raises(cr.InputError, match=r"a\.nc: unit: found mm, expected µm, as the file"):
+            raw(self.written(tmp_path / "a.nc"), unit="mm")
+
+    def test_masked_pixels_are_holes(self, tmp_path: Path) -> None:
+        masked = np.ma.masked_array(HEIGHTS, X == 4)
+        path = self.written(tmp_path / "a.x3p", masked)
+        with pytest.raises(cr.InputError, match=r"7 holes \(nan\) in 63 pixels"):
+            raw(path)
+        assert raw(path, fill=True).filled == 7
+
+    def test_no_such_format(self, tmp_path: Path) -> None:
+        path = tmp_path / "a.bin"
+        path.write_bytes(b"\1\2\3" * 50)
+        with pytest.raises(cr.FileError, match=r"a\.bin: no format that SurfaceTopography knows"):
+            raw(path)
+        with pytest.raises(cr.FileError, match="cannot be read: No such file"):
+            raw(tmp_path / "b.gwy")

@@ -1,0 +1,134 @@
+"""Maps: what is removed, what they are like, and what is no map."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import convexrough as cr
+from convexrough.surface.holes import filled
+
+RNG = np.random.default_rng(5)
+NOISE = 1e-3 * RNG.standard_normal((40, 60))
+
+
+def grid(shape: tuple[int, int] = (40, 60), pixel: tuple[float, float] = (0.5, 0.7)):  # type: ignore[no-untyped-def]
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(float)
+    return (x - (shape[1] - 1) / 2) * pixel[0], (y - (shape[0] - 1) / 2) * pixel[1]
+
+
+def test_a_plane_is_removed_and_said() -> None:
+    x, y = grid()
+    plane = cr.surface.Surface(3 + 0.2 * x - 0.1 * y + NOISE, (0.5, 0.7)).detrend()
+    removed = plane.removed[0]
+    assert removed.kind == "plane"
+    assert_allclose(removed.slopes, (0.2, -0.1), atol=1e-4)
+    assert_allclose(removed.height, 3.0, atol=1e-3)
+    assert removed.radius == np.inf
+    left = plane.heights
+    for term in (np.ones_like(x), x, y):  # a least-squares fit leaves nothing of its terms
+        assert abs(np.vdot(left, term)) < 1e-9
+    assert_allclose(plane.rms_height, NOISE.std(), rtol=1e-2)
+
+
+@pytest.mark.parametrize("radius", [25.0, -25.0, 400.0])
+def test_a_sphere_is_removed_and_said(radius: float) -> None:
+    """A deep cap, half as steep as it can be, off the middle; a bowl; and nearly a plane."""
+    x, y = grid()
+    cap = np.sign(radius) * np.sqrt(radius**2 - (x - 2) ** 2 - (y + 1) ** 2)
+    exact = cr.surface.Surface(cap + 1e-9 * NOISE, (0.5, 0.7)).detrend("sphere")
+    removed = exact.removed[0]
+    assert_allclose(removed.radius, radius, rtol=1e-9)
+    assert_allclose(removed.height, cap[19:21, 29:31].mean(), rtol=1e-3)
+    assert exact.max_height < 2e-11
+    rough = cr.surface.Surface(cap + NOISE, (0.5, 0.7)).detrend("sphere")
+    assert_allclose(rough.removed[0].radius, radius, rtol=5e-3)
+    assert_allclose(rough.rms_height, NOISE.std(), rtol=1e-2)
+
+
+def test_removals_are_remembered_in_their_order() -> None:
+    x, y = grid()
+    cap = np.sqrt(50**2 - x**2 - y**2) + 0.1 * x + NOISE
+    both = cr.surface.Surface(cap, (0.5, 0.7)).detrend("plane").detrend("sphere")
+    assert [each.kind for each in both.removed] == ["plane", "sphere"]
+    assert "radius" in str(both.removed[1])
+    assert both.summits(0.3).origin.removed == both.removed
+
+
+def test_moments_of_plain_waves() -> None:
+    """z = A sin(q x): m2 = A^2 q^2 / 4 as the mean of x and y, up to the differences."""
+    x, _ = grid((200, 2000), (0.01, 0.01))
+    surface = cr.surface.Surface(0.3 * np.sin(2 * np.pi * x), 0.01)
+    q = 2 * np.pi
+    assert_allclose(surface.moments.m0, 0.3**2 / 2, rtol=1e-3)
+    assert_allclose(surface.moments.m2, 0.3**2 * q**2 / 4, rtol=2e-3)
+    assert_allclose(surface.moments.m4, 0.3**2 * q**4 / 4, rtol=2e-3)
+    assert surface.moments.slope_ratio == 0.0
+
+
+def test_the_bandwidth_of_one_wavelength() -> None:
+    """Waves of one length in all directions: alpha is the least there is, 1.5."""
+    moments = cr.surface.self_affine_moments(0.5, 0.1, 64.0, pixels=1024, cutoff=512 / 10.0)
+    narrow = cr.surface.Moments(1.0, 0.5, 3 / 8)  # q = 1: means of cos^2 and cos^4
+    assert narrow.bandwidth == 1.5
+    assert moments.bandwidth > 1.5
+
+
+@pytest.mark.parametrize(
+    ("heights", "message"),
+    [
+        (np.full((5, 5), 2.0), "found 2 everywhere, expected a rough surface"),
+        (np.zeros((5, 5)), "found 0 everywhere, expected a rough surface"),
+        (np.where(np.eye(5) > 0, np.nan, NOISE[:5, :5]), r"5 holes \(nan\) in 25 pixels"),
+        (np.where(np.eye(5) > 0, np.inf, NOISE[:5, :5]), "inf in row 0, column 0"),
+        (NOISE[0], r"shape \(60,\), expected rows and columns"),
+        (NOISE[:2], r"shape \(2, 60\), expected rows and columns, at least 3"),
+        ([["a", "b"], ["c", "d"]], "expected numbers"),
+        (NOISE * 1j, "expected numbers"),
+    ],
+)
+def test_no_map(heights: object, message: str) -> None:
+    with pytest.raises(cr.InputError, match=message):
+        cr.surface.Surface(heights, 1.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("pixel", "message"),
+    [
+        (0.0, "positive"),
+        ((1.0, -1.0), "positive"),
+        ((1.0, 20.0), "found 1 by 20, expected sides at most 1 to 10"),
+        ((1.0, 1.0, 1.0), "found 3 numbers"),
+        ("1", "positive number"),
+    ],
+)
+def test_no_pixel(pixel: object, message: str) -> None:
+    with pytest.raises(cr.InputError, match=message):
+        cr.surface.Surface(NOISE, pixel)  # type: ignore[arg-type]
+
+
+def test_nothing_but_trend() -> None:
+    x, y = grid()
+    with pytest.raises(cr.InputError, match="found nothing but a plane, expected a rough surface"):
+        cr.surface.Surface(1 + 0.1 * x + y, (0.5, 0.7)).detrend()
+    with pytest.raises(
+        cr.InputError, match='detrend: found \'cone\', expected "plane" or "sphere"'
+    ):
+        cr.surface.Surface(NOISE, 1.0).detrend("cone")  # type: ignore[arg-type]
+
+
+def test_holes_become_soap_films() -> None:
+    """A harmonic map comes back as it was, and no filled pixel is a maximum."""
+    x, y = grid()
+    saddle = x**2 / 0.25 - y**2 / 0.49  # harmonic for the pixels, too
+    holed = saddle.copy()
+    holed[10:20, 5:30] = holed[30, 40] = np.nan
+    assert_allclose(filled(holed), saddle, atol=1e-8 * np.ptp(saddle))
+    rough = RNG.standard_normal((30, 30))
+    rough[RNG.random((30, 30)) < 0.4] = np.nan
+    rough[:6, :6] = np.nan  # a corner, where neighbours are missing
+    mended = filled(rough)
+    at = cr.surface.Surface(mended, 1.0).summits(0.0).pixels
+    assert not np.isnan(rough[tuple(at.T)]).any()
+    assert np.nanmin(rough) <= mended.min()
+    assert mended.max() <= np.nanmax(rough)
+    assert_allclose(mended[~np.isnan(rough)], rough[~np.isnan(rough)], rtol=0)

@@ -1,0 +1,77 @@
+"""Paraboloids where they are exact, and the elliptic contact by quadrature."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+
+from convexrough.surface.tips import elliptic_load, fit_tips
+
+PIXEL = (0.5, 0.3)
+
+
+@pytest.mark.parametrize("across", [3, 5, 7])
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
+def test_a_paraboloid_is_found_exactly(across: int, scale: float) -> None:
+    """Whatever the unit: top, height and both principal curvatures, of a turned paraboloid."""
+    dx, dy = PIXEL[0] * scale, PIXEL[1] * scale
+    x, y = np.meshgrid(np.arange(-5, 6) * dx, np.arange(-4, 5) * dy)
+    x0, y0, angle, k1, k2 = 0.3 * dx, -0.4 * dy, 0.7, 3.0 / scale, 0.4 / scale
+    u = np.cos(angle) * (x - x0) + np.sin(angle) * (y - y0)
+    v = np.cos(angle) * (y - y0) - np.sin(angle) * (x - x0)
+    heights = 2.0 * scale - k1 * u**2 / 2 - k2 * v**2 / 2
+    tips = fit_tips(heights, np.array([[4, 5]]), (dx, dy), across)
+    assert tips.whole.all()
+    assert_allclose(tips.offsets[0], [x0, y0], rtol=1e-11)
+    assert_allclose(tips.heights, 2.0 * scale, rtol=1e-13)
+    assert_allclose(tips.curvatures[0], [k1, k2], rtol=1e-10)
+    reach = across // 2
+    near = np.s_[4 - reach : 5 + reach, 5 - reach : 6 + reach]
+    sphere = 2.0 * scale - np.sqrt(k1 * k2) * ((x - x0) ** 2 + (y - y0) ** 2) / 2
+    deviation = np.sqrt(np.mean((heights - sphere)[near] ** 2))
+    assert_allclose(tips.deviations, deviation, rtol=1e-10)
+
+
+def test_a_saddle_and_a_top_elsewhere_are_no_tips() -> None:
+    x, y = np.meshgrid(np.arange(-3.0, 4.0), np.arange(-3.0, 4.0))
+    middle = np.array([[3, 3]])
+    assert not fit_tips(y**2 / 2 - x**2, middle, (1.0, 1.0), 3).whole.any()
+    assert not fit_tips(x**2 + y**2, middle, (1.0, 1.0), 3).whole.any()
+    assert not fit_tips(-((x - 1.5) ** 2) - y**2, middle, (1.0, 1.0), 3).whole.any()
+    assert fit_tips(-((x - 1.5) ** 2) - y**2, middle, (1.0, 1.0), 5).whole.all()
+
+
+def test_a_sphere_does_not_deviate() -> None:
+    x, y = np.meshgrid(np.arange(-3.0, 4.0), np.arange(-3.0, 4.0))
+    tips = fit_tips(-(x**2 + y**2) / 20, np.array([[3, 3]]), (1.0, 1.0), 5)
+    assert_allclose(tips.curvatures, 0.1, rtol=1e-12)
+    assert tips.deviations[0] < 1e-15
+
+
+@pytest.mark.parametrize("axes", [0.9, 0.5, 0.1, 0.01])
+def test_the_elliptic_contact_by_quadrature(axes: float) -> None:
+    """Displacements under p0 sqrt(1 - x^2/a^2 - y^2/b^2), from the integrals of the potential.
+
+    With a = 1, b = axes: delta - A x^2 - B y^2 = p0 a b / (2 E*) times the integral over s from 0
+    of (1 - x^2/(1 + s) - y^2/(b^2 + s)) / sqrt((1 + s) (b^2 + s) s)  (Johnson 1985, eq. 3.33).
+    """
+    b = axes
+
+    def integral(power_a: float, power_b: float) -> float:
+        def at(t: float) -> float:  # s = t^2
+            return 2 * (1 + t * t) ** -(0.5 + power_a) * (b * b + t * t) ** -(0.5 + power_b)
+
+        return sum(quad(at, *ends, epsrel=1e-11)[0] for ends in ((0, b), (b, 1), (1, np.inf)))
+
+    scale = b / 2  # p0 = E* = 1
+    indentation, k2, k1 = (scale * integral(*p) for p in ((0, 0), (1, 0), (0, 1)))
+    k1, k2 = 2 * k1, 2 * k2
+    load = 2 / 3 * np.pi * b
+    sphere = 4 / 3 * np.sqrt(1 / np.sqrt(k1 * k2)) * indentation**1.5
+    assert_allclose(elliptic_load(np.array([k1 / k2])), load / sphere, rtol=1e-8)
+
+
+def test_a_sphere_carries_what_a_sphere_carries() -> None:
+    ratios = np.array([1.0, 1 + 1e-9, 1 + 2e-7, 1 + 1e-5, 1.001])
+    assert_allclose(elliptic_load(ratios), 1.0, rtol=1e-6)
+    assert (np.diff(elliptic_load(np.geomspace(1.01, 1e6, 50))) > 0).all()
