@@ -46,6 +46,12 @@ def steel(geometry: Any = "summit") -> cr.Scene:
     return cr.Scene(0.01, asperities, STEEL, geometry=geometry)
 
 
+def twins() -> tuple[cr.Scene, float]:
+    """Two equal asperities so close that both may touch, but at no least of the energy; a load."""
+    points = [[-5e-5, 0.0], [5e-5, 0.0]]
+    return cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, friction=0.5), 6.6e-8
+
+
 #: name -> (scene, approach): every one in the convex range.
 NAMED = {
     "paper": (paper(), PAPER_APPROACH),

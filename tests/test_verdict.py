@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import PAPER_APPROACH, operators, paper, scattered
+from scenes import PAPER_APPROACH, operators, paper, scattered, twins
 
 import convexrough as cr
 
@@ -149,9 +149,9 @@ def test_noise_up_to_the_floor_is_open(noise: float) -> None:
 
 
 def test_where_nothing_can_be_proved_nothing_holds() -> None:
-    scene, approach = scattered(1, 20, 4.0, 0.5)
-    contact = cr.press(scene, approach=approach)
-    verdict = cr.verify(scene, contact.loads, approach=approach)
+    scene, load = twins()
+    contact = cr.press(scene, load=load)
+    verdict = cr.verify(scene, contact.loads, load=load)
     assert contact.certificate.scope == "none"
     assert len(verdict.undecided) == len(scene)
     assert not verdict.holds

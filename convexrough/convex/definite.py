@@ -19,12 +19,26 @@ factor that is not: LAPACK need not see that, and no such factor counts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.roundoff import ROUNDOFF
+
+
+def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
+    """The largest of some margins, from small to large, that is proved; else 0. By bisection."""
+    low, high = -1, len(margins)
+    middle = 0  # most of the time, what is not proved with the smallest is not proved at all
+    while high - low > 1:
+        if proved(margins[middle]):
+            low = middle
+        else:
+            high = middle
+        middle = (low + high) // 2
+    return 0.0 if low < 0 else margins[low]
 
 
 def is_definite(matrix: Array) -> bool:
@@ -54,3 +68,60 @@ def proved_margin(
         if is_definite(trial):
             return margin
     return 0.0
+
+
+def proved_sparse_margin(
+    diagonal: Array,
+    pairs: tuple[Indices, Indices],
+    values: Array,
+    margins: Sequence[float],
+    errors: Array,
+) -> float:
+    """The largest mu with  S >= mu I  proved, of a symmetric sparse matrix S; else 0.
+
+    diagonal : (n,);  pairs, values : of entries above the diagonal;  errors : bounds on theirs
+    margins  : from small to large
+
+    By elimination without exchange of rows: where L and U are computed, S = L U + E with
+    |E| <= g / (1 - g) |L| |U|, g = n u (Higham, Accuracy and Stability, theorem 9.3, in any order
+    of the sums). With D the diagonal of U, positive, S - L D L' = E + L (U - D L') is symmetric, so
+    its norm is at most its largest row sum.
+    """
+    from scipy.sparse import coo_array
+
+    n = len(diagonal)
+    (i, j), every = pairs, np.arange(n)
+    blur = np.bincount(i, errors, n) + np.bincount(j, errors, n)
+    off = float(blur.max(initial=0.0)) + 4 * ROUNDOFF
+    where = (np.concatenate((every, i, j)), np.concatenate((every, j, i)))
+
+    def proved(margin: float) -> bool:
+        # A hundredth more is for what elimination loses.
+        entries = np.concatenate((diagonal - 1.01 * margin - off, values, values))
+        slack = _elimination_slack(coo_array((entries, where), shape=(n, n)).tocsc())
+        return 1.1 * slack < 0.01 * margin
+
+    return largest(margins, proved)
+
+
+def _elimination_slack(matrix: Any) -> float:
+    """e such that  matrix >= -e I  is proved, infinite where it is not definite."""
+    from scipy.sparse import diags_array
+    from scipy.sparse.linalg import splu
+
+    n = matrix.shape[0]
+    try:
+        options = {"SymmetricMode": True, "Equil": False}
+        found = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    except RuntimeError:  # exactly singular
+        return np.inf
+    D = found.U.diagonal()
+    if not ((found.perm_r == found.perm_c).all() and (D > 0).all()):
+        return np.inf
+    L, U = abs(found.L), abs(found.U)
+    scaled = diags_array(D) @ found.L.T
+    rounding = n * ROUNDOFF / (1.0 - n * ROUNDOFF)
+    ones = np.ones(n)
+    beyond = abs(found.U - scaled) @ ones + 2 * ROUNDOFF * (U @ ones + abs(scaled) @ ones)
+    slack = float((L @ (rounding * (U @ ones) + beyond)).max())
+    return slack if np.isfinite(slack) else np.inf

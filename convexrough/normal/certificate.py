@@ -6,16 +6,18 @@ are the given float64 numbers, and includes the rounding of everything computed 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
-from convexrough.normal.judgement import Judgement, Scope
+from convexrough.normal.boxes import Scope
+from convexrough.normal.judgement import Judgement
 from convexrough.normal.problem import NormalProblem
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
@@ -30,9 +32,8 @@ class Certificate(Table):
     """What is proved of given loads. Arrays are (n,), in the caller's order.
 
     scope : "global": the scene has one solution, and the bounds are on the distance to it;
-        "local": it has one solution with contact radii a_i up to convexity_number (pi/2) s_i,
-        where s_i + s_j <= r_ij share out the room between neighbours (by halves, or by the sizes
-        of their contacts), and the bounds are on the distance to that;
+        "local": it has a solution, the only one with contacts of about these sizes (`meaning` says
+        what others there could be), and the bounds are on the distance to that;
         "none": nothing is proved, every bound is infinite and every asperity undecided
     convexity_number : where below 1, the energy is strictly convex on the box used: the smallest
         eigenvalue of its Hessian, scaled by its local part, is at least 1 - convexity_number
@@ -44,16 +45,25 @@ class Certificate(Table):
     approach : [length] prescribed, or the one that fits the loads best
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
     duality_gap : [force length] bound on the energy of these loads above that of the solution, by
-        a dual point made from the loads alone; 0 to rounding at a solution, infinite where the
-        shells do not prove the energy convex up to there. Under load control of the loads as they
+        a dual point made from the loads alone, or by the slope of a convex energy; 0 to rounding
+        at a solution, infinite where nothing is proved. Under load control of the loads as they
         are judged: scaled, and none on asperities that cannot touch
+
+    held : how many asperities had to be taken as open, which in this solution they are; 0 unless
+        contacts are crowded. The solution is then the only one near it with these open
+    rival_crowding : any other solution has a larger crowding, the largest (a_i + a_j) / r_ij over
+        all asperities that could touch, open ones with a = 0; infinite where there is no other, 0
+        where nothing is known
+    rival_covers : any other solution has a disc that covers its nearest neighbour's summit
+    in_the_way : (m,) asperities that no proof can pass; none where there is one
+    obstacle : in words, what is wrong with them
 
     >>> judged = contact.certificate
     >>> judged.scope, judged.holds, judged.load_error < 1e-12 * contact.load
     ('global', True, True)
     """
 
-    _shown = ("holds", "load_error", "gap_error")
+    _shown = ("holds", "meaning", "load_error", "gap_error")
     _along: ClassVar[Along] = {("asperity",): ("status", "load_errors", "gaps", "gap_errors")}
 
     scope: Scope
@@ -65,6 +75,33 @@ class Certificate(Table):
     approach: float
     approach_error: float
     duality_gap: float
+    held: int = 0
+    rival_crowding: float = 0.0
+    rival_covers: bool = False
+    in_the_way: Indices = field(default_factory=lambda: frozen(np.zeros(0, dtype=np.intp)))
+    obstacle: str = ""
+
+    @property
+    def meaning(self) -> str:
+        """The scope in words: what other solutions there could be.
+
+        >>> contact.certificate.meaning
+        'the only solution'
+        """
+        if self.scope == "global":
+            return "the only solution"
+        if self.scope == "none":
+            why = f"; {self.obstacle}" if self.obstacle else ""
+            return f"nothing is proved, {len(self.in_the_way):,} asperities in the way{why}"
+        rivals = []
+        if self.rival_covers:
+            rivals.append("a disc that covers its nearest neighbour's summit")
+        if self.rival_crowding > 0:
+            rivals.append(f"crowding above {math.floor(self.rival_crowding * 100) / 100:.2f}")
+        if rivals:
+            return f"any other solution has {' and '.join(rivals)}"
+        held = f" with the same {self.held:,} asperities held open" if self.held else ""
+        return f"the only solution near these loads{held}"
 
     @property
     def holds(self) -> bool:
@@ -130,6 +167,11 @@ def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
         gap_errors=frozen(found.errors * length),
         approach=found.approach * length,
         approach_error=found.approach_error * length,
+        held=found.held,
+        rival_crowding=found.rivals.crowding,
+        rival_covers=found.rivals.cover,
+        in_the_way=frozen(problem.candidates[found.obstacle.which]),
+        obstacle=found.obstacle.reason,
         duality_gap=(found.duality_gap + _screened_energy(problem, scene_loads, found))
         * (force * length),
     )

@@ -23,32 +23,31 @@ Headings in quotes below are of that page. Its letters, and the names here:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks
 from convexrough.arrays import Array, Indices
-from convexrough.convex.definite import proved_margin
-from convexrough.influence.coupling import Coupling, Influence, error_reach
-from convexrough.normal.prescribed_load import approach_error, riding_weights
+from convexrough.influence.coupling import Coupling
+from convexrough.normal.bounds import Ball, Bounds, ball_of, bounds_of, reach
+from convexrough.normal.boxes import Box, Scope, box_of_touching, crowded, lowest_ceiling, tried
+from convexrough.normal.prescribed_load import riding_weights
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.residual import SUM_ROUNDOFFS, Fit, fit, scaled_to
-from convexrough.normal.sup_norm import SupNorm
+from convexrough.normal.rivals import NO_RIVALS, UNKNOWN, Rivals
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.sphere import hertz
 
-Scope = Literal["global", "local", "none"]
+#: Boxes of those that touch that are tried: larger ones where the solution may be outside, and with
+#: asperities let in that are not proved open. Heuristics, as is the room that a box leaves.
+ATTEMPTS, ROOM = 6, 3.0
 
-#: Convexity number of the loads themselves from which shells fitted to them are tried. A heuristic:
-#: if it is off, work is wasted, or a bound is less sharp than it could be.
-FIT_FROM = 0.8
+NONE = np.zeros(0, dtype=np.intp)
 
-#: Margins mu that Cholesky's factorisation is tried with, the best first. Any will do, as the
-#: bounds are sharpened afterwards on a smaller box.
-MARGINS = (0.1, 1e-3)
+CROWDED = "their discs overlap so far that the energy is not known to be convex"
+POORLY_KNOWN = "their loads are not known well enough to stay in a box where the energy is convex"
+NOT_OPEN = "they are held open, but their gaps are not proved"
 
 
 class Judgement(NamedTuple):
@@ -66,6 +65,9 @@ class Judgement(NamedTuple):
     approach: float
     approach_error: float
     duality_gap: float
+    held: int  # candidates taken to be open, as they then are proved to be in this solution
+    rivals: Rivals
+    obstacle: Obstacle
 
     @classmethod
     def of(cls, problem: NormalProblem, given: Array) -> Judgement:
@@ -78,12 +80,11 @@ class Judgement(NamedTuple):
         screened = _screened(problem, loads, found.approach)
         indentation = problem.to_scene(found.indentation)
         indentation[screened.which] = screened.indentation
-        box = _find_box(problem, loads, found.displacement)
-        ball = None if box is None else _ball(box, found, loads)
-        if box is None or ball is None:
-            return _unproved(problem, loads, found, indentation)
-        bounds = _bounds(box.problem, loads, found, ball, weights, screened.coupling)
-        error = bounds.moved + found.rounding + found.component + bounds.approach
+        proved = _proved(problem, loads, found, weights, screened.coupling)
+        if isinstance(proved, Obstacle):
+            return _unproved(problem, loads, found, indentation, proved)
+        box, ball, bounds = proved
+        error = bounds.of_indentation(found)
 
         # delta* gives a second bound on each load, sharper where the load is small.
         low = hertz.load(found.indentation - error, problem.coefficients) * (1 - SAFETY)
@@ -93,8 +94,12 @@ class Judgement(NamedTuple):
 
         everywhere = problem.to_scene(error)
         everywhere[screened.which] = bounds.elsewhere + screened.rounding + bounds.approach
+        rivals = NO_RIVALS
+        if box.scope != "global":
+            ceiling = lowest_ceiling(problem, loads, found.displacement)
+            rivals = Rivals.of(problem, ball.near, ceiling)
         return cls(
-            scope=box.scope,
+            scope="local" if rivals.possible else "global",
             convexity_number=box.convexity_number,
             load_errors=load_errors,
             touches=(loads > bounds.loads) | (found.indentation > error),
@@ -102,172 +107,77 @@ class Judgement(NamedTuple):
             errors=everywhere,
             approach=found.approach,
             approach_error=bounds.approach,
-            duality_gap=box.problem.duality_gap(
-                loads,
-                found.displacement,
-                found.approach,
-                ball.near,
-                found.rounding + found.component,
-            ),
+            duality_gap=_energy_error(box, ball, bounds, loads, found),
+            held=int(box.held.sum()),
+            rivals=rivals,
+            obstacle=Obstacle("", NONE),
         )
 
 
-class _Bounds(NamedTuple):
-    """What is proved of the distance to the solution."""
+class Obstacle(NamedTuple):
+    """What stands in the way of a proof."""
 
-    loads: Array  # (n,) of P
-    moved: Array  # (n,) of A P
-    approach: float  # of D0
-    elsewhere: Array  # of A P at the screened asperities
+    reason: str
+    which: Indices  # candidates
 
 
-def _bounds(
+def _proved(
     problem: NormalProblem,
     loads: Array,
     found: Fit,
-    ball: _Ball,
     weights: Array | None,
     screened: Coupling | None,
-) -> _Bounds:
-    """The smaller of (1) and of docs/theory/sup-norm.md, for each asperity."""
-    A, errors, shift = problem.influence, ball.load_errors, 0.0
-    sup = SupNorm.of(A, problem.stiffness(ball.near))
-    if weights is not None:
-        shift = np.inf
-        if sup is not None:
-            shift = approach_error(problem, loads, errors, found, weights, sup)
-        if shift == np.inf:
-            shift = _approach_error(problem, loads, found, errors, ball.moves(A, A.scale))
-    if sup is None or shift == np.inf:
-        elsewhere = np.zeros(0) if screened is None else ball.moves(screened, A.scale)
-        return _Bounds(errors, ball.moves(A, A.scale), shift, elsewhere)
-    residuals = found.residual + (found.component + shift)
-    largest = float(residuals.max(initial=0.0))
-    errors = np.minimum(errors, sup.load_errors(residuals, largest))
-    moved, elsewhere = ball.lesser(sup.moves(A, largest), A, A), np.zeros(0)
-    if screened is not None:
-        elsewhere = ball.lesser(sup.moves_at(screened, largest), screened, A)
-    return _Bounds(errors, moved, shift, elsewhere)
+) -> tuple[Box, Ball, Bounds] | Obstacle:
+    """The first box that keeps the solution inside, and how far it can be: "Which box".
 
-
-class _Box(NamedTuple):
-    """A box of loads that holds the solution, and how convex the energy is on it."""
-
-    scope: Scope
-    problem: NormalProblem  # with the shells that prove it
-    loads: Array  # the upper corner
-    stiffness: Array  # h there
-    convexity_number: float  # 1 - mu
-    faces: Array  # upper faces that the solution must be shown to stay below; else infinite
-
-
-class _Ball(NamedTuple):
-    """Where (1) says that the solution is: || P - P* ||_H <= radius."""
-
-    radius: float  # eps
-    stiffness: Array  # h
-    near: Array  # upper corner of a box that holds the ball and the solution
-
-    @property
-    def load_errors(self) -> Array:
-        errors: Array = self.radius / np.sqrt(self.stiffness)
-        return errors
-
-    def moves(self, coupling: Coupling, scale: float) -> Array:
-        """How far A (P - P*) can be from 0."""
-        return self.radius * error_reach(coupling, scale, 1.0 / self.stiffness) * (1 + SAFETY)
-
-    def lesser(self, moved: Array, coupling: Coupling, influence: Influence) -> Array:
-        """The smaller of `moved` and `moves`, which is left out where it cannot be much smaller.
-
-        As sum_j A_ij^2 / h_j is no less than what it would be if all were as far as the farthest.
-        """
-        if len(influence) == 0:
-            return moved
-        extent = max(float(np.hypot(*np.ptp(influence.points, axis=0))), checks.SMALLEST)
-        total = float((1.0 / self.stiffness).sum()) - 1.0 / float(self.stiffness.min())
-        least = self.radius * influence.scale / extent * np.sqrt(max(total, 0.0))
-        if float(moved.max(initial=0.0)) <= least:
-            return moved
-        return np.minimum(moved, self.moves(coupling, influence.scale))
-
-
-def _ball(box: _Box, found: Fit, loads: Array) -> _Ball | None:
-    """(1) on the box, and once more on the box up to there: "A bound on the loads".
-
-    None where the solution may lie outside the local box: "Which box", 3.
+    Where no box of all candidates does, one of those that touch, if all others are then open.
     """
-    h = box.stiffness
-    radius = _norm(found, h, box.convexity_number)
-    errors = radius / np.sqrt(h)
-    if (loads + errors >= box.faces).any():
-        return None
-    near = np.minimum(box.loads, loads + errors)
-    if (theta := box.problem.convexity_number(near)) <= box.convexity_number:
-        h = box.problem.stiffness(near)
-        radius = _norm(found, h, theta)
-    return _Ball(radius, h, near)
+    for box in tried(problem, loads, found.displacement):
+        if (ball := ball_of(box, found, loads)) is not None:
+            return box, ball, bounds_of(box, loads, found, ball, weights, screened)
+    return _proved_of_touching(problem, loads, found, weights, screened)
 
 
-def _norm(found: Fit, stiffness: Array, convexity_number: float) -> float:
-    """eps = || e ||_{H^-1} / (1 - theta), the right side of (1)."""
-    squared = float(np.sum(found.residual**2 / stiffness))
-    remainder = found.remainder / np.sqrt(float(stiffness.min(initial=np.inf)))
-    return float(np.sqrt(squared) + remainder) / (1.0 - convexity_number) * (1 + SAFETY)
+def _proved_of_touching(
+    problem: NormalProblem,
+    loads: Array,
+    found: Fit,
+    weights: Array | None,
+    screened: Coupling | None,
+) -> tuple[Box, Ball, Bounds] | Obstacle:
+    """The same with all others held open, and then proved to be: docs/theory/crowded.md."""
+    touching, room, obstacle = loads > 0, np.zeros(len(loads)), Obstacle("", NONE)
+    for _ in range(ATTEMPTS):
+        box = box_of_touching(problem, loads, touching, room)
+        if box is None:
+            break
+        part = found.of_some(touching)
+        if (ball := ball_of(box, part, loads)) is None:
+            needed = reach(box, part)
+            obstacle = Obstacle(POORLY_KNOWN, np.flatnonzero(loads + needed >= box.faces))
+            room = np.maximum(room, ROOM * needed)
+            continue
+        bounds = bounds_of(box, loads, part, ball, weights, screened)
+        doubtful = box.held & ~(-found.indentation > bounds.of_indentation(found))
+        if not doubtful.any():
+            return box, ball, bounds
+        obstacle = Obstacle(NOT_OPEN, np.flatnonzero(doubtful))
+        touching, room = touching | doubtful, np.maximum(room, ROOM * ball.load_errors)
+    return obstacle if obstacle.reason else Obstacle(CROWDED, crowded(problem, loads))
 
 
-def _find_box(problem: NormalProblem, loads: Array, displacement: Array) -> _Box | None:
-    """Global from the a priori bound by shells, then by Cholesky; else local; else None.
+def _energy_error(box: Box, ball: Ball, bounds: Bounds, loads: Array, found: Fit) -> float:
+    """Of Phi(P) above its least: by a dual point, or, where loads are known well, by convexity.
 
-    "Which box", 1 to 4.
+    Phi(P) - Phi(P*) <= g(P)'(P - P*), and each part is at most |e_i| times the error of the load.
     """
-    ceiling = problem.ceiling
+    problem, rounding = box.problem, found.rounding + found.component
+    dual = problem.duality_gap(loads, found.displacement, found.approach, ball.near, rounding)
+    residuals = np.where(box.held, 0.0, found.residual + found.component)
+    slope = float(residuals @ bounds.loads) * (1 + SAFETY)
     if problem.load is not None:
-        ceiling = min(ceiling, problem.overhang(loads, displacement))
-    corner = np.maximum(problem.bounds(ceiling), loads)  # the box must hold both states
-    h = problem.stiffness(corner)
-    nowhere = np.full(len(problem), np.inf)
-    if (theta := problem.convexity_number(corner)) < 1:
-        return _Box("global", problem, corner, h, theta, nowhere)
-    if (margin := convex_margin(problem.influence, h, MARGINS)) > 0:
-        return _Box("global", problem, corner, h, 1.0 - margin, nowhere)
-    theta = problem.convexity_number(loads)
-    if theta > FIT_FROM:
-        fitted = problem.fitted_to(loads)
-        if (number := fitted.convexity_number(loads)) < theta:
-            problem, theta = fitted, number
-    if theta < 1:
-        theta = (1.0 + theta) / 2.0
-        # The faces a_i = theta (pi/2) s_i, where h_i = shell_i / theta.
-        faces = (2.0 / 3.0 * problem.coefficients * theta / problem.shells) ** 3
-        local = np.minimum(corner, faces)
-        beyond = np.where(faces < corner, faces, np.inf)
-        return _Box("local", problem, local, problem.stiffness(local), theta, beyond)
-    return None
-
-
-def convex_margin(influence: Influence, stiffness: Array, margins: Sequence[float]) -> float:
-    """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved, else 0: "Which box", 2.
-
-    Only where there is a matrix: a factorisation costs as the cube of its size.
-    """
-    if not influence.at_hand:
-        return 0.0
-    root = 1.0 / np.sqrt(stiffness)
-    scaled = influence.matrix * root * root[:, None]
-    return proved_margin(scaled, margins, influence.entry_error + 8 * ROUNDOFF)
-
-
-def _approach_error(
-    problem: NormalProblem, loads: Array, found: Fit, errors: Array, moved: Array
-) -> float:
-    """|D0 - D0*|, as D0* = k_i P*_i^(2/3) + (A P*)_i - d_i at every asperity sure to touch.
-
-    "Prescribed load".
-    """
-    least = hertz.indentation(np.maximum(loads - errors, 0.0), problem.coefficients)
-    each = np.abs(found.gap) + found.rounding + found.component + (found.local - least) + moved
-    return float(each.min(where=loads > errors, initial=np.inf))
+        slope += abs(found.approach) * problem.missing(loads)
+    return min(dual, slope)
 
 
 class _Screened(NamedTuple):
@@ -291,7 +201,9 @@ def _screened(problem: NormalProblem, loads: Array, approach: float) -> _Screene
     return _Screened(others, coupling, approach + offsets - product, rounding)
 
 
-def _unproved(problem: NormalProblem, loads: Array, found: Fit, indentation: Array) -> Judgement:
+def _unproved(
+    problem: NormalProblem, loads: Array, found: Fit, indentation: Array, obstacle: Obstacle
+) -> Judgement:
     """Said plainly: "Which box", 4."""
     return Judgement(
         scope="none",
@@ -303,4 +215,7 @@ def _unproved(problem: NormalProblem, loads: Array, found: Fit, indentation: Arr
         approach=found.approach,
         approach_error=0.0 if problem.load is None else np.inf,
         duality_gap=np.inf,
+        held=0,
+        rivals=UNKNOWN,
+        obstacle=obstacle,
     )

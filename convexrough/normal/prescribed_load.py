@@ -10,8 +10,6 @@ The better mu solves M mu = 1, the less is left of beta.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from convexrough.arrays import Array
@@ -65,9 +63,8 @@ def approach_error(
     left = sup.growth * float((off / sup.stiffness).sum()) / total * (1 + SAFETY)
     if not left < 1:
         return np.inf
-    missing = abs(math.fsum(loads) - problem.load) + 2 * ROUNDOFF * problem.load
     rounding = fit.rounding + min(fit.component, fit.remainder * float(np.linalg.norm(mu)) / total)
-    mean = abs(float(mu @ fit.gap)) + float(mu @ rounding) + missing
+    mean = abs(float(mu @ fit.gap)) + float(mu @ rounding) + problem.missing(loads)
     mean += len(loads) * ROUNDOFF * float(mu @ np.abs(fit.gap))
     largest = float(fit.residual.max()) + fit.component
     return (mean / total + left * largest) / (1.0 - left) * (1 + SAFETY)

@@ -230,9 +230,13 @@ class NormalProblem:
         distance = np.minimum(np.abs(loads - best) + moved, np.maximum(loads, box))
         rounding += float((error * distance).sum()) * (1 + SAFETY)
         if self.load is not None:
-            missing = abs(math.fsum(loads) - self.load) + 2 * ROUNDOFF * self.load
-            rounding += abs(approach) * missing * (1 + SAFETY)
+            rounding += abs(approach) * self.missing(loads)
         return float(np.maximum(charge(loads) - charge(best), 0.0).sum()) + rounding
+
+    def missing(self, loads: Array) -> float:
+        """Bound on what loads miss the prescribed total by."""
+        assert self.load is not None
+        return (abs(math.fsum(loads) - self.load) + 2 * ROUNDOFF * self.load) * (1 + SAFETY)
 
     def _loads_at_slope(self, slope: Array, box: Array) -> Array:
         """(n,) the x from 0 to box_i with h_i'(x) = slope_i, or the nearer end: h_i of the above.

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.errors import InputError
@@ -31,6 +32,10 @@ class Fit(NamedTuple):
     component: float  # bound on each component of it
     residual: Array  # bound on |e|, less the remainder: |gap| where loaded, else its negative part
     approach: float  # D0
+
+    def of_some(self, which: NDArray[np.bool_]) -> Fit:
+        """Of some asperities alone, whatever gaps the others have."""
+        return self._replace(residual=np.where(which, self.residual, 0.0))
 
 
 def scaled_to(load: float, given: Array) -> Array:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact
+from convexrough.normal.boxes import Scope
 from convexrough.normal.certificate import Certificate
-from convexrough.normal.judgement import Scope
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.judgement import Bounds, judge_states

@@ -21,7 +21,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence import couple
 from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.influence.shells import fitted_shells
-from convexrough.normal.judgement import FIT_FROM, convex_margin
+from convexrough.normal.boxes import FIT_FROM, convex_margin
 from convexrough.normal.problem import FITTED
 from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY

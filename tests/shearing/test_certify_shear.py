@@ -7,7 +7,7 @@ import pytest
 from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, exact, in_doubt, off, pressed
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import paper
+from scenes import paper, twins
 
 import convexrough as cr
 
@@ -167,8 +167,8 @@ def test_where_nothing_touches_or_is_proved() -> None:
     judged = cr.certify_shear(apart, np.full(len(scene), 1e-9), force=0.0)
     assert (judged.force_errors == 1e-9).all()
     assert (judged.status == "open").all()
-    lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=5.0, within=0.0102)
-    crowded = cr.press(cr.Scene(1.0, lattice, scene.material, 0.5), approach=5e-5)
+    close, load = twins()
+    crowded = cr.press(close, load=load)
     judged = cr.certify_shear(crowded, crowded.loads * 0.1, force=0.1 * crowded.load)
     assert judged.scope == "none"
     assert not judged.holds

@@ -69,7 +69,7 @@ def test_five_cones(tip_radius: float, fraction: float) -> None:
 
 def test_too_dense_for_a_convex_program() -> None:
     contact = blunt(5.0)
-    assert contact.certificate.scope == "none"
+    assert contact.crowding > 1
     force = 0.1 * FRICTION * contact.load
     expected = (
         r"too dense.* is 1\.\d+ of the local stiffness.*convexity numbers.*: \d+ \(\d\.\d+\), "

@@ -1,0 +1,158 @@
+"""Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Which box".
+
+`tried` gives them one by one, the widest first. Of crowded contacts only those that touch can be in
+one: `box_of_touching`, docs/theory/crowded.md. The letters of those pages, and the names here:
+
+    B, h, mu              loads, stiffness, 1 - convexity_number
+    theta, s_i            convexity_number, problem.shells (1 / (pi E* s_i))
+    O                     held
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices
+from convexrough.convex.definite import largest, proved_margin
+from convexrough.influence.coupling import Influence
+from convexrough.influence.shells import fitted_shells
+from convexrough.normal.overlap import overlapping_margin
+from convexrough.normal.problem import FITTED, NormalProblem
+from convexrough.roundoff import ROUNDOFF
+
+Scope = Literal["global", "local", "none"]
+
+#: Convexity number of the loads themselves from which shells fitted to them are tried. A heuristic:
+#: if it is off, work is wasted, or a bound is less sharp than it could be.
+FIT_FROM = 0.8
+
+#: Margins mu that Cholesky's factorisation is tried with, the best first. Any will do, as the
+#: bounds are sharpened afterwards on a smaller box.
+MARGINS = (0.1, 1e-3)
+
+#: Part by which loads may grow at least in a box of those that touch, and part of the largest by
+#: which any may. Heuristic: any box proves what it says.
+LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
+
+#: Up to so many of those that touch, a Cholesky factor costs no more than shells that overlap.
+FACTORISED = 1500
+
+#: Margins mu of such a box: its convexity may hang by a thread.
+CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
+
+
+class Box(NamedTuple):
+    """A box of loads that holds the solution, and how convex the energy is on it."""
+
+    scope: Scope
+    problem: NormalProblem  # with the shells that prove it
+    loads: Array  # the upper corner
+    stiffness: Array  # h there
+    convexity_number: float  # 1 - mu
+    faces: Array  # upper faces that the solution must be shown to stay below; else infinite
+    held: NDArray[np.bool_]  # taken to be open, which has to be shown of the solution
+
+
+def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
+    """Global from the a priori bound by shells, then by Cholesky; else local."""
+    ceiling = lowest_ceiling(problem, loads, displacement)
+    corner = np.maximum(problem.bounds(ceiling), loads)  # the box must hold both states
+    h = problem.stiffness(corner)
+    nowhere, none = np.full(len(problem), np.inf), np.zeros(len(problem), dtype=bool)
+    if (theta := problem.convexity_number(corner)) < 1:
+        yield Box("global", problem, corner, h, theta, nowhere, none)
+        return
+    if (margin := convex_margin(problem.influence, h, MARGINS)) > 0:
+        yield Box("global", problem, corner, h, 1.0 - margin, nowhere, none)
+        return
+    theta = problem.convexity_number(loads)
+    if theta > FIT_FROM:
+        fitted = problem.fitted_to(loads)
+        if (number := fitted.convexity_number(loads)) < theta:
+            problem, theta = fitted, number
+    if theta < 1:
+        theta = (1.0 + theta) / 2.0
+        # The faces a_i = theta (pi/2) s_i, where h_i = shell_i / theta.
+        faces = (2.0 / 3.0 * problem.coefficients * theta / problem.shells) ** 3
+        local = np.minimum(corner, faces)
+        beyond = np.where(faces < corner, faces, np.inf)
+        yield Box("local", problem, local, problem.stiffness(local), theta, beyond, none)
+
+
+def lowest_ceiling(problem: NormalProblem, loads: Array, displacement: Array) -> float:
+    """The least known upper bound on D0 at any solution; `displacement` is A times the loads."""
+    if problem.load is None:
+        return problem.ceiling
+    return min(problem.ceiling, problem.overhang(loads, displacement))
+
+
+def box_of_touching(
+    problem: NormalProblem, loads: Array, touching: NDArray[np.bool_], room: Array
+) -> Box | None:
+    """Local, all others held open: by shells fitted to those that touch, or by `_crowded_margin`.
+
+    docs/theory/crowded.md
+
+    room : (n,) by which loads must be able to grow in the box
+    """
+    which = np.flatnonzero(touching)
+    influence = problem.influence.among(which)
+    least = LEEWAY * loads + LEAST_LEEWAY * float(loads.max(initial=0.0))
+    box = np.where(touching, loads + np.maximum(least, room), 0.0)
+    h = problem.stiffness(box)
+    shelled = replace(problem, shells=_shells(influence, h, which))
+    number = shelled.convexity_number(box)
+    if not number < 1:
+        number = 1.0 - _crowded_margin(influence, h[which])
+    if not number < 1:
+        return None
+    return Box("local", shelled, box, h, number, np.where(touching, box, np.inf), ~touching)
+
+
+def _crowded_margin(influence: Influence, stiffness: Array) -> float:
+    """The largest mu by Cholesky where a matrix is cheap, else by shells that overlap."""
+    if not influence.at_hand and len(influence) > FACTORISED:
+        return overlapping_margin(influence, influence.scale / stiffness, CROWDED_MARGINS)
+    scaled, error = _scaled(influence, stiffness), influence.entry_error + 8 * ROUNDOFF
+    return largest(CROWDED_MARGINS, lambda each: proved_margin(scaled, (each,), error) > 0)
+
+
+def _scaled(influence: Influence, stiffness: Array) -> Array:
+    """H^(-1/2) A H^(-1/2)."""
+    root = 1.0 / np.sqrt(stiffness)
+    scaled: Array = influence.matrix * root * root[:, None]
+    return scaled
+
+
+def crowded(problem: NormalProblem, loads: Array) -> Indices:
+    """Asperities that are too near to one that touches, or too near for its size."""
+    which = np.flatnonzero(loads)
+    if len(which) < 2:
+        return which
+    influence = problem.influence.among(which)
+    shells = _shells(influence, problem.stiffness(loads), which)
+    return np.flatnonzero(shells / problem.stiffness(loads) >= 1.0)
+
+
+def _shells(influence: Influence, stiffness: Array, which: Indices) -> Array:
+    """Of those of one box, 0 elsewhere."""
+    shells = np.zeros(len(stiffness))
+    radii = (np.pi / 2.0) * influence.scale / stiffness[which]
+    shells[which] = fitted_shells(influence, radii, FITTED)
+    return shells
+
+
+def convex_margin(influence: Influence, stiffness: Array, margins: Sequence[float]) -> float:
+    """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved, else 0: "Which box", 2.
+
+    Only where there is a matrix: a factorisation costs as the cube of its size.
+    """
+    if not influence.at_hand:
+        return 0.0
+    error = influence.entry_error + 8 * ROUNDOFF
+    return proved_margin(_scaled(influence, stiffness), margins, error)

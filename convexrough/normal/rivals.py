@@ -1,0 +1,55 @@
+"""What any other solution would have to be like: docs/theory/crowded.md, "Rivals".
+
+Two solutions have contact radii a and b. With t_i = (2 / pi) m_i, m = (2/3) (a^2 + a b + b^2) /
+(a + b), they are one and the same if t_i + t_j <= r_ij for all pairs.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.normal.problem import NormalProblem
+from convexrough.roundoff import SAFETY
+
+#: Contact radius over the distance to the nearest neighbour up to which a rival covers a summit:
+#: the root of m(x, 1) = pi / 4, rounded down.
+ROOMY = 0.52
+
+
+class Rivals(NamedTuple):
+    """Other solutions than the one found."""
+
+    possible: bool
+    crowding: float  # theirs is above this; infinite if there are none
+    cover: bool  # each has a disc that covers its nearest neighbour's summit
+
+    @classmethod
+    def of(cls, problem: NormalProblem, near: Array, ceiling: float) -> Rivals:
+        """Of a solution with loads (n,) of at most `near`, approaches of at most `ceiling`."""
+        A = problem.influence
+        blur = 1.0 + SAFETY + 2.0 * A.entry_error
+        a, most = (_radii(problem, loads) for loads in (near, problem.bounds(ceiling)))
+        if A.crowding(2.0 / np.pi * _mean(a, most)) * blur <= 1:
+            return NO_RIVALS
+        crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * blur
+        cover = bool((a <= ROOMY * A.separations()).all())
+        return cls(True, max(crowding, 0.0), cover)
+
+
+NO_RIVALS, UNKNOWN = Rivals(False, np.inf, True), Rivals(True, 0.0, False)
+
+
+def _radii(problem: NormalProblem, loads: Array) -> Array:
+    """(n,) [length] contact radii of loads, or a little more."""
+    radii: Array = np.pi / 2.0 * problem.influence.scale / problem.stiffness(loads) * (1 + SAFETY)
+    return radii
+
+
+def _mean(a: Array, b: Array) -> Array:
+    """m, such that scale / t is the mean stiffness between contact radii a and b; grows in both."""
+    total = a + b
+    product = np.divide(a * b, total, out=np.zeros_like(total), where=total > 0)
+    return np.asarray(2.0 / 3.0 * (total - product) * (1 + SAFETY))

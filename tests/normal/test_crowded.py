@@ -1,0 +1,239 @@
+"""Crowded contacts: what is held open, shells that overlap, and what rivals must be like."""
+
+import itertools
+from typing import Any
+
+import multiprecision
+import numpy as np
+import pytest
+from flint import arb, ctx
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scenes import MATERIAL, OPERATORS, operators, solve_exactly
+
+import convexrough as cr
+from convexrough.convex.definite import largest, proved_sparse_margin
+from convexrough.influence import Kind
+from convexrough.influence.coupling import inverse_distances
+from convexrough.influence.dense import DenseInfluence
+from convexrough.normal.boxes import CROWDED_MARGINS
+from convexrough.normal.overlap import overlapping_margin, overlaps
+
+Array = NDArray[np.float64]
+
+
+def random_points(seed: int, count: int, size: float = 1.0) -> cr.Scene:
+    """Asperities with no least distance; size 1 is the paper's."""
+    rng = np.random.default_rng(seed)
+    r, angle = 0.01 * np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
+    points = np.column_stack((r * np.cos(angle), r * np.sin(angle)))
+    tips = size * 0.02 * np.sqrt(61 / count) * rng.lognormal(0, 0.2, count)
+    return cr.Scene(1.0, cr.Asperities(points, tips), MATERIAL, friction=0.5)
+
+
+def assert_honest(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
+    for word, load, gap in zip(certificate.status, exact.loads, exact.gaps, strict=True):
+        assert word != "contact" or load > 0
+        assert word != "open" or gap > 0
+    assert (np.abs(multiprecision.errors(loads, exact.loads)) <= certificate.load_errors).all()
+    gap_errors = np.abs(multiprecision.errors(certificate.gaps, exact.gaps))
+    assert (gap_errors <= certificate.gap_errors).all()
+    drift = abs(float(multiprecision.errors([certificate.approach], [exact.approach])[0]))
+    assert drift <= certificate.approach_error
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.integers(2, 20),
+    st.floats(1.0, 4.0),
+    st.sampled_from(OPERATORS),
+    st.sampled_from([0.0, 1e-16, 1e-13, 1e-10, 1e-6, 1e-3]),
+)
+def test_random_points_are_judged_honestly(
+    seed: int, count: int, size: float, kind: Kind, off: float
+) -> None:
+    """Against the exact solution next to the loads, whatever these are off by."""
+    scene = random_points(seed, count, size)
+    if kind not in operators(scene):
+        return
+    contact = cr.press(scene, approach=5e-5, influence=kind)
+    wrong = contact.loads * (1 + off * np.random.default_rng(seed).standard_normal(count))
+    judged = cr.certify(scene, wrong, approach=5e-5, influence=kind)
+    if judged.scope == "none":
+        return
+    start = contact.loads + 1e-30 * contact.load
+    try:
+        exact = solve_exactly(scene, approach=5e-5, start=start)
+    except multiprecision.NotProved:
+        return
+    near = np.abs(multiprecision.errors(contact.loads, exact.loads)).max() < 1e-9 * contact.load
+    if judged.scope != "global" and not near:
+        return  # the exact one is another solution
+    assert_honest(judged, wrong, exact)
+    by_load = cr.certify(scene, wrong, load=contact.load, influence=kind)
+    if by_load.scope != "none":
+        exact = solve_exactly(scene, load=contact.load, start=start)
+        assert_honest(by_load, wrong, exact)
+
+
+def test_random_points_are_proved() -> None:
+    """Through a matrix and through a mesh: what used to be undecided is decided."""
+    for seed in range(6):
+        scene = random_points(seed, 300)
+        for kind in ("dense", "scattered"):
+            contact = cr.press(scene, approach=5e-5, influence=kind)
+            certificate = contact.certificate
+            assert contact.crowding > 1.5
+            assert certificate.scope == "local"
+            assert certificate.holds
+            assert certificate.held == (contact.status == "open").sum()
+            assert certificate.load_error < 1e-6 * contact.loads.max()
+            assert "held open" in certificate.meaning
+            sheared = cr.shear(contact, force=0.1 * 0.5 * contact.load)
+            assert sheared.certificate.scope in ("local", "none")
+
+
+def all_states(scene: cr.Scene, approach: float) -> list[Any]:
+    """Every solution, by every set of asperities that might touch."""
+    found = []
+    for many in range(len(scene) + 1):
+        for touching in itertools.combinations(range(len(scene)), many):
+            start = np.zeros(len(scene))
+            start[list(touching)] = 1e-8
+            try:
+                exact = solve_exactly(scene, approach=approach, start=start)
+            except multiprecision.NotProved:
+                continue
+            loads = np.array([float(load) for load in exact.loads])
+            if all(np.abs(loads - other).max() > 1e-12 for other in found):
+                found.append(loads)
+    return found
+
+
+@pytest.mark.parametrize("distance", [2e-4, 4e-4, 6e-4, 1e-3])
+def test_rivals_are_as_the_certificate_says(distance: float) -> None:
+    """Twins, where there are two or three solutions: each is judged, and says true things."""
+    points = np.array([[0.0, 0.0], [distance, 0.0], [3e-3, 0.0]])
+    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL)
+    approach = 5e-5
+    states = all_states(scene, approach)
+    assert states
+    inverse = inverse_distances(points, points)
+    nearest = 1 / inverse.max(axis=1)
+    judged_any = False
+    for mine in states:
+        judged = cr.certify(scene, mine, approach=approach)
+        judged_any |= judged.scope != "none"
+        if judged.scope == "none":
+            continue
+        assert judged.scope == "local" or len(states) == 1
+        for other in states:
+            if np.abs(other - mine).max() < 1e-12:
+                continue
+            radii = np.cbrt(0.75 * other * scene.relative_radii)
+            crowding = float((np.add.outer(radii, radii) * inverse).max())
+            assert crowding > judged.rival_crowding
+            assert not judged.rival_covers or (radii > nearest).any()
+    assert judged_any or distance == 4e-4  # crowding just above pi: only both touching is found
+
+
+def scaled(lengths: Array, points: Array) -> Array:
+    """I + H^-1/2 A H^-1/2."""
+    root = np.sqrt(lengths)
+    return np.asarray(
+        np.eye(len(points)) + root[:, None] * inverse_distances(points, points) * root
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 120), st.floats(0.05, 4.0))
+def test_overlapping_shells(seed: int, count: int, width: float) -> None:
+    """H^-1/2 (H + A) H^-1/2 >= S for any radii, and what is proved is below the least of it."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-1, 1, (count, 2))
+    lengths = rng.lognormal(0, 0.5, count) * 0.3 / np.sqrt(count)
+    radii = width * lengths * rng.lognormal(0, 0.5, count)
+    pairs = overlaps(points, lengths, radii)
+    if pairs is None:
+        return
+    S = np.diag(1 - lengths / radii)
+    S[pairs.first, pairs.second] = S[pairs.second, pairs.first] = pairs.values
+    hessian = scaled(lengths, points)
+    assert np.linalg.eigvalsh(hessian - S)[0] >= -1e-12 * hessian.max()
+    least = float(np.linalg.eigvalsh(hessian)[0])
+    A = DenseInfluence.assemble(points, 1.0)
+    assert overlapping_margin(A, lengths, CROWDED_MARGINS) <= max(least, 0.0)
+
+
+def test_an_isolated_pair_is_proved_up_to_pi() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0]])
+    A = DenseInfluence.assemble(points, 1.0)
+    for crowding, proved in ((1.6, True), (3.0, True), (3.13, True), (np.pi, False), (3.2, False)):
+        lengths = np.full(2, crowding / np.pi)
+        assert (overlapping_margin(A, lengths, CROWDED_MARGINS) > 0) == proved
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(-0.2, 0.6))
+def test_sparse_elimination_proves_no_more_than_is_true(seed: int, count: int, lift: float) -> None:
+    rng = np.random.default_rng(seed)
+    full = np.triu(rng.normal(0, 0.3, (count, count)) * (rng.random((count, count)) < 0.1), 1)
+    i, j = np.nonzero(full)
+    matrix = full + full.T
+    shift = lift - float(np.linalg.eigvalsh(matrix)[0])
+    diagonal = np.full(count, shift)
+    errors = np.full(len(i), 1e-5)
+    proved = proved_sparse_margin(diagonal, (i, j), full[i, j], CROWDED_MARGINS, errors)
+    assert proved <= max(lift, 0.0)
+    blurred = lift - 1e-5 * float((matrix != 0).sum(axis=1).max())
+    assert proved >= 0.4 * blurred or blurred < 3e-4 or proved == CROWDED_MARGINS[-1]
+
+
+def test_the_largest_margin() -> None:
+    margins = (1.0, 2.0, 3.0, 4.0, 5.0)
+    for limit in np.arange(0.5, 6.0):
+        true = max((m for m in margins if m <= limit), default=0.0)
+        assert largest(margins, lambda m, limit=limit: m <= limit) == true
+
+
+def energy(scene: cr.Scene, loads: Any, approach: float) -> arb:
+    """Phi in ball arithmetic, of the scene's float64 numbers."""
+    points = [[arb(x) for x in point] for point in scene.asperities.positions.tolist()]
+    modulus, R = arb(scene.material.contact_modulus), arb(scene.sphere_radius)
+    total = arb(0)
+    for i, load in enumerate(loads):
+        rho = arb(float(scene.asperities.tip_radii[i]))
+        k = (9 * (1 / R + 1 / rho) / (16 * modulus**2)).root(3)
+        drop = (points[i][0] ** 2 + points[i][1] ** 2) / (2 * R)
+        prescribed = arb(approach) + arb(float(scene.asperities.heights[i])) - drop
+        total += 3 * k * load.root(3) ** 5 / 5 - prescribed * load
+        for j in range(i):
+            r = ((points[i][0] - points[j][0]) ** 2 + (points[i][1] - points[j][1]) ** 2).sqrt()
+            total += load * loads[j] / (arb.pi() * modulus * r)
+    return total
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 12), st.floats(0.2, 3.0), st.floats(-16, -3))
+def test_energies_are_bounded(seed: int, count: int, size: float, digits: float) -> None:
+    """Of perturbed loads above the exact ones nearby, crowded or not."""
+    scene = random_points(seed, count, size)
+    contact = cr.press(scene, approach=5e-5)
+    off = 10.0**digits * np.random.default_rng(seed).standard_normal(count)
+    wrong = contact.loads * (1 + off)
+    judged = cr.certify(scene, wrong, approach=5e-5)
+    try:
+        exact = solve_exactly(scene, approach=5e-5, start=contact.loads + 1e-30 * contact.load)
+    except multiprecision.NotProved:
+        return
+    near = np.abs(multiprecision.errors(contact.loads, exact.loads)).max() < 1e-9 * contact.load
+    if judged.scope == "none" or not near:
+        return
+    with ctx.workdps(80):
+        above = energy(scene, [arb(float(load)) for load in wrong], 5e-5)
+        above -= energy(scene, exact.loads, 5e-5)
+        assert float(above.mid()) <= judged.duality_gap
+    if digits < -10:
+        assert judged.duality_gap < 1e-9 * 5e-5 * contact.load
