@@ -32,6 +32,12 @@ def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
     """The table of a sweep in a folder, finished or not. Nothing is read before it is asked for.
 
     Raises FileError where there is no sweep.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     made = cr.sweep([scene], load=3e-7, measure=["load"], out=folder, workers=1)
+    ...     print(cr.open_sweep(folder).counts())
+    {'certified': 1, 'undecided': 0, 'failed': 0}
     """
     found = open_folder(Path(folder))
     return SweepTable(found.manifest, found)
@@ -46,6 +52,11 @@ class SweepTable(Record):
     Columns: `scene`, its number; what is swept; `seed`, -1 where nothing is random; `status`,
     "certified", "undecided" or "failed"; `message`, why; and what was measured, nan where that
     failed.
+
+    >>> loads = [1e-7, 2e-7, 3e-7]
+    >>> table = cr.sweep([scene] * 3, load=loads, measure=["contacts"], workers=1)
+    >>> print(table.read(["normal.load", "contacts"])["contacts"], table.complete)
+    [19. 31. 37.] True
     """
 
     manifest: Mapping[str, Any]

@@ -225,3 +225,17 @@ def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> No
         pass
     with pytest.raises(cr.InputError, match="scheduler: found nonsense"), engines.dask("nonsense"):
         pass
+
+
+@pytest.mark.parametrize("spacing", [0.0025, 0.0005], ids=["matrix", "lattice"])
+def test_sharing_changes_no_bit(spacing: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes one after the other, and each as the first of its batch."""
+    lattice = {"spacing": spacing, "tip_radius": 8 * spacing, "within": 0.0102}
+    measured = {"seeds": 3, "measure": ["load", "approach", "certificate", "loss"]}
+    contents = tables(
+        asperities=lattice, sweep=measured | {"over": {"asperities.height_std": [1e-7]}}
+    )
+    with ThreadPoolExecutor(1) as here:
+        shared = cr.sweep(contents, executor=here)
+        monkeypatch.setattr(running, "MOST_SCENES", 1)
+        assert same(shared, cr.sweep(contents, executor=here))
