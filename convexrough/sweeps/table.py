@@ -14,7 +14,7 @@ from convexrough import checks, frames
 from convexrough.errors import ExtraError, InputError
 from convexrough.record import Record, in_words
 from convexrough.sweeps.batch import Columns, Rows
-from convexrough.sweeps.parts import Folder, Part, missing, once, open_folder, read_part
+from convexrough.sweeps.parts import Folder, Part, length, missing, once, open_folder, read_part
 
 if TYPE_CHECKING:
     import dask.dataframe
@@ -95,7 +95,7 @@ class SweepTable(Record):
         """How many rows there are."""
         if self.held is not None:
             return len(self.held["scene"])
-        return self.scenes - sum(map(len, missing(self._parts(), range(self.scenes))))
+        return self.scenes - sum(map(length, missing(self._parts(), range(self.scenes))))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
         """Some columns, default all, a part after the other: for what exceeds memory."""
@@ -114,6 +114,8 @@ class SweepTable(Record):
         wanted = self.columns if names is None else list(names)
         checks.fits_in_memory("rows", len(self), CELL * len(wanted))
         blocks = list(self.blocks(wanted))
+        if not blocks:
+            return {name: np.empty(0) for name in wanted}
         return {name: np.concatenate([block[name] for block in blocks]) for name in wanted}
 
     def counts(self) -> dict[str, int]:

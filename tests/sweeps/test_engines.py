@@ -112,13 +112,15 @@ def test_workers_that_never_live_are_given_up(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_another_version_on_a_worker_is_refused() -> None:
+    batch_versions = {**batch.VERSIONS, "numpy": "1.0"}
+
     class Older(engines.Given):
         def submit(self, batch: Batch) -> Future[Rows]:
             future: Future[Rows] = Future()
-            future.set_result(replace(compute(batch), version="0.0.9"))
+            future.set_result(replace(compute(batch), versions=batch_versions))
             return future
 
-    with pytest.raises(cr.WorkerError, match=r"a worker has version 0\.0\.9"):
+    with pytest.raises(cr.WorkerError, match=r"other versions: numpy 1\.0 instead"):
         running.run(PLAN, Older(ThreadPoolExecutor(1)))
 
 
