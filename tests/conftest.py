@@ -18,7 +18,7 @@ if os.environ.get("CI"):
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--full", action="store_true", help="the word audit on ten thousand scenes")
+    parser.addoption("--full", action="store_true", help="10,000 scenes audited, 60 sweeps killed")
 
 
 class Outcome(NamedTuple):

@@ -17,6 +17,7 @@ TOLERANCES = {
     "continuum_limit": 1e-5,
     "limits_of_shakedown": 1e-7,
     "normal_and_shear_together": 5e-5,
+    "roughness_statistics": 1e-3,
 }
 
 

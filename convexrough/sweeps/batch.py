@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from convexrough.errors import ConvexroughError
@@ -24,6 +25,13 @@ MOST_SECONDS = 60.0
 
 #: What can go wrong in a scene without anything being wrong with the others.
 FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
+
+#: Rows are the same, bit for bit, where these are.
+VERSIONS = {
+    "convexrough": __version__,
+    "numpy": np.__version__,
+    "scipy": scipy.__version__,
+}
 
 Columns = dict[str, NDArray[Any]]
 
@@ -55,13 +63,13 @@ class Batch:
 class Rows:
     """The rows of scenes that follow each other from `first` on.
 
-    version : of the package that computed them
+    versions : of the programs that computed them
     """
 
     first: int
     columns: Columns
     seconds: float
-    version: str = __version__
+    versions: Mapping[str, str] = field(default_factory=lambda: VERSIONS)
 
     def __len__(self) -> int:
         return len(self.columns["scene"])
@@ -69,6 +77,16 @@ class Rows:
     @property
     def stop(self) -> int:
         return self.first + len(self)
+
+
+def different(versions: Mapping[str, str]) -> str:
+    """Other versions than those here, in words; "" if they are the same."""
+    said = (
+        f"{name} {versions.get(name)} instead of {here}"
+        for name, here in VERSIONS.items()
+        if versions.get(name) != here
+    )
+    return ", ".join(said)
 
 
 def never() -> bool:

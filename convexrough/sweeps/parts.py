@@ -21,7 +21,7 @@ import numpy as np
 from convexrough.errors import ExtraError, FileError
 from convexrough.run.results import beside
 from convexrough.run.summary import to_json
-from convexrough.sweeps.batch import Columns, Rows
+from convexrough.sweeps.batch import Columns, Rows, different
 
 MANIFEST, PARTS = "manifest.json", "parts"
 
@@ -124,6 +124,8 @@ def make_folder(path: Path, manifest: Mapping[str, Any]) -> Folder:
             f"{path}: holds another sweep, {_named(there)}; this is {_named(asked)}; "
             f"--out takes another folder"
         )
+    if other := different(there["versions"]):
+        raise FileError(f"{path}: was begun with {other}; rows would not be of one kind")
     return folder
 
 
@@ -139,6 +141,11 @@ def best_format() -> str:
     return "parquet" if find_spec("pyarrow") else "npz"
 
 
+def length(numbers: range) -> int:
+    """`len` that can say 10^20."""
+    return max(0, numbers.stop - numbers.start)
+
+
 def missing(parts: Iterable[Part], numbers: range) -> list[range]:
     """The scenes that are in no part."""
     gaps, reached = [], numbers.start
@@ -147,7 +154,7 @@ def missing(parts: Iterable[Part], numbers: range) -> list[range]:
             gaps.append(range(reached, min(part.first, numbers.stop)))
         reached = max(reached, part.stop)
     gaps.append(range(reached, numbers.stop))
-    return [gap for gap in gaps if len(gap)]
+    return [gap for gap in gaps if gap.start < gap.stop]
 
 
 def once(parts: Iterable[Part]) -> Iterator[tuple[Part, range]]:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-import platform
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,11 +14,10 @@ import numpy as np
 
 from convexrough.errors import FileError, InputError
 from convexrough.progress import Announce
-from convexrough.run.results import NUMERICAL
-from convexrough.sweeps.batch import MOST_SCENES, Batch, Rows, compute
+from convexrough.sweeps.batch import MOST_SCENES, VERSIONS, Batch, Rows, compute
 from convexrough.sweeps.engines import Engine
 from convexrough.sweeps.measures import units
-from convexrough.sweeps.parts import Folder, best_format, make_folder, missing
+from convexrough.sweeps.parts import Folder, best_format, length, make_folder, missing
 from convexrough.sweeps.sources import Tables
 from convexrough.sweeps.sweep_file import Plan
 from convexrough.sweeps.table import SweepTable, joined
@@ -79,8 +76,8 @@ def run(
         folder = make_folder(Path(out), manifest(plan))
         todo, found = _missing(folder, numbers, resume)
         tell(str(found))
-    held = []
-    count = sum(map(len, todo))
+    held = [compute(_batch(plan, range(numbers.start, numbers.start)))]  # no rows, all columns
+    count = sum(map(length, todo))
     for rows in _told(Work(_batches(plan, todo, count, engine), engine).rows(), count, tell):
         if folder is None:
             held.append(rows)
@@ -111,10 +108,7 @@ def manifest(plan: Plan) -> dict[str, Any]:
         "units": _units(plan),
         "format": best_format(),
         **plan.said,
-        "versions": {
-            "python": platform.python_version(),
-            **{name: metadata.version(name) for name in NUMERICAL},
-        },
+        "versions": VERSIONS,
     }
 
 
@@ -148,15 +142,15 @@ def _share(count: int, part: tuple[int, int] | None) -> range:
 def _missing(folder: Folder, numbers: range, resume: bool) -> tuple[list[range], Found]:
     """What there is to do, and what was found; FileError where that is not to be gone on with."""
     parts = folder.parts()
-    there = _length(numbers) - sum(map(_length, missing(parts, numbers)))
+    there = length(numbers) - sum(map(length, missing(parts, numbers)))
     if there and not resume:
         raise FileError(
-            f"{folder.path}: holds {there:,} of these {_length(numbers):,} scenes already; "
+            f"{folder.path}: holds {there:,} of these {length(numbers):,} scenes already; "
             f"--resume computes the rest, --out takes another folder"
         )
     damaged, unfinished = folder.clear(numbers)
     todo = missing(folder.parts(), numbers)
-    return todo, Found(_length(numbers) - sum(map(_length, todo)), damaged, unfinished)
+    return todo, Found(length(numbers) - sum(map(length, todo)), damaged, unfinished)
 
 
 def _batches(plan: Plan, todo: Iterable[range], count: int, engine: Engine) -> Iterator[Batch]:
@@ -174,7 +168,7 @@ def _batch(plan: Plan, numbers: range) -> Batch:
 
 def _refuse_too_many(plan: Plan, numbers: range) -> None:
     """How many scenes, and how long: the first one is timed."""
-    if (count := _length(numbers)) <= MOST:
+    if (count := length(numbers)) <= MOST:
         return
     each = compute(_batch(plan, range(numbers.start, numbers.start + 1))).seconds
     raise InputError(
@@ -204,8 +198,3 @@ def duration(seconds: float) -> str:
         if seconds >= 2 * size:
             return f"{seconds / size:,.0f} {unit}"
     return f"{seconds:.0f} s"
-
-
-def _length(numbers: range) -> int:
-    """`len` that can say 10^20."""
-    return max(0, numbers.stop - numbers.start)

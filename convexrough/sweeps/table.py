@@ -14,7 +14,7 @@ from convexrough import checks, frames
 from convexrough.errors import ExtraError, InputError
 from convexrough.record import Record, in_words
 from convexrough.sweeps.batch import Columns, Rows
-from convexrough.sweeps.parts import Folder, Part, missing, once, open_folder, read_part
+from convexrough.sweeps.parts import Folder, Part, length, missing, once, open_folder, read_part
 
 if TYPE_CHECKING:
     import dask.dataframe
@@ -32,6 +32,12 @@ def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
     """The table of a sweep in a folder, finished or not. Nothing is read before it is asked for.
 
     Raises FileError where there is no sweep.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     made = cr.sweep([scene], load=3e-7, measure=["load"], out=folder, workers=1)
+    ...     print(cr.open_sweep(folder).counts())
+    {'certified': 1, 'undecided': 0, 'failed': 0}
     """
     found = open_folder(Path(folder))
     return SweepTable(found.manifest, found)
@@ -46,6 +52,11 @@ class SweepTable(Record):
     Columns: `scene`, its number; what is swept; `seed`, -1 where nothing is random; `status`,
     "certified", "undecided" or "failed"; `message`, why; and what was measured, nan where that
     failed.
+
+    >>> loads = [1e-7, 2e-7, 3e-7]
+    >>> table = cr.sweep([scene] * 3, load=loads, measure=["contacts"], workers=1)
+    >>> print(table.read(["normal.load", "contacts"])["contacts"], table.complete)
+    [19. 31. 37.] True
     """
 
     manifest: Mapping[str, Any]
@@ -84,7 +95,7 @@ class SweepTable(Record):
         """How many rows there are."""
         if self.held is not None:
             return len(self.held["scene"])
-        return self.scenes - sum(map(len, missing(self._parts(), range(self.scenes))))
+        return self.scenes - sum(map(length, missing(self._parts(), range(self.scenes))))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
         """Some columns, default all, a part after the other: for what exceeds memory."""
@@ -103,6 +114,8 @@ class SweepTable(Record):
         wanted = self.columns if names is None else list(names)
         checks.fits_in_memory("rows", len(self), CELL * len(wanted))
         blocks = list(self.blocks(wanted))
+        if not blocks:
+            return {name: np.empty(0) for name in wanted}
         return {name: np.concatenate([block[name] for block in blocks]) for name in wanted}
 
     def counts(self) -> dict[str, int]:

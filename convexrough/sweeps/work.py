@@ -7,9 +7,8 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 
 from convexrough.errors import WorkerError
-from convexrough.sweeps.batch import Batch, Rows, refused
+from convexrough.sweeps.batch import VERSIONS, Batch, Rows, different, refused
 from convexrough.sweeps.engines import Engine
-from convexrough.version import __version__
 
 #: Batches may be lost so often without any coming back: a scene that kills its worker is found
 #: among a thousand after ten times.
@@ -88,10 +87,8 @@ class Work:
             return
         except CancelledError as error:
             raise WorkerError("the engine dropped a batch: is its scheduler gone?") from error
-        if rows.version != __version__:
-            raise WorkerError(
-                f"a worker has version {rows.version} of convexrough, this is {__version__}"
-            )
+        if rows.versions != VERSIONS:
+            raise WorkerError(f"a worker has other versions: {different(rows.versions)}")
         self._lost = 0
         if len(rows):
             yield rows

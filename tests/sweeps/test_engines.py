@@ -112,13 +112,15 @@ def test_workers_that_never_live_are_given_up(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_another_version_on_a_worker_is_refused() -> None:
+    batch_versions = {**batch.VERSIONS, "numpy": "1.0"}
+
     class Older(engines.Given):
         def submit(self, batch: Batch) -> Future[Rows]:
             future: Future[Rows] = Future()
-            future.set_result(replace(compute(batch), version="0.0.9"))
+            future.set_result(replace(compute(batch), versions=batch_versions))
             return future
 
-    with pytest.raises(cr.WorkerError, match=r"a worker has version 0\.0\.9"):
+    with pytest.raises(cr.WorkerError, match=r"other versions: numpy 1\.0 instead"):
         running.run(PLAN, Older(ThreadPoolExecutor(1)))
 
 
@@ -225,3 +227,17 @@ def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> No
         pass
     with pytest.raises(cr.InputError, match="scheduler: found nonsense"), engines.dask("nonsense"):
         pass
+
+
+@pytest.mark.parametrize("spacing", [0.0025, 0.0005], ids=["matrix", "lattice"])
+def test_sharing_changes_no_bit(spacing: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes one after the other, and each as the first of its batch."""
+    lattice = {"spacing": spacing, "tip_radius": 8 * spacing, "within": 0.0102}
+    measured = {"seeds": 3, "measure": ["load", "approach", "certificate", "loss"]}
+    contents = tables(
+        asperities=lattice, sweep=measured | {"over": {"asperities.height_std": [1e-7]}}
+    )
+    with ThreadPoolExecutor(1) as here:
+        shared = cr.sweep(contents, executor=here)
+        monkeypatch.setattr(running, "MOST_SCENES", 1)
+        assert same(shared, cr.sweep(contents, executor=here))

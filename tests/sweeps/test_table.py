@@ -1,5 +1,6 @@
 """What is in the table of a sweep, and the forms in which it is had."""
 
+import json
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
@@ -192,6 +193,38 @@ def test_a_part_of_a_sweep(here: Executor, tmp_path: Path) -> None:
     assert same(table, whole)
     second = cr.sweep(SMALL, executor=here, part=(2, 3))
     assert numbers(second, "scene") == [list(range(5, 10))]
+
+
+def test_more_parts_than_scenes(here: Executor, tmp_path: Path) -> None:
+    few = sweeping(over={"normal.load": [1e-7, 2e-7]})
+    assert len(cr.sweep(few, executor=here, part=(1, 5))) == 0
+    table = cr.sweep(few, executor=here, out=tmp_path / "a", part=(1, 5))
+    assert (len(table), table.complete) == (0, False)
+    assert "0 of 2 scenes" in repr(table)
+    assert len(table.read()["contacts"]) == 0
+    assert all(len(values) == 0 for values in quantiles(table).values())
+    with pytest.raises(cr.InputError, match="found nothing to draw"):
+        table.plot()
+
+
+def test_other_versions_are_refused(here: Executor, tmp_path: Path) -> None:
+    cr.sweep(SMALL, executor=here, out=tmp_path / "a")
+    manifest = tmp_path / "a/manifest.json"
+    said = json.loads(manifest.read_text())
+    said["versions"]["scipy"] = "1.0"
+    manifest.write_text(json.dumps(said))
+    with pytest.raises(cr.FileError, match=r"was begun with scipy 1\.0 instead of "):
+        cr.sweep(SMALL, executor=here, out=tmp_path / "a", resume=True)
+
+
+def test_labels_have_the_units_of_the_scene(here: Executor) -> None:
+    named = {**SMALL, "units": {"length": "mm", "force": "N"}}
+    axes = cr.sweep(named, executor=here).plot("loss_0.37", "asperities.height_std")
+    assert axes.get_xlabel() == "asperities: height std (mm)"
+    assert axes.get_ylabel() == "loss 0.37 (N mm)"
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        "load 1e-07", "load 3e-07"
+    ]  # fmt: skip
 
 
 def test_scenes_computed_twice_are_there_once(here: Executor, tmp_path: Path) -> None:
