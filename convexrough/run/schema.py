@@ -23,6 +23,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from convexrough.checks import SIZED, is_sized, nearest
 from convexrough.influence import KINDS
+from convexrough.run.sensitivity import BY, NUMBERS
 from convexrough.solvers import SOLVERS
 
 
@@ -70,6 +71,13 @@ SolverName = Annotated[str, _expected(f"one of: {', '.join(SOLVERS)}", SOLVERS._
 
 
 ShakedownKind = Annotated[Literal["exact", "elastic"], _expected('"exact" or "elastic"')]
+
+
+Number = Annotated[str, _expected(f"one of: {', '.join(NUMBERS)}", NUMBERS.__contains__)]
+By = Annotated[
+    list[str], _expected(f"a list of some of: {', '.join(BY)}", lambda it: set(it) <= {*BY})
+]
+Control = Annotated[Literal["load", "approach"], _expected('"load" or "approach"')]
 
 
 class Table(BaseModel):
@@ -208,6 +216,20 @@ class Shakedown(Table):
             yield f"load_amplitudes: found {found} values, expected {len(self.force_amplitudes)}"
 
 
+class Gradient(Table):
+    of: Number
+    fraction: Share | None = None
+    by: By = list(BY)  # pydantic makes a copy of it
+    holding: Control | None = None
+
+    def mistakes_within(self) -> Iterator[str]:
+        sheared = self.of in ("loss", "displacement")
+        if sheared and self.fraction is None:
+            yield f"fraction: missing, needed with the {self.of}"
+        if not sheared and self.fraction is not None:
+            yield f"fraction: found {self.fraction}, expected none with the {self.of}"
+
+
 class Solver(Table):
     name: SolverName = "newton"
     influence: InfluenceName | None = None
@@ -233,6 +255,7 @@ class Document:
     path: Path | None = None
     steady: Path | None = None
     shakedown: Shakedown | None = None
+    gradient: Gradient | None = None
     solver: Solver = field(default_factory=Solver)
     units: Units = field(default_factory=Units)
 
@@ -249,6 +272,7 @@ _TABLES: dict[str, tuple[type[Table], ...]] = {
     "path": (Path,),
     "steady": (Path,),
     "shakedown": (Shakedown,),
+    "gradient": (Gradient,),
     "solver": (Solver,),
     "units": (Units,),
 }
@@ -277,6 +301,9 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
     if "friction" not in contents and (given := [name for name in _FRICTIONAL if name in contents]):
         mistakes.append(f"[friction]: missing table, needed with [{given[0]}]")
     mistakes += _unbounded(tables)
+    asked = tables.get("gradient")
+    if "friction" not in contents and asked is not None and asked.fraction is not None:
+        mistakes.append(f"[friction]: missing table, needed with the {asked.of} of [gradient]")
     return (None if mistakes else Document(**tables)), mistakes
 
 
