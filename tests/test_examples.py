@@ -16,6 +16,8 @@ TOLERANCES = {
     "continuum_limit": 1e-5,
     "limits_of_shakedown": 1e-7,
     "normal_and_shear_together": 5e-5,
+    "design_a_damper": 1e-3,
+    "scatter_of_heights": 0.1,
 }
 
 
