@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     )
     from convexrough.gradients.change import ContactChange, Direction, ShearChange
     from convexrough.gradients.gradient import Gradient
+    from convexrough.gradients.objective import Objective
     from convexrough.gradients.states import onset_gradient
     from convexrough.normal.certificate import Certificate, certify
     from convexrough.paths.memory import MemoryCurve
@@ -72,6 +73,7 @@ _HOMES = {
     ),
     "gradients.change": ("ContactChange", "Direction", "ShearChange"),
     "gradients.gradient": ("Gradient",),
+    "gradients.objective": ("Objective",),
     "gradients.states": ("onset_gradient",),
     "normal.certificate": ("Certificate", "certify"),
     "paths.memory": ("MemoryCurve",),
@@ -122,6 +124,7 @@ __all__ = [
     "Loop",
     "Material",
     "MemoryCurve",
+    "Objective",
     "PathComparison",
     "PathEntry",
     "PhaseLosses",

@@ -18,6 +18,8 @@ TOLERANCES = {
     "limits_of_shakedown": 1e-7,
     "normal_and_shear_together": 5e-5,
     "roughness_statistics": 1e-3,
+    "design_a_damper": 1e-3,
+    "scatter_of_heights": 0.1,
 }
 
 

@@ -80,6 +80,7 @@ def results() -> dict[str, Any]:
         contact.change(cr.Direction(heights=1e-8)),
         state.change(cr.Direction(heights=1e-8)),
         cr.Direction(heights=1e-8),
+        cr.Objective(scene=scene, of="loss", load=contact.load, force=Q),
     )
     return {type(each).__name__: each for each in found}
 

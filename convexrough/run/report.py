@@ -9,6 +9,7 @@ import numpy as np
 
 from convexrough.run.columns import aligned
 from convexrough.run.plausibility import doubts, geometry_matters
+from convexrough.run.sensitivity import gradient_lines
 from convexrough.run.summary import NORMAL, Summary
 
 _SCOPES = {
@@ -78,7 +79,8 @@ def _describe_shear(summary: Summary, length_unit: str, force_unit: str) -> list
         if len(steps) > 20:
             lines.append(f"(the last 20 of {len(steps)} steps; all are in history.csv)")
         lines += _numbers(["Q/(fP)", "displacement", "energy"], steps[-20:])
-    return lines + describe_varied(summary, length_unit, force_unit)
+    lines += describe_varied(summary, length_unit, force_unit)
+    return lines + (gradient_lines(summary["gradient"]) if "gradient" in summary else [])
 
 
 def describe_varied(summary: Summary, length_unit: str, force_unit: str) -> list[str]:

@@ -20,6 +20,7 @@ from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
 from convexrough.paths.shapes import elliptic_path
 from convexrough.record import Record
+from convexrough.run.sensitivity import Sensitivity
 from convexrough.run.stages import Stages
 from convexrough.run.tables import few, read_summits, read_text
 from convexrough.run.toml_slips import explained
@@ -131,6 +132,7 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
         cycle=(tuple(cycle.maximum), tuple(cycle.lowest)) if cycle else None,
         history=tuple(history.fractions) if history else None,
         varying=_varying(tables),
+        gradient=_sensitivity(tables),
         loop_points=cycle.loop_points if cycle else None,
         loop_asperities=_whose_loops(path, cycle, len(scene)) if cycle else None,
         solver=named(tables.solver.name),
@@ -174,6 +176,13 @@ def _varying(tables: Document) -> Varying:
             table.kind,
         )
     return Varying(**found, shakedown=limit)
+
+
+def _sensitivity(tables: Document) -> Sensitivity | None:
+    """What the table [gradient] asks for."""
+    if (table := tables.gradient) is None:
+        return None
+    return Sensitivity(table.of, table.fraction or 0.0, tuple(table.by), table.holding)
 
 
 def digest(path: Path) -> str:

@@ -23,6 +23,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from convexrough.checks import SIZED, is_sized, nearest
 from convexrough.influence import KINDS
+from convexrough.run.sensitivity import BY, NUMBERS
 from convexrough.solvers import SOLVERS
 
 
@@ -79,6 +80,13 @@ Force = Annotated[
     Annotated[Finite, Tag("number")] | Annotated[Pair, Tag("list")],
     Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
 ]
+
+
+Number = Annotated[str, _expected(f"one of: {', '.join(NUMBERS)}", NUMBERS.__contains__)]
+By = Annotated[
+    list[str], _expected(f"a list of some of: {', '.join(BY)}", lambda it: set(it) <= {*BY})
+]
+Control = Annotated[Literal["load", "approach"], _expected('"load" or "approach"')]
 
 
 class Table(BaseModel):
@@ -230,6 +238,20 @@ class Shakedown(Table):
                 yield f"force_amplitudes[{i}]: found {force}, expected {expected}"
 
 
+class Gradient(Table):
+    of: Number
+    fraction: Share | None = None
+    by: By = list(BY)  # pydantic makes a copy of it
+    holding: Control | None = None
+
+    def mistakes_within(self) -> Iterator[str]:
+        sheared = self.of in ("loss", "displacement")
+        if sheared and self.fraction is None:
+            yield f"fraction: missing, needed with the {self.of}"
+        if not sheared and self.fraction is not None:
+            yield f"fraction: found {self.fraction}, expected none with the {self.of}"
+
+
 class Solver(Table):
     name: SolverName = "newton"
     influence: InfluenceName | None = None
@@ -255,6 +277,7 @@ class Document:
     path: Path | None = None
     steady: Steady | None = None
     shakedown: Shakedown | None = None
+    gradient: Gradient | None = None
     solver: Solver = field(default_factory=Solver)
     units: Units = field(default_factory=Units)
 
@@ -271,6 +294,7 @@ _TABLES: dict[str, tuple[type[Table], ...]] = {
     "path": (Path,),
     "steady": (Steady,),
     "shakedown": (Shakedown,),
+    "gradient": (Gradient,),
     "solver": (Solver,),
     "units": (Units,),
 }
@@ -299,6 +323,9 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
     if "friction" not in contents and (given := [name for name in _FRICTIONAL if name in contents]):
         mistakes.append(f"[friction]: missing table, needed with [{given[0]}]")
     mistakes += _unbounded(tables)
+    asked = tables.get("gradient")
+    if "friction" not in contents and asked is not None and asked.fraction is not None:
+        mistakes.append(f"[friction]: missing table, needed with the {asked.of} of [gradient]")
     return (None if mistakes else Document(**tables)), mistakes
 
 

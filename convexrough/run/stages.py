@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.progress import Announce
+from convexrough.run.sensitivity import Differentiated, Sensitivity
 from convexrough.run.varying import Varied, Varying
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.shearing.cycle import Cycle, cycles, loops
@@ -36,6 +37,7 @@ class Stages:
     cycle   : maxima and minima of steady cycles, as fractions of f P
     history : shear forces one after the other, as fractions of f P
     varying : paths of load and shear, which do not start from the contact
+    gradient : of what, and by what
     loop_points : of each loop, about; None for what is affordable
     loop_asperities : whose loops to keep: indices or "all"; None for one at each distance from the
         axis, of at most 12 distances
@@ -45,6 +47,7 @@ class Stages:
     cycle: tuple[Fractions, Fractions] | None = None
     history: Fractions | None = None
     varying: Varying = field(default_factory=Varying)
+    gradient: Sensitivity | None = None
     loop_points: int | None = None
     loop_asperities: tuple[int, ...] | Literal["all"] | None = None
 
@@ -81,6 +84,7 @@ class Findings:
     cycles: tuple[Cycled, ...] = ()
     history: Followed | None = None
     varying: Varied = field(default_factory=Varied)
+    gradient: Differentiated | None = None
 
 
 def compute(contact: Contact, stages: Stages, announce: Announce | None = None) -> Findings:
@@ -89,8 +93,9 @@ def compute(contact: Contact, stages: Stages, announce: Announce | None = None) 
     announce : told in a line how far long work has come
     """
     varied = stages.varying.compute(contact, announce)
+    slopes = None if stages.gradient is None else stages.gradient.compute(contact)
     if stages.shear is None and stages.cycle is None and stages.history is None:
-        return Findings(contact, varying=varied)
+        return Findings(contact, varying=varied, gradient=slopes)
     limit = checks.friction(contact.scene.friction) * contact.load
     maxima, minima = stages.cycle or ((), ())
     steady = cycles(contact, limit * np.array(maxima), limit * np.array(minima), announce=announce)
@@ -108,6 +113,7 @@ def compute(contact: Contact, stages: Stages, announce: Announce | None = None) 
         cycles=tuple(map(Cycled, maxima, minima, steady, drawn)),
         history=followed,
         varying=varied,
+        gradient=slopes,
     )
 
 

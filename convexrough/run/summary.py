@@ -15,6 +15,7 @@ from convexrough.compare import Comparison, Entry
 from convexrough.contact import Contact
 from convexrough.normal.certificate import Certificate
 from convexrough.run.plausibility import limits_of
+from convexrough.run.sensitivity import gradient_summary
 from convexrough.run.stages import Findings
 from convexrough.run.varied import varied_summary
 from convexrough.version import __version__
@@ -76,6 +77,8 @@ def summarise(found: Findings) -> Summary:
             "energy": history.energy.tolist(),
             "energy_error": history.energy_errors.tolist(),
         }
+    if found.gradient is not None:
+        summary["gradient"] = gradient_summary(found.gradient)
     return summary | varied_summary(found.varying)
 
 

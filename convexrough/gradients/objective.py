@@ -1,0 +1,171 @@
+"""A number of a scene as a function of its parameters: what optimisers and frameworks call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.arrays import Array
+from convexrough.contact import press
+from convexrough.errors import InputError
+from convexrough.gradients.gradient import Gradient
+from convexrough.influence import Kind
+from convexrough.record import Record
+from convexrough.scene.asperities import Asperities
+from convexrough.scene.material import Material
+from convexrough.scene.scene import Scene
+from convexrough.shearing.cycle import cycle
+from convexrough.shearing.state import shear
+
+#: What it can be a number of, and what must be prescribed for it besides a load or an approach.
+NUMBERS = {"loss": "force", "displacement": "force", "approach": "load", "load": "approach"}
+
+#: What it can be a function of: of the asperities, of the scene, and what is prescribed.
+EACH, WHOLE = ("heights", "tip_radii", "positions"), ("sphere_radius", "friction")
+ELASTIC, PRESCRIBED = ("contact_modulus", "poisson_ratio"), ("load", "approach", "force")
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Objective(Record):
+    """A number of a scene as a function of a vector of parameters, and its gradient.
+
+    scene : what is not varied is as there
+    of    : "loss" of the symmetric cycle of this force, "displacement" under it, "approach" under
+        a load, "load" at an approach
+    by    : what the vector holds, in this order: "heights", "tip_radii", "positions" (x and y of
+        the first asperity, ...), "sphere_radius", "contact_modulus", "poisson_ratio", "friction",
+        "load", "approach", "force"
+    load or approach : what is prescribed, and held;  force : [force] half the range of the cycle
+    influence : how to couple, as in `press`
+
+    `objective(x)` is (value, gradient): what `scipy.optimize.minimize(..., jac=True)` calls.
+    `to_jax`, `to_torch` and `to_autograd` give functions of those packages.
+
+    >>> loss = cr.Objective(scene=scene, of="loss", by=["heights"], load=3.6e-7, force=9e-8)
+    >>> value, slopes = loss(loss.start)
+    >>> print(f"{value:.4g}", len(slopes))
+    1.364e-13 61
+    """
+
+    scene: Scene
+    of: str
+    by: Sequence[str] = field(default=("heights",))
+    load: float | None = None
+    approach: float | None = None
+    force: float | None = None
+    influence: Kind | None = None
+
+    def __post_init__(self) -> None:
+        checks.instance("scene", self.scene, Scene)
+        checks.exactly_one("load", self.load, "approach", self.approach)
+        if self.of not in NUMBERS:
+            expected = f"one of: {', '.join(NUMBERS)}"
+            raise InputError("of", found=repr(self.of), expected=expected)
+        needed = NUMBERS[self.of]
+        if getattr(self, needed) is None:
+            raise InputError(needed, found="none", expected=f"a number, for the {self.of}")
+        known = (*EACH, *WHOLE, *ELASTIC, *PRESCRIBED)
+        by = (self.by,) if isinstance(self.by, str) else tuple(self.by)
+        object.__setattr__(self, "by", by)
+        for name in by:
+            if name not in known or (name in PRESCRIBED and getattr(self, name) is None):
+                able = [each for each in known if getattr(self, each, 0.0) is not None]
+                raise InputError("by", found=repr(name), expected=f"some of: {', '.join(able)}")
+
+    @property
+    def start(self) -> Array:
+        """The vector of the scene itself, and of what is prescribed."""
+        return np.concatenate([np.ravel(self._own(name)) for name in self.by]).astype(np.float64)
+
+    def __call__(self, parameters: ArrayLike) -> tuple[float, Array]:
+        """The number and its gradient, (m,) as the parameters.
+
+        Raises InputError for parameters that no scene has, or for which there is no gradient.
+        """
+        gradient = self.gradient(parameters)
+        slopes = [np.ravel(_slope(gradient, name)) for name in self.by]
+        return gradient.value, np.concatenate(slopes)
+
+    def gradient(self, parameters: ArrayLike) -> Gradient:
+        """Everything about the number at these parameters."""
+        given = dict(self._split(parameters))
+        scene, control = self._scene(given), {}
+        for name in PRESCRIBED:
+            value = given.get(name, getattr(self, name))
+            control[name] = None if value is None else float(value)
+        contact = press(
+            scene, load=control["load"], approach=control["approach"], influence=self.influence
+        )
+        force = control["force"]
+        if self.of == "loss":
+            return cycle(contact, maximum=force).gradient()
+        if self.of == "displacement":
+            return shear(contact, force=force).gradient(displacement=1.0)
+        if self.of == "approach":
+            return contact.gradient(approach=1.0)
+        return contact.gradient(load=1.0)
+
+    def to_jax(self) -> Callable[[Any], Any]:
+        """A function of jax: `jax.grad`, `jax.jit` and `jax.vmap` take it. Raises ExtraError."""
+        from convexrough.gradients.with_jax import differentiable
+
+        return differentiable(self)
+
+    def to_torch(self) -> Callable[[Any], Any]:
+        """A function of torch: `backward` goes through it. Raises ExtraError."""
+        from convexrough.gradients.with_torch import differentiable
+
+        return differentiable(self)
+
+    def to_autograd(self) -> Callable[[Any], Any]:
+        """A function of autograd: `autograd.grad` takes it. Raises ExtraError."""
+        from convexrough.gradients.with_autograd import differentiable
+
+        return differentiable(self)
+
+    def _own(self, name: str) -> Any:
+        """A parameter as the scene has it, or as prescribed."""
+        if name in EACH:
+            return getattr(self.scene.asperities, name)
+        if name in ELASTIC:
+            return getattr(self.scene.material, name)
+        if name == "friction":
+            return checks.friction(self.scene.friction)
+        return getattr(self if name in PRESCRIBED else self.scene, name)
+
+    def _split(self, parameters: ArrayLike) -> Iterator[tuple[str, Array]]:
+        vector, done, m = checks.array("parameters", parameters), 0, len(self.start)
+        if len(vector) != m:
+            expected = f"{m}: {', '.join(self.by)}"
+            raise InputError("parameters", found=f"{len(vector)} numbers", expected=expected)
+        for name in self.by:
+            shape = np.shape(self._own(name))
+            size = int(np.prod(shape))
+            yield name, vector[done : done + size].reshape(shape)
+            done += size
+
+    def _scene(self, given: dict[str, Array]) -> Scene:
+        a, material = self.scene.asperities, self.scene.material
+        each = {name: given.get(name, getattr(a, name)) for name in EACH}
+        modulus, ratio = (float(given.get(each, getattr(material, each))) for each in ELASTIC)
+        scene = replace(
+            self.scene,
+            asperities=Asperities(**each),
+            material=Material(modulus, ratio, material.hardness),
+            sphere_radius=float(given.get("sphere_radius", self.scene.sphere_radius)),
+        )
+        if "friction" in given:
+            scene = replace(scene, friction=float(given["friction"]))
+        return scene
+
+
+def _slope(gradient: Gradient, name: str) -> Any:
+    """dJ by one of the parameters; where the force is half the range of a cycle, both ends move."""
+    if name == "force" and gradient.maximum is not None:
+        return 2.0 * gradient.maximum
+    return getattr(gradient, name)

@@ -1,0 +1,139 @@
+"""Which roughness loses most, and which least?  A damper designed by gradients.
+
+A joint under a load takes a shear force to and fro. Sixty-one asperities may be taller or lower by
+2 % of the approach, and no more on average: which heights make the cycle lose most? The loss has a
+gradient by every height, for the price of two linear systems, so any optimiser can ask. Equal
+heights are neither best nor worst.
+
+    python examples/design_a_damper.py --draw design.png
+    python examples/design_a_damper.py --finer 4          # about 1,000 asperities, a minute
+
+Loads have a kink of second order wherever an asperity makes contact, and an open asperity has a
+gradient of zero: no optimiser lifts it. So start from random heights, and more than once. Second
+derivatives do not exist, and methods that want them should not be given any.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+import convexrough as cr
+
+Array = NDArray[np.float64]
+Pair = tuple[str, float, float]  # what it is, computed, reference
+
+LOAD, FRICTION, FRACTION = 3.60853389e-7, 0.5, 0.5
+FARTHEST = 1e-6  # [length] 2 % of the approach
+SEEDS = (0, 2)
+
+
+def scene(finer: int = 1) -> cr.Scene:
+    """The source paper's, equal heights; or on a finer lattice, as crowded."""
+    asperities = cr.Asperities.hexagonal(
+        spacing=0.0025 / finer, tip_radius=0.02 / finer, within=0.0102
+    )
+    return cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), FRICTION)
+
+
+def design(sign: float, seed: int, finer: int = 1) -> tuple[Array, float, float]:
+    """Heights of most (1) or least (-1) loss, that loss and what is left of the gradient.
+
+    The loss is over that of equal heights, heights are in units of the farthest: optimisers stop by
+    numbers that mean something at about 1. What is left: the best that any direction could gain.
+    """
+    force = FRACTION * FRICTION * LOAD
+    loss = cr.Objective(scene=scene(finer), of="loss", load=LOAD, force=force)
+    equal, _ = loss(loss.start)
+
+    def cost(z: Array) -> tuple[float, Array]:
+        value, slopes = loss(FARTHEST * z)
+        return -sign * value / equal, -sign * slopes * FARTHEST / equal
+
+    n = len(loss.start)
+    start = np.random.default_rng(seed).uniform(-0.5, 0.5, n)
+    bounds = [(-1.0, 1.0)] * n
+    search: Any = minimize  # whose types know no such constraints
+    if finer == 1:
+        level = {"type": "eq", "fun": np.mean, "jac": lambda z: np.full(n, 1 / n)}
+        options: dict[str, float] = {"ftol": 1e-8, "maxiter": 60}
+        found = search(
+            cost, start, jac=True, method="SLSQP", bounds=bounds, constraints=level, options=options
+        )
+    else:  # a shift of all heights changes nothing under a load, but for who is at a bound
+        options = {"maxiter": 40}
+        found = search(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
+    z = np.clip(found.x, -1.0, 1.0)
+    value, slopes = cost(z)
+    return FARTHEST * z, -sign * value, gain(z, -slopes)
+
+
+def gain(z: Array, slopes: Array) -> float:
+    """First-order gain of the best feasible step: raise what gains most, lower what gains least.
+
+    Of heights within bounds, whose mean is held by a shift that every height shares.
+    """
+    low, high = slopes[z > -1 + 1e-9], slopes[z < 1 - 1e-9]
+    return max(float(high.max() - low.min()), 0.0)
+
+
+def compare() -> list[Pair]:
+    """Most and least of several starts; the gradient at the best against a difference."""
+    most = [design(1.0, seed) for seed in SEEDS]
+    least = [design(-1.0, seed) for seed in SEEDS]
+    pairs = [
+        ("most, over equal heights", max(value for _, value, _ in most), 1.195),
+        ("least, over equal heights", min(value for _, value, _ in least), 0.848),
+        ("most, from another start", most[0][1], most[1][1]),
+        ("no step gains another 1e-4", float(most[0][2] < 1e-4), 1.0),
+    ]
+    heights, _, _ = most[0]
+    force = FRACTION * FRICTION * LOAD
+    loss = cr.Objective(scene=scene(), of="loss", load=LOAD, force=force)
+    along = np.random.default_rng(1).normal(size=len(heights)) * FARTHEST
+    ends = [loss(heights + part * 1e-5 * along)[0] for part in (1, -1)]
+    slope = float(loss(heights)[1] @ along)
+    return [*pairs, ("slope along a direction", slope, (ends[0] - ends[1]) / 2e-5)]
+
+
+def draw(path: str) -> None:
+    """Heights of most and of least loss, on the array."""
+    import matplotlib.pyplot as plt
+
+    figure, panels = plt.subplots(1, 2, figsize=(7.0, 3.3), layout="constrained", sharey=True)
+    points = 1e3 * scene().asperities.positions
+    for axes, sign, word in zip(panels, (1.0, -1.0), ("most", "least"), strict=True):
+        best = max((design(sign, seed) for seed in SEEDS), key=lambda it: sign * it[1])
+        look = {"cmap": "viridis", "vmin": -1, "vmax": 1, "edgecolors": "0.3", "linewidths": 0.4}
+        dots = axes.scatter(*points.T, s=110, c=best[0] / FARTHEST, **look)
+        axes.set(
+            title=f"{word}: {best[1]:.2f} of equal heights", aspect="equal", xlabel="x / (R / 1000)"
+        )
+    panels[0].set_ylabel("y / (R / 1000)")
+    figure.colorbar(dots, ax=panels, label="height over the farthest", shrink=0.85)
+    figure.savefig(path, dpi=150)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="heights of most and least loss")
+    parser.add_argument("--draw", metavar="FILE", help="draw the heights")
+    parser.add_argument("--finer", type=int, default=1, help="how many times finer the lattice is")
+    given = parser.parse_args()
+    path = given.draw
+    if given.finer > 1:
+        for sign, word in ((1.0, "most"), (-1.0, "least")):
+            heights, value, _ = design(sign, SEEDS[0], given.finer)
+            print(f"{len(heights):,} asperities: {word} {value:.4f} of equal heights")
+        return
+    for name, computed, reference in compare():
+        print(f"{name:32}{computed:16.6g}{reference:16.6g}")
+    if path:
+        draw(path)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,88 @@
+"""How sure is a loss whose heights are known to some digits?  First order, and where it fails.
+
+Heights scatter independently with a standard deviation. To first order the loss scatters by that
+times the length of its gradient: no sampling at all. This holds as long as the deviation is small
+beside the least gap and the least indentation. Beyond, asperities make and lose contact, and first
+order says too little; but it is still a good control variate: its mean is known, so subtract it
+from every sample and only what it does not explain is left to average.
+
+    python examples/scatter_of_heights.py --samples 400
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+import convexrough as cr
+
+Array = NDArray[np.float64]
+Pair = tuple[str, float, float]  # what it is, computed, reference
+
+LOAD, FRICTION, FRACTION = 3.60853389e-7, 0.5, 0.5
+SMALL, LARGE = 1e-7, 1e-6  # [length] 0.2 % and 2 % of the approach
+
+
+def scene() -> cr.Scene:
+    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    return cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), FRICTION)
+
+
+def loss(heights: Array) -> cr.Cycle:
+    mean = scene()
+    a = mean.asperities
+    there = replace(mean, asperities=cr.Asperities(a.positions, a.tip_radii, heights))
+    return cr.cycle(cr.press(there, load=LOAD), maximum=FRACTION * FRICTION * LOAD)
+
+
+def sampled(deviation: float, samples: int) -> tuple[Array, Array]:
+    """Losses of random heights, and what first order says of each; over that of equal heights."""
+    equal = loss(np.zeros(61))
+    slopes = equal.gradient(holding="load").heights
+    rng = np.random.default_rng(0)
+    heights = deviation * rng.normal(size=(samples, 61))
+    found = np.array([loss(each).energy for each in heights])
+    return found / equal.energy, 1.0 + heights @ slopes / equal.energy
+
+
+def foretold(deviation: float) -> float:
+    """The standard deviation to first order."""
+    equal = loss(np.zeros(61))
+    length = np.linalg.norm(equal.gradient(holding="load").heights)
+    return float(deviation * length / equal.energy)
+
+
+def unexplained(found: Array, first_order: Array) -> float:
+    """The part of the standard deviation that a control variate leaves."""
+    centred, known = found - found.mean(), first_order - first_order.mean()
+    rest = centred - (centred @ known) / (known @ known) * known
+    return float(rest.std() / centred.std())
+
+
+def compare(samples: int = 60) -> list[Pair]:
+    """First order holds for small scatter and not for large; as a control variate it helps both."""
+    small, large = sampled(SMALL, samples), sampled(LARGE, samples)
+    return [
+        ("small: deviation over foretold", small[0].std() / small[1].std(), 1.0),
+        ("small: left by a control variate, below 0.1", float(unexplained(*small) < 0.1), 1.0),
+        ("large: first order fails by a fifth", float(large[1].std() < 0.85 * large[0].std()), 1.0),
+        ("large: left by a control variate, below 0.8", float(unexplained(*large) < 0.8), 1.0),
+    ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="the scatter of a loss")
+    parser.add_argument("--samples", type=int, default=200)
+    samples: int = parser.parse_args().samples
+    for deviation in (SMALL, LARGE):
+        found, first = sampled(deviation, samples)
+        print(f"heights {deviation:g}: loss {found.mean():.4f} of that of equal ones")
+        print(f"  deviation  {found.std():.4f}, foretold {foretold(deviation):.4f}")
+        print(f"  left by a control variate  {unexplained(found, first):.2f} of it")
+
+
+if __name__ == "__main__":
+    main()

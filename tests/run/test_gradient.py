@@ -1,0 +1,106 @@
+"""[gradient] in scene files: its table, numbers, words, figure, and mistakes."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import convexrough as cr
+
+SCENE = """
+[sphere]
+radius = 1.0
+[material]
+contact_modulus = 1.0
+poisson_ratio = 0.3
+[asperities]
+pattern = "hexagonal"
+spacing = 0.0025
+tip_radius = 0.02
+within = 0.0102
+[normal]
+load = 3.60853389e-7
+[friction]
+coefficient = 0.5
+"""
+
+
+def write(table: str, scene: str = SCENE) -> None:
+    Path("scene.toml").write_text(scene + table)
+
+
+def read(name: str) -> dict[str, Any]:
+    with Path(f"out/{name}.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    return {key: np.array([float(row[key]) for row in rows]) for key in rows[0]}
+
+
+def test_a_run(command: Any) -> None:
+    write('[gradient]\nof = "loss"\nfraction = 0.5\n')
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert outcome.status == 0, outcome.err
+    assert "gradient of the loss at Q/(fP) = 0.5, load held" in outcome.out
+    summary = json.loads(Path("out/summary.json").read_text())["gradient"]
+    file = cr.read_scene("scene.toml")
+    contact = cr.press(file.scene, load=file.load)
+    gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient()
+    table = read("gradient")
+    np.testing.assert_array_equal(table["by_height"], gradient.heights)
+    np.testing.assert_array_equal(table["error"], gradient.height_errors)
+    np.testing.assert_array_equal(table["by_tip_radius"], gradient.tip_radii)
+    np.testing.assert_array_equal(table["by_y"], gradient.positions[:, 1])
+    assert summary["by"]["contact_modulus"] == gradient.contact_modulus
+    assert summary["largest_by_height"] == gradient.heights[summary["largest_at"]]
+    assert abs(summary["largest_by_height"]) == np.abs(gradient.heights).max()
+    for kind in ("png", "svg"):
+        assert Path(f"out/gradient.{kind}").stat().st_size > 0
+
+
+@pytest.mark.parametrize("of", ["displacement", "approach", "load"])
+def test_other_numbers_and_fewer_columns(command: Any, of: str) -> None:
+    part = "fraction = 0.3\n" if of == "displacement" else ""
+    write(f'[gradient]\nof = "{of}"\nby = ["heights"]\nholding = "approach"\n{part}')
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures", "--json")
+    assert outcome.status == 0, outcome.err
+    summary = json.loads(outcome.out)["gradient"]
+    assert (summary["of"], summary["holding"]) == (of, "approach")
+    table = read("gradient")
+    assert set(table) == {"x", "y", "by_height", "error"}
+    moved = summary["by"]["approach"]
+    # To raise all heights is to press deeper, where the approach itself is not what is asked for.
+    assert table["by_height"].sum() == pytest.approx(0.0 if of == "approach" else moved, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ('of = "los"', "of: found 'los', expected one of: loss, displacement, approach, load"),
+        ('of = "loss"', "fraction: missing, needed with the loss"),
+        ('of = "load"\nfraction = 0.1', "fraction: found 0.1, expected none with the load"),
+        ('of = "loss"\nfraction = 2.0', "expected a number from 0 to 1"),
+        ('of = "load"\nby = ["height"]', "expected a list of some of: heights, tip_radii"),
+        ('of = "load"\nholding = "gap"', 'expected "load" or "approach"'),
+    ],
+)
+def test_mistakes(command: Any, table: str, said: str) -> None:
+    write(f"[gradient]\n{table}\n")
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert outcome.status == 2
+    assert said in outcome.err
+
+
+def test_a_loss_needs_friction(command: Any) -> None:
+    write('[gradient]\nof = "loss"\nfraction = 0.5\n', SCENE.split("[friction]")[0])
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert outcome.status == 2
+    assert "[friction]: missing table, needed with the loss of [gradient]" in outcome.err
+
+
+def test_where_there_is_none(command: Any) -> None:
+    write('[gradient]\nof = "loss"\nfraction = 1.0\nholding = "approach"\n')
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert outcome.status == 2
+    assert "with the approach held f P may fall below the force" in outcome.err
