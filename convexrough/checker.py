@@ -30,9 +30,7 @@ MOST_ASPERITIES, MOST_BYTES = 3000, 1 << 24
 BITS = 128  # significant bits to which the ends of an interval are rounded, outwards
 GRID = 160  # bits of the largest coordinate as an integer: points are known to 1 on that grid
 NEAREST = 1 << 80  # asperities nearer than this on the grid are refused
-UNIT = (
-    1 << 240
-)  # an inverse distance is an integer over this, too small by a factor of SLACK at most
+UNIT = 1 << 240  # an inverse distance is an integer over this, too small by SLACK at most
 SLACK = 1 + Fraction(1, 1 << 70)
 FAR = 1 << 400  # stands for the distance of an asperity to itself, as it does not push itself
 ROOT_BITS = 60  # of the integer Cholesky factor

@@ -61,3 +61,12 @@ def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:
     assert "warning: nothing is proved" in ran.err
     written = {path.name for path in (tmp_path / "crowded-results").iterdir()}
     assert written == {"summary.json", "asperities.csv", "files.json", "scene.toml"}
+
+
+def test_a_proof_of_another_run_does_not_stay(command: Any, tmp_path: Path) -> None:
+    command("new", "first.toml")
+    assert command("run", "first.toml", "--proof", "--no-figures").status == 0
+    folder = tmp_path / "first-results"
+    assert "proof.json" in json.loads((folder / "files.json").read_text())["files"]
+    assert command("run", "first.toml", "--no-figures", "--force").status == 0
+    assert not (folder / "proof.json").exists()
