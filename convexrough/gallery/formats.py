@@ -45,7 +45,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
 
 
 def clarabel_json(program: ConeProgram) -> bytes:
-    """What clarabel.load_from_file reads, and solver.save_to_file writes, with default settings."""
+    """What clarabel.load_from_file reads; its Python package (0.11) has nothing that writes it."""
     data = {
         "P": _columns(program.quadratic),
         "q": program.linear.tolist(),
