@@ -64,7 +64,7 @@ def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Colum
                 )
                 yield name, {key: column[some] for key, column in columns.items()}
             return
-    yield "median", columns
+    yield "median, 25 to 75 %, 5 to 95 %", columns
 
 
 def _draw_band(axes: Axes, x: Any, y: Array, name: str, look: tuple[str, str, str]) -> None:
