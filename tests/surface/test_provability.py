@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import convexrough as cr
 from convexrough.errors import SolverError
-from convexrough.surface import crowded, model_errors, provability
+from convexrough.surface import Provability, crowded, model_errors, provability
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384)
 
@@ -48,6 +48,26 @@ def test_stronger_pruning_leaves_the_model_room() -> None:
     assert curve.trusted[first:].all()
     assert not curve.trusted[first - 1]
     assert (np.diff(curve.summits) < 0).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "trusted"),
+    [
+        ({}, True),
+        ({"scope": "local"}, True),
+        ({"scope": "none"}, False),
+        ({"undecided": 1}, False),
+        ({"crowding": 1.001}, False),
+        ({"model_error": 0.0501}, False),
+        ({"crowding": np.nan}, False),
+    ],
+)
+def test_what_trust_needs(change: dict[str, object], trusted: bool) -> None:
+    row = dict(prune=0.1, heights=0.1, summits=9, contacts=5, undecided=0, scope="global",
+               crowding=0.999, model_error=0.0499, approaches=1.0, loads=1.0) | change  # fmt: skip
+    curve = Provability(**{name: np.array([value]) for name, value in row.items()})
+    assert curve.trusted.tolist() == [trusted]
+    assert (curve.trusted_from == 0.1) == trusted
 
 
 def test_where_nothing_is_left_the_curve_ends() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import least_squares
 
 import convexrough as cr
 from convexrough.surface.holes import filled
@@ -43,6 +44,41 @@ def test_a_sphere_is_removed_and_said(radius: float) -> None:
     rough = cr.surface.Surface(cap + NOISE, (0.5, 0.7)).detrend("sphere")
     assert_allclose(rough.removed[0].radius, radius, rtol=5e-3)
     assert_allclose(rough.rms_height, NOISE.std(), rtol=1e-2)
+
+
+@pytest.mark.parametrize("radius", [22.0, -60.0])
+def test_no_sphere_fits_better(radius: float) -> None:
+    """Of heights far from any sphere, against a general optimiser in centre and radius."""
+    x, y = grid()
+    sign = np.sign(radius)
+    heights = sign * np.sqrt(radius**2 - x**2 - y**2) + 1e3 * NOISE * (np.cos(x) + y / 10) / 3
+    surface = cr.surface.Surface(heights, (0.5, 0.7)).detrend("sphere")
+
+    def misfit(where: np.ndarray) -> np.ndarray:
+        x0, y0, z0, curvature = where
+        r = 1 / curvature
+        inside = np.maximum(r * r - (x - x0) ** 2 - (y - y0) ** 2, 1e-9)
+        return (heights - z0 - np.sign(r) * np.sqrt(inside)).ravel()
+
+    start = [0.0, 0.0, 0.0, 1 / radius]
+    best = least_squares(misfit, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    assert_allclose(surface.removed[0].curvature, best.x[3], rtol=1e-5)
+    assert_allclose(surface.rms_height, np.sqrt(np.mean(best.fun**2)), rtol=1e-9)
+
+
+def test_another_unit_is_the_same_surface() -> None:
+    x, y = grid()
+    cap = np.sqrt(50**2 - x**2 - y**2) + NOISE
+    scan = cr.surface.Surface(cap, (0.5, 0.7), unit="mm").detrend("sphere")
+    metres = scan.to_unit("m")
+    assert_allclose(metres.heights, 1e-3 * scan.heights, rtol=1e-15)
+    assert_allclose(metres.pixel, (0.5e-3, 0.7e-3), rtol=1e-15)
+    one, other = scan.removed[0], metres.removed[0]
+    assert_allclose((other.radius, other.height), (1e-3 * one.radius, 1e-3 * one.height))
+    assert other.slopes == one.slopes
+    assert_allclose(metres.to_unit("um").summits(0.1).tip_radii, 1e3 * scan.summits(0.1).tip_radii)
+    with pytest.raises(cr.InputError, match="unit: found none, expected a unit of length of the"):
+        cr.surface.Surface(cap, 1.0).to_unit("m")
 
 
 def test_removals_are_remembered_in_their_order() -> None:
