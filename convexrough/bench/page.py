@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from convexrough.bench.gradients import GradientRow
 from convexrough.bench.machine import busy
 from convexrough.bench.measure import CostRow, Row
 from convexrough.bench.suite import Bench, Panel, ShearRow
@@ -21,6 +22,8 @@ WORK_HEADING = ["solver", "setting", "error", "seconds", "assembling", "certifyi
 WORK_HEADING += ["single", "iterations", "MB", ""]
 COST_HEADING = ["scene", "asperities", "touching", "seconds", "assembling", "solving"]
 COST_HEADING += ["certifying", "A P", "single", "MB", "B each", "proved error"]
+GRADIENT_HEADING = ["scene", "asperities", "touching", "press", "cycle", "gradient"]
+GRADIENT_HEADING += ["A P", "single"]
 SHEAR_HEADING = ["what", "asperities", "touching", "states", "seconds", "s per state", "MB"]
 
 
@@ -66,6 +69,9 @@ def _costs(bench: Bench) -> Iterator[Section]:
     yield Section("cost of a press", _cost_table(bench.cost), 1, _messages(bench.cost))
     if bench.shear:
         yield Section("cost of shear", _shear_table(bench.shear), 1, _messages(bench.shear))
+    if bench.gradients:
+        messages = _messages(bench.gradients)
+        yield Section("cost of a gradient", _gradient_table(bench.gradients), 1, messages)
 
 
 def renewed_page(page: Path, bench: Bench, figures: str) -> str:
@@ -147,7 +153,21 @@ def _shear_table(rows: Sequence[ShearRow]) -> list[list[str]]:
     return table
 
 
-def _messages(rows: Sequence[Row] | Sequence[CostRow] | Sequence[ShearRow]) -> list[str]:
+def _gradient_table(rows: Sequence[GradientRow]) -> list[list[str]]:
+    table = [GRADIENT_HEADING]
+    for row in rows:
+        cells = [f"{row.asperities:,}", row.outcome, *["-"] * 5]
+        if row.outcome == "answered":
+            times = (row.pressing, row.cycling, row.differentiating)
+            cells = [f"{row.asperities:,}", f"{row.touching:,}", *map(_seconds, times)]
+            cells += [str(row.products), str(row.single)]
+        table.append([row.family, *cells])
+    return table
+
+
+def _messages(
+    rows: Sequence[Row] | Sequence[CostRow] | Sequence[ShearRow] | Sequence[GradientRow],
+) -> list[str]:
     """Why some did not answer, below their table."""
     found: dict[str, list[str]] = {}
     for row in rows:

@@ -12,6 +12,7 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.bench.frontier import better_than_default, exponent, mark_frontier
+from convexrough.bench.gradients import GradientRow, measure_gradient
 from convexrough.bench.machine import describe_machine
 from convexrough.bench.measure import (
     Attempt,
@@ -99,6 +100,7 @@ class Bench:
     panels: tuple[Panel, ...]
     cost: tuple[CostRow, ...]
     shear: tuple[ShearRow, ...]
+    gradients: tuple[GradientRow, ...]
     seconds: float
 
     def fitted(self, family: Family) -> list[CostRow]:
@@ -134,12 +136,17 @@ def run(plan: Plan, announce: Announce | None = None) -> Bench:
         for family, size in sizes:
             say(f"shear, {what}: {family}, about {size:,}")
             sheared.append(_shear_row(plan, what, family, size, sheared))
+    slopes = []
+    for family, size in plan.gradients:
+        say(f"gradient: {family}, about {size:,}")
+        slopes.append(measure_gradient(family, scene(family, REFINEMENTS[size])))
     return Bench(
         machine=machine,
         quick=plan.quick,
         panels=tuple(panels),
         cost=tuple(cost),
         shear=tuple(sheared),
+        gradients=tuple(slopes),
         seconds=time.perf_counter() - began,
     )
 

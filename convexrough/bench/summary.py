@@ -32,6 +32,7 @@ def summarise(bench: Bench) -> Summary:
             for family in _families(bench)
         ],
         "shear": [asdict(row) for row in bench.shear],
+        "gradient": [asdict(row) for row in bench.gradients],
     }
 
 
@@ -45,6 +46,7 @@ def tables(bench: Bench) -> dict[str, dict[str, list[Any]]]:
     found = {"work-precision": work}
     found["cost"] = [asdict(row) for row in bench.cost]
     found["shear"] = [asdict(row) for row in bench.shear]
+    found["gradient"] = [asdict(row) for row in bench.gradients]
     return {
         name: {key: [row[key] for row in rows] for key in rows[0]}
         for name, rows in found.items()
