@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from convexrough.bench import sweeping
+from convexrough.bench.gradients import GradientRow
 from convexrough.bench.machine import busy
 from convexrough.bench.measure import CostRow, Row
 from convexrough.bench.paths import PathRow
@@ -25,6 +26,8 @@ COST_HEADING = ["scene", "asperities", "touching", "seconds", "assembling", "sol
 COST_HEADING += ["certifying", "A P", "single", "MB", "B each", "proved error"]
 PATH_HEADING = ["scene", "asperities", "touching", "presses", "first call, s", "next, s"]
 PATH_HEADING += ["presses per segment", "undecided", "proved error", "MB", "order"]
+GRADIENT_HEADING = ["scene", "asperities", "touching", "press", "cycle", "gradient"]
+GRADIENT_HEADING += ["A P", "single"]
 SHEAR_HEADING = ["what", "asperities", "touching", "states", "seconds", "s per state", "MB"]
 
 
@@ -75,6 +78,9 @@ def _costs(bench: Bench) -> Iterator[Section]:
         yield Section(title, _path_table(bench.paths), 1, _messages(bench.paths))
     if bench.sweeps:
         yield Section("cost of a sweep", sweeping.table(bench.sweeps), 0, [])
+    if bench.gradients:
+        messages = _messages(bench.gradients)
+        yield Section("cost of a gradient", _gradient_table(bench.gradients), 1, messages)
 
 
 def renewed_page(page: Path, bench: Bench, figures: str) -> str:
@@ -169,8 +175,24 @@ def _path_table(rows: Sequence[PathRow]) -> list[list[str]]:
     return table
 
 
+def _gradient_table(rows: Sequence[GradientRow]) -> list[list[str]]:
+    table = [GRADIENT_HEADING]
+    for row in rows:
+        cells = [f"{row.asperities:,}", row.outcome, *["-"] * 5]
+        if row.outcome == "answered":
+            times = (row.pressing, row.cycling, row.differentiating)
+            cells = [f"{row.asperities:,}", f"{row.touching:,}", *map(_seconds, times)]
+            cells += [str(row.products), str(row.single)]
+        table.append([row.family, *cells])
+    return table
+
+
 def _messages(
-    rows: Sequence[Row] | Sequence[CostRow] | Sequence[ShearRow] | Sequence[PathRow],
+    rows: Sequence[Row]
+    | Sequence[CostRow]
+    | Sequence[ShearRow]
+    | Sequence[PathRow]
+    | Sequence[GradientRow],
 ) -> list[str]:
     """Why some did not answer, below their table."""
     found: dict[str, list[str]] = {}

@@ -17,6 +17,7 @@ class Plan:
     """Sizes are keys of `REFINEMENTS`.
 
     work     : where every solver is compared;  cost : where the default one is timed
+    gradients : sizes of a gradient of the loss
     shear    : sizes of one shear state;  cycles : sizes of a loss curve, of `amplitudes` points
     paths    : sizes of a load path
     sweeps   : size, scenes, and numbers of processes
@@ -28,6 +29,7 @@ class Plan:
     shear: Sizes
     cycles: Sizes
     paths: Sizes
+    gradients: Sizes
     amplitudes: int
     patience: float
     longest: float
@@ -50,6 +52,7 @@ def full_plan() -> Plan:
         shear=_of("lattice", 61, 700, 8_400, 36_000, 120_000, 330_000),
         cycles=_of("lattice", 700, 8_400, 120_000),
         paths=(*_of("lattice", 61, 700, 8_400, 120_000), *_of("rough", 120_000)),
+        gradients=_of("lattice", 700, 36_000, 330_000),
         amplitudes=50,
         patience=1.0,
         longest=20.0,
@@ -69,6 +72,7 @@ def quick_plan() -> Plan:
         shear=_of("lattice", 61, 700),
         cycles=(),
         paths=_of("lattice", 61, 700),
+        gradients=_of("lattice", 700, 36_000),
         amplitudes=50,
         patience=0.1,
         longest=4.0,

@@ -12,6 +12,7 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.bench.frontier import better_than_default, exponent, mark_frontier
+from convexrough.bench.gradients import GradientRow, measure_gradient
 from convexrough.bench.machine import describe_machine
 from convexrough.bench.measure import (
     Attempt,
@@ -102,6 +103,7 @@ class Bench:
     cost: tuple[CostRow, ...]
     shear: tuple[ShearRow, ...]
     paths: tuple[PathRow, ...]
+    gradients: tuple[GradientRow, ...]
     seconds: float
     sweeps: tuple[SweepRow, ...] = ()
 
@@ -146,6 +148,10 @@ def run(plan: Plan, announce: Announce | None = None) -> Bench:
     for size, scenes, workers in plan.sweeps:
         say(f"sweep: {scenes:,} scenes of about {size:,}")
         swept += measure_sweeps(size, scenes, workers)
+    slopes = []
+    for family, size in plan.gradients:
+        say(f"gradient: {family}, about {size:,}")
+        slopes.append(measure_gradient(family, scene(family, REFINEMENTS[size])))
     return Bench(
         machine=machine,
         quick=plan.quick,
@@ -154,6 +160,7 @@ def run(plan: Plan, announce: Announce | None = None) -> Bench:
         shear=tuple(sheared),
         paths=tuple(followed),
         sweeps=tuple(swept),
+        gradients=tuple(slopes),
         seconds=time.perf_counter() - began,
     )
 

@@ -34,6 +34,7 @@ def summarise(bench: Bench) -> Summary:
         "shear": [asdict(row) for row in bench.shear],
         "paths": [asdict(row) for row in bench.paths],
         "sweeps": [asdict(row) for row in bench.sweeps],
+        "gradient": [asdict(row) for row in bench.gradients],
     }
 
 
@@ -49,6 +50,7 @@ def tables(bench: Bench) -> dict[str, dict[str, list[Any]]]:
     found["shear"] = [asdict(row) for row in bench.shear]
     found["paths"] = [asdict(row) for row in bench.paths]
     found["sweeps"] = [asdict(row) for row in bench.sweeps]
+    found["gradient"] = [asdict(row) for row in bench.gradients]
     return {
         name: {key: [row[key] for row in rows] for key in rows[0]}
         for name, rows in found.items()

@@ -22,6 +22,16 @@ from convexrough.shearing.normal_map import States
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.sphere import annulus
 
+#: Numbers of an array of states that are kept for whoever asks again: a gradient of a cycle's loss.
+KEPT = 2**21
+
+
+class _Kept:
+    """The states that were asked for last."""
+
+    def __init__(self, problem: TangentialProblem) -> None:
+        self.states: States | None = None
+
 
 class FirstLoading:
     """The states of one contact with friction, and their losses.
@@ -36,7 +46,12 @@ class FirstLoading:
     def states(self, totals: Array, announce: Announce | None = None) -> tuple[States, Indices]:
         """One state for each distinct T, and which of them each of the totals is."""
         distinct, back = np.unique(self.problem.limited(totals), return_inverse=True)
-        return self.problem.solve(distinct, announce=announce), back
+        kept = self.problem.keep(_Kept)
+        if kept.states is not None and np.isin(distinct, kept.states.totals).all():
+            return kept.states.take(np.searchsorted(kept.states.totals, distinct)), back
+        states = self.problem.solve(distinct, announce=announce)
+        kept.states = states if states.increments.size <= KEPT else None
+        return states, back
 
     def judged(
         self, states: States, announce: Announce | None = None

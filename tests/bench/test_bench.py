@@ -18,6 +18,7 @@ import convexrough as cr
 from convexrough.bench import measure, page, paths, reference, suite, summary
 from convexrough.bench.figures import bench_figures
 from convexrough.bench.frontier import better_than_default, exponent, mark_frontier
+from convexrough.bench.gradients import measure_gradient
 from convexrough.bench.measure import Attempt, CostRow, Row, Tally, counted
 from convexrough.bench.plan import Plan, attempts, full_plan, quick_plan
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, scene
@@ -33,6 +34,7 @@ TINY = replace(
     shear=(("lattice", 61),),
     cycles=(("lattice", 61),),
     paths=(("lattice", 61), ("rough", 61)),
+    gradients=(("lattice", 61),),
     amplitudes=2,
     patience=0.0,
     sweeps=((61, 20, (1,)),),
@@ -276,7 +278,7 @@ def test_command(command: Any, tmp_path: Path) -> None:
     names = {path.name for path in (tmp_path / "bench-results").iterdir()}
     assert names == {
         *("files.json", "bench.json", "work-precision.csv", "cost.csv", "shear.csv", "paths.csv"),
-        "sweeps.csv",
+        *("sweeps.csv", "gradient.csv"),
         *("work-precision.png", "work-precision.svg", "cost.png", "cost.svg"),
     }
     with (tmp_path / "bench-results" / "work-precision.csv").open() as file:
@@ -423,3 +425,16 @@ def test_progress_is_told() -> None:
         found = suite.run(plan, told.append)
     assert "lattice, 61 asperities: newton, " in told
     assert [each.solver for each in found.panels[0].rows] == ["newton", "bristles"]
+
+
+def test_what_a_gradient_costs() -> None:
+    each = scene("lattice", REFINEMENTS[700])
+    row = measure_gradient("lattice", each)
+    assert row.outcome == "answered"
+    assert 0 < row.touching < row.asperities
+    assert min(row.pressing, row.cycling, row.differentiating) > 0
+    assert (row.products > 2, row.single > 2) == (True, True)
+    assert row.products + row.single < 100
+    smooth = replace(each, friction=None)
+    refused = measure_gradient("lattice", smooth)
+    assert (refused.outcome, "friction" in refused.message) == ("refused", True)
