@@ -139,7 +139,7 @@ def test_what_a_path_costs_is_its_work() -> None:
     missed = []
     for parts in (16, 32):
         cut = _cut(np.vstack(([0.0, 0.0], points)), parts)
-        assert cut.energy[-1] == pytest.approx(path.energy[-1], rel=1e-11)
+        assert cut.energy[-1] == pytest.approx(path.energy[-1], rel=1e-11, abs=0.0)
         # Stored energy: the work along the path without slip to the same state.
         stored = _cut(slow, parts)
         assert stored.energy[-1] < 1e-12 * path.energy[-1]
@@ -167,14 +167,14 @@ def test_pulled_off_and_pressed_again() -> None:
     assert (path.forces[1] == 0).all()
     assert (path.status[1] == "open").all()
     fresh = follow("paper", [(0.6, 0), (0.6, 0.3)])
-    assert path.displacements[3] == pytest.approx(fresh.displacements[1], rel=1e-13)
+    assert path.displacements[3] == pytest.approx(fresh.displacements[1], rel=1e-13, abs=0.0)
     assert_allclose(path.forces[3], fresh.forces[1], atol=1e-14 * LARGEST["paper"])
 
 
 def test_unloading_at_constant_shear_slips() -> None:
     path = follow("paper", [(1, 0), (1, 0.3), (0.5, 0.3)])
     assert path.energy[2] > path.energy[1]
-    assert path.fronts[2] == pytest.approx(0.2 * LARGEST["paper"])
+    assert path.fronts[2] == pytest.approx(0.2 * LARGEST["paper"], abs=0.0)
 
 
 def test_a_path_of_seven_segments_takes_60_ms() -> None:

@@ -29,13 +29,13 @@ def settled(case: tuple[cr.Scene, Array, Array]) -> cr.Steady:
 def test_the_octagon() -> None:
     found = settled(octagon("paper"))
     mean = LARGEST["paper"] / 1.4
-    assert found.energy_first == pytest.approx(9.5663629049784e-14, rel=1e-12)
-    assert found.energy == pytest.approx(1.9339188634987e-13, rel=1e-12)
+    assert found.energy_first == pytest.approx(9.5663629049784e-14, rel=1e-12, abs=0.0)
+    assert found.energy == pytest.approx(1.9339188634987e-13, rel=1e-12, abs=0.0)
     assert found.level / mean == pytest.approx(0.4318019484661, rel=1e-12)
     assert found.force_level / (0.5 * mean) == pytest.approx(-0.2146446609407, rel=1e-12)
     assert found.order == "proved at the levels used"
     assert found.energy_error < 1e-10 * found.energy
-    assert found.energies.sum() == pytest.approx(found.energy, rel=1e-3)
+    assert found.energies.sum() == pytest.approx(found.energy, rel=1e-3, abs=0.0)
     words, counts = np.unique(found.status, return_counts=True)
     assert dict(zip(words.tolist(), counts.tolist(), strict=True)) == {
         "intermittent": 6,
@@ -43,7 +43,9 @@ def test_the_octagon() -> None:
         "partial": 19,
         "sliding": 12,
     }
-    assert settled(octagon("rough")).energy == pytest.approx(1.9572569969746e-13, rel=1e-12)
+    assert settled(octagon("rough")).energy == pytest.approx(
+        1.9572569969746e-13, rel=1e-12, abs=0.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -52,7 +54,7 @@ def test_the_octagon() -> None:
 def test_a_straight_line(name: str, loss: float) -> None:
     """Against its closed form, a divided difference of V, too."""
     found = settled(path_of(name, [(0.9, 0.4), (0.5, -0.4)]))
-    assert found.energy == pytest.approx(loss, rel=1e-12)
+    assert found.energy == pytest.approx(loss, rel=1e-12, abs=0.0)
     assert found.level / LARGEST[name] == pytest.approx(0.3)
     P, p, q = 0.7, 0.2, 0.4
     levels = Levels(SCENES[name], LARGEST[name])
@@ -68,13 +70,15 @@ def test_a_straight_line(name: str, loss: float) -> None:
         - still.approach
     )
     travel = (2 - 0.3) / (2 * (1 - 0.3)) * 0.5**2
-    assert found.energy == pytest.approx(4 * travel * q * LARGEST[name] * bracket, rel=1e-10)
+    assert found.energy == pytest.approx(
+        4 * travel * q * LARGEST[name] * bracket, rel=1e-10, abs=0.0
+    )
 
 
 def test_loads_that_follow_cost_nothing() -> None:
     found = settled(path_of("paper", [(0.9, 0.2), (0.5, -0.1)]))
     assert found.energy == 0
-    assert found.level == pytest.approx(0.5 * LARGEST["paper"])
+    assert found.level == pytest.approx(0.5 * LARGEST["paper"], abs=0.0)
     assert set(found.status) == {"stuck", "intermittent", "open"}
 
 
@@ -99,7 +103,7 @@ def test_ellipses(degrees: float, loss: float) -> None:
         rounds = [np.sqrt(al**2 + be**2 + 2 * c * al * be * np.sin(phase)) for c in (1, -1)]
         assert found.level / mean == pytest.approx(1 - sum(rounds) / 2, rel=1e-12)
         losses.append(found.energy)
-    assert losses[-1] == pytest.approx(loss, rel=5e-4)
+    assert losses[-1] == pytest.approx(loss, rel=5e-4, abs=0.0)
     assert abs(losses[2] / losses[1] - 1) < 0.45 * abs(losses[1] / losses[0] - 1) + 1e-9
 
 
@@ -109,7 +113,7 @@ def test_constant_load_is_a_cycle(name: str) -> None:
     contact = cr.press(scene, load=P[0])
     cycle = cr.cycle(contact, maximum=Q[0], minimum=Q[1])
     found = cr.steady(scene, loads=P, forces=Q)
-    assert found.energy == pytest.approx(cycle.energy, rel=1e-11)
+    assert found.energy == pytest.approx(cycle.energy, rel=1e-11, abs=0.0)
     assert_allclose(found.energies, cycle.energies, rtol=1e-8, atol=1e-12 * cycle.energy)
     assert (found.status == cycle.status).all()
     first = cr.shear(contact, force=0.5 * (Q[0] - Q[1]))
@@ -172,7 +176,7 @@ def test_losses_against_phase() -> None:
     bracket = mean(P - t, P + p) + mean(P - t, P - p) - mean(P - p, P + p)
     bracket -= (0.75 * (P - t)) ** (2 / 3)
     line = 4 * (2 - 0.3) / (2 * (1 - 0.3)) * 0.5**2 * t * bracket
-    assert found.smooth[2] == pytest.approx(line, rel=1e-9)
+    assert found.smooth[2] == pytest.approx(line, rel=1e-9, abs=0.0)
     assert found.energy[2] < 0.5 * found.energy[0]
     assert found.order == "proved at the levels used"
 
@@ -188,7 +192,7 @@ def test_where_order_fails_nothing_is_said_of_cycles() -> None:
     path = cr.load_path(
         scene, loads=np.append(np.tile(P, 2), P[0]), forces=np.append(np.tile(Q, 2), Q[0])
     )
-    assert found.energy == pytest.approx(path.energy[4] - path.energy[2])
+    assert found.energy == pytest.approx(path.energy[4] - path.energy[2], abs=0.0)
     assert found.energy > 0
 
 
