@@ -187,7 +187,7 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
     """A process that runs the command; limit [bytes] of each file."""
     if process := os.fork():
         return process
-    status = 99
+    status = 130  # of an interrupt before the command has begun
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         os.chdir(folder)
@@ -196,11 +196,13 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        status = 99
         status = cli.main(arguments)
     except BaseException:
         import traceback
 
-        os.write(2, traceback.format_exc().encode())
+        if status == 99:
+            os.write(2, traceback.format_exc().encode())
     finally:
         os._exit(status)
 
