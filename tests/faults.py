@@ -109,6 +109,7 @@ def prepare(folder: Path) -> None:
     (folder / "new.toml").write_text(scene_text(layout, "approach = 2e-5", STAGES))
     (folder / "old.toml").write_text(scene_text(layout, "approach = 1e-5", STAGES))
     (folder / "loads.csv").write_text("load\n" + "1e-9\n" * 19)
+    (folder / "said").touch()  # a process may be killed before it says anything
     (folder / "out").mkdir()
 
 
@@ -163,7 +164,7 @@ def _tried(
     folder: Path, arguments: list[str], fault: str, rng: random.Random, duration: float
 ) -> tuple[int, str]:
     """Status of the command that it happens to (of the last one), and what they say."""
-    limit = rng.choice([0, 100, 1000, 5000, 20_000, 100_000]) if fault == "small" else None
+    limit = rng.choice([500, 1000, 5000, 20_000, 100_000]) if fault == "small" else None
     running = [_forked(folder, arguments, limit)]
     if fault == "twice":
         time.sleep(rng.uniform(0, duration / 2))
@@ -186,7 +187,7 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
     """A process that runs the command; limit [bytes] of each file."""
     if process := os.fork():
         return process
-    status = 99
+    status = 130  # of an interrupt before the command has begun
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         os.chdir(folder)
@@ -195,11 +196,13 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        status = 99
         status = cli.main(arguments)
     except BaseException:
         import traceback
 
-        os.write(2, traceback.format_exc().encode())
+        if status == 99:
+            os.write(2, traceback.format_exc().encode())
     finally:
         os._exit(status)
 
