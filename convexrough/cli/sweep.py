@@ -59,7 +59,8 @@ def sweep(
     written once and whole. With --summary: quantiles of what is in a folder; with --out, too, a
     table of them and figures.
 
-    Exit status: 0 all rows certified; 3 some undecided; 4 some scenes failed, or no worker is left.
+    Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or no
+    worker is left. What was computed until then is kept, and --resume goes on.
     """
     if (sweep is None) == (summary is None):
         raise click.UsageError("Either SWEEP, or --summary DIR.")

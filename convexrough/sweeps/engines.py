@@ -20,7 +20,7 @@ from multiprocessing.process import BaseProcess
 from types import ModuleType
 from typing import Any, Protocol
 
-from convexrough.errors import ExtraError, InputError
+from convexrough.errors import ExtraError, InputError, WorkerError
 from convexrough.sweeps.batch import Batch, Rows, compute
 
 #: Batches that an executor of somebody else's is given at once.
@@ -128,7 +128,10 @@ class Dask:
         self._executor: Executor = self.client.get_executor(pure=False)
 
     def at_once(self) -> int:
-        threads = sum(self.client.nthreads().values())
+        try:
+            threads = sum(self.client.nthreads().values())
+        except OSError as error:
+            raise WorkerError(f"the scheduler of Dask is gone: {error}") from error
         return max(4, 2 * int(threads))
 
     def submit(self, batch: Batch) -> Future[Rows]:

@@ -241,3 +241,25 @@ def test_sharing_changes_no_bit(spacing: float, monkeypatch: pytest.MonkeyPatch)
         shared = cr.sweep(contents, executor=here)
         monkeypatch.setattr(running, "MOST_SCENES", 1)
         assert same(shared, cr.sweep(contents, executor=here))
+
+
+def test_a_scheduler_that_is_gone_is_said_to_be() -> None:
+    class Gone:
+        def nthreads(self) -> None:
+            raise OSError("connection closed")
+
+        def get_executor(self, pure: bool) -> Executor:
+            return ThreadPoolExecutor(1)
+
+    class Dropping(engines.Given):
+        def submit(self, batch: Batch) -> Future[Rows]:
+            future: Future[Rows] = Future()
+            future.cancel()
+            future.set_running_or_notify_cancel()
+            return future
+
+    pytest.importorskip("distributed")
+    with pytest.raises(cr.WorkerError, match="the scheduler of Dask is gone: connection closed"):
+        running.run(PLAN, engines.Dask(Gone()))
+    with pytest.raises(cr.WorkerError, match="is its scheduler gone"):
+        running.run(PLAN, Dropping(ThreadPoolExecutor(1)))
