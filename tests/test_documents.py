@@ -28,7 +28,8 @@ DIRECTIVES = {"{toctree}", "{eval-rst}"}
 #: Longer than a page should be: tables a command wrote, derivations that belong together.
 LONG = {"performance.md", "certificate.md", "operators.md", "shear.md"}
 #: Pages of tables, to look things up in: every option, key and column is there.
-LONG |= {"results.md", "scene-file.md", "word-audit.md"}
+LONG |= {"results.md", "scene-file.md", "word-audit.md", "glossary.md", "guarantees.md"}
+LONG |= {"changelog.md"}
 
 
 class Block(NamedTuple):
