@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.influence.lattice_smoother import differences
 
 #: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.5 for the
@@ -57,39 +57,62 @@ class Box:
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
         """1 / |i b1 + j b2|^power for every difference of two sites of the box, 0 for none."""
+
+        def values(i: Indices, j: Indices) -> tuple[Array]:
+            x = np.add.outer(i * self.basis[0, 0], j * self.basis[1, 0])
+            y = np.add.outer(i * self.basis[0, 1], j * self.basis[1, 1])
+            x *= x
+            y *= y
+            x += y
+            np.sqrt(x, out=x)
+            x[np.ix_(i == 0, j == 0)] = np.inf
+            each = 1.0 / x
+            if power > 1:
+                each **= power
+            return (each,)
+
+        return self.transformed(values, dtype)[0]
+
+    def transformed(
+        self, values: Callable[[Indices, Indices], tuple[Array, ...]], dtype: Any
+    ) -> list[Kernel]:
+        """Kernels from their values at differences (i, j) of sites; even, each of the other."""
         from scipy import fft
 
         rows, columns = self.padded
         i, j = differences(rows), differences(columns)
         j_used = np.abs(j) < self.shape[1]
-        half = np.zeros((rows, columns // 2 + 1), dtype=np.result_type(dtype, np.complex64))
-        total = square = 0.0
+        halves: list[NDArray[Any]] = []
+        sums: list[list[float]] = []
         block = max(1, 2**20 // columns)
         for start in range(0, self.shape[0], block):
             taken = slice(start, min(start + block, self.shape[0]))
-            x = np.add.outer(i[taken] * self.basis[0, 0], j * self.basis[1, 0])
-            y = np.add.outer(i[taken] * self.basis[0, 1], j * self.basis[1, 1])
-            x *= x
-            y *= y
-            x += y
-            np.sqrt(x, out=x)
-            if start == 0:
-                x[0, 0] = np.inf
-            values = j_used / x
-            if power > 1:
-                values **= power
             weights = np.where(i[taken] > 0, 2.0, 1.0)  # i and -i
-            total += float(weights @ values.sum(axis=1))
-            square += float(weights @ (values * values).sum(axis=1))
-            half[taken] = fft.rfft(values.astype(dtype), axis=1, workers=self.workers)
-        # The kernel is even: row -i is row i read backwards.
+            for k, each in enumerate(values(i[taken], j)):
+                if k == len(halves):
+                    shape = (rows, columns // 2 + 1)
+                    halves.append(np.zeros(shape, dtype=np.result_type(dtype, np.complex64)))
+                    sums.append([0.0, 0.0])
+                each *= j_used
+                sums[k][0] += float(weights @ each.sum(axis=1))
+                sums[k][1] += float(weights @ (each * each).sum(axis=1))
+                halves[k][taken] = fft.rfft(each.astype(dtype), axis=1, workers=self.workers)
+        return [
+            Kernel(self._spectrum(half, dtype), total, float(np.sqrt(square)))
+            for half, (total, square) in zip(halves, sums, strict=True)
+        ]
+
+    def _spectrum(self, half: NDArray[Any], dtype: Any) -> NDArray[Any]:
+        """The real transform of an even kernel from the transforms of its first rows."""
+        from scipy import fft
+
         last = self.shape[0] - 1
         if last:
-            half[-last:] = np.conj(half[last:0:-1])
+            half[-last:] = np.conj(half[last:0:-1])  # row -i is row i read backwards
         spectrum = np.empty(half.shape, dtype=dtype)
-        for each in _blocks(half.shape[1]):
+        for each in self.blocks(half.shape[1]):
             spectrum[:, each] = fft.fft(half[:, each], axis=0, workers=self.workers).real
-        return Kernel(spectrum, total, float(np.sqrt(square)))
+        return spectrum
 
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
         """The convolution of a field (rows, columns) with a kernel, on the box."""
@@ -97,13 +120,19 @@ class Box:
 
         rows, columns = self.padded
         half = fft.rfft(field, columns, axis=1, workers=self.workers)
-        for each in _blocks(half.shape[1]):
+        for each in self.blocks(half.shape[1]):
             full = fft.fft(half[:, each], rows, axis=0, workers=self.workers)
             full *= spectrum[:, each]
             full = fft.ifft(full, axis=0, overwrite_x=True, workers=self.workers)
             half[:, each] = full[: self.shape[0]]
         result: NDArray[Any] = fft.irfft(half, columns, axis=1, workers=self.workers)
         return result[:, : self.shape[1]]
+
+    @staticmethod
+    def blocks(width: int) -> Iterator[slice]:
+        """Columns transformed at a time."""
+        for start in range(0, width, COLUMNS):
+            yield slice(start, min(start + COLUMNS, width))
 
     def bound(self, kernel: Kernel, roundoff: float) -> float:
         """Bound on the 2-norm of the error of `convolve`, relative to that of the field.
@@ -132,11 +161,6 @@ class Kernel:
     spectrum: NDArray[Any]
     total: float
     norm: float
-
-
-def _blocks(width: int) -> Iterator[slice]:
-    for start in range(0, width, COLUMNS):
-        yield slice(start, min(start + COLUMNS, width))
 
 
 def _pass_roundoffs(length: int) -> int:

@@ -16,6 +16,7 @@ from convexrough.influence.coupling import (
     Kind,
     Rounding,
     Smoother,
+    Sums,
     inverse_distances,
 )
 from convexrough.influence.packing import clearances, matrix_packing
@@ -127,6 +128,9 @@ class DenseInfluence:
 
     def clearances(self) -> Array:
         return self.separations()
+
+    def sums(self, loads: Array) -> Sums | None:
+        return None
 
     def smoother(self, root: Array) -> Smoother | None:
         return None
