@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 
 #: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.5 for the
 #: twiddle factors and the products with them, and sqrt(p) ((p - 1) / 2 + 4) for the sums of p terms
@@ -23,6 +23,10 @@ PARALLEL = 2**18
 
 #: Columns are transformed some at a time: so many bytes of each row, what a cache holds.
 ROW = 512
+
+
+#: What a kernel is at differences of sites, of rows i and columns j: arrays (len(i), len(j)).
+Values = Callable[[Indices, Indices], tuple[Array, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,42 +77,93 @@ class Box:
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
         """1 / |i b1 + j b2|^power for every difference of sites that matter, 0 for none."""
+
+        def values(taken: slice) -> tuple[Array]:
+            found = self._squares(taken)
+            found[found > self.extent**2] = np.inf
+            np.sqrt(found, out=found)
+            np.divide(1.0, found, out=found)
+            nearest = found.copy() if power > 1 else found
+            for _ in range(power - 1):
+                found *= nearest
+            return (found,)
+
+        return self._transformed(values, dtype)[0]
+
+    def kernels(self, values: Values, dtype: Any) -> list[Kernel]:
+        """Even kernels from their values at differences of sites; 0 for none."""
+        return self._transformed(lambda taken: self.laid_out(values, taken), dtype)
+
+    def laid_out(self, values: Values, taken: slice) -> list[Array]:
+        """Values at differences of sites, in some rows of the padded box; placed as `_squares`."""
+        squares = np.full((taken.stop - taken.start, self.padded[1]), np.inf)
+        found: list[Array] = []
+        for within, places, i, j in self._images(taken):
+            shorter = self._lengths(i, j)
+            nearer = shorter < squares[within, places]
+            np.copyto(squares[within, places], shorter, where=nearer)
+            each = values(i, j)
+            found = found or [np.zeros(squares.shape) for _ in each]
+            for whole, part in zip(found, each, strict=True):
+                np.copyto(whole[within, places], part, where=nearer)
+        for whole in found:
+            whole[squares > self.extent**2] = 0.0
+        return found
+
+    def _transformed(self, values: Callable[[slice], Sequence[Array]], dtype: Any) -> list[Kernel]:
+        """Even kernels from their values in rows of the padded box."""
         from scipy import fft
 
         rows, columns = self.padded
-        half = np.zeros((rows, columns // 2 + 1), dtype=np.result_type(dtype, np.complex64))
-        total = square = 0.0
+        shape, whole = (rows, columns // 2 + 1), np.result_type(dtype, np.complex64)
+        halves: list[NDArray[Any]] = []
+        sums: list[Array] = []  # of each kernel and of its squares
         block = max(1, 2**18 // columns)
         for start in range(0, rows // 2 + 1, block):
             taken = slice(start, min(start + block, rows // 2 + 1))
-            values = self._squares(taken)
-            values[values > self.extent**2] = np.inf
-            np.sqrt(values, out=values)
-            np.divide(1.0, values, out=values)
-            nearest = values.copy() if power > 1 else values
-            for _ in range(power - 1):
-                values *= nearest
             i = np.arange(taken.start, taken.stop)
             weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # i and -i
-            total += float(weights @ values.sum(axis=1))
-            square += float(weights @ np.einsum("ij,ij->i", values, values))
-            half[taken] = fft.rfft(values.astype(dtype, copy=False), axis=1, workers=self.workers)
-        # The kernel is even: row -i is row i read backwards.
-        last = (rows - 1) // 2
+            for k, each in enumerate(values(taken)):
+                if k == len(halves):
+                    halves.append(np.zeros(shape, dtype=whole))
+                    sums.append(np.zeros(2))
+                sums[k] += weights @ each.sum(axis=1), weights @ np.einsum("ij,ij->i", each, each)
+                halves[k][taken] = fft.rfft(
+                    each.astype(dtype, copy=False), axis=1, workers=self.workers
+                )
+        return [
+            Kernel(self._spectrum(half, dtype), float(total), float(np.sqrt(square)))
+            for half, (total, square) in zip(halves, sums, strict=True)
+        ]
+
+    def _spectrum(self, half: NDArray[Any], dtype: Any) -> NDArray[Any]:
+        """The real transform of an even kernel from the transforms of its first rows."""
+        from scipy import fft
+
+        last = (self.padded[0] - 1) // 2
         if last:
-            np.conj(half[last:0:-1], out=half[-last:])
+            np.conj(half[last:0:-1], out=half[-last:])  # row -i is row i read backwards
         spectrum = np.empty(half.shape, dtype=dtype)
-        for each in _blocks(half):
+        for each in blocks(half):
             spectrum[:, each] = fft.fft(half[:, each], axis=0, workers=self.workers).real
-        return Kernel(spectrum, total, float(np.sqrt(square)))
+        return spectrum
 
     def _squares(self, taken: slice) -> Array:
         """|i b1 + j b2|^2 in some rows of the padded box, infinite for no difference.
 
         In each place stands the shortest difference of two sites of the box that falls on it.
         """
+        squares = np.full((taken.stop - taken.start, self.padded[1]), np.inf)
+        for within, places, i, j in self._images(taken):
+            lengths = self._lengths(i, j)
+            np.minimum(squares[within, places], lengths, out=squares[within, places])
+        if taken.start == 0:
+            squares[0, 0] = np.inf
+        return squares
+
+    def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
+        """Differences i, j of two sites of the box, and the rows and columns that they fall on."""
         (rows, columns), (height, width) = self.shape, self.padded
-        squares = np.full((taken.stop - taken.start, width), np.inf)
         right, left = np.arange(columns), np.arange(1 - columns, 0)
         for shift in (0, height):
             i = np.arange(taken.start, taken.stop) - shift
@@ -116,17 +171,17 @@ class Box:
             if len(inside) == 0:
                 continue
             within = slice(int(inside[0]), int(inside[-1]) + 1)
-            for j, places in ((right, slice(columns)), (left, slice(width + 1 - columns, width))):
-                x, y = (
-                    np.add.outer(i[within] * self.basis[0, k], j * self.basis[1, k]) for k in (0, 1)
-                )
-                x *= x
-                y *= y
-                x += y
-                np.minimum(squares[within, places], x, out=squares[within, places])
-        if taken.start == 0:
-            squares[0, 0] = np.inf
-        return squares
+            yield within, slice(columns), i[within], right
+            yield within, slice(width + 1 - columns, width), i[within], left
+
+    def _lengths(self, i: Indices, j: Indices) -> Array:
+        """|i b1 + j b2|^2."""
+        x: Array = np.add.outer(i * self.basis[0, 0], j * self.basis[1, 0])
+        y: Array = np.add.outer(i * self.basis[0, 1], j * self.basis[1, 1])
+        x *= x
+        y *= y
+        x += y
+        return x
 
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
         """The convolution of a field (rows, columns) with a kernel, on the box.
@@ -138,7 +193,7 @@ class Box:
 
         rows, columns = self.padded
         half = fft.rfft(field, columns, axis=1, workers=self.workers)
-        for each in _blocks(half):
+        for each in blocks(half):
             full = fft.fft(half[:, each], rows, axis=0, workers=self.workers)
             full *= spectrum[:, each]
             full = fft.ifft(full, axis=0, overwrite_x=True, workers=self.workers)
@@ -177,7 +232,8 @@ class Kernel:
     norm: float
 
 
-def _blocks(half: NDArray[Any]) -> Iterator[slice]:
+def blocks(half: NDArray[Any]) -> Iterator[slice]:
+    """Columns transformed at a time."""
     width, step = half.shape[1], max(1, ROW // half.itemsize)
     for start in range(0, width, step):
         yield slice(start, min(start + step, width))

@@ -57,6 +57,19 @@ class Rounding(NamedTuple):
         return 1.01 * min(self.each, self.norm)
 
 
+class Sums(NamedTuple):
+    """sum_j P_j / r_ij as  (whole + rest) unit, off by at most  error unit  in each component.
+
+    And by  norm unit  in the 2-norm.
+    """
+
+    whole: Array  # whole numbers
+    rest: Array
+    unit: float  # a power of two [force / length]
+    error: float
+    norm: float
+
+
 class Coupling(Protocol):
     """From loads at the asperities to displacements at some points."""
 
@@ -148,6 +161,13 @@ class Influence(Coupling, Protocol):
         """At least the largest t_i / (r_ij - t_j) over pairs with radii t (n,) that are not 0.
 
         Infinite where that is not below 1: where two such spheres meet.
+        """
+        ...
+
+    def sums(self, loads: Array) -> Sums | None:
+        """sum_j P_j / r_ij [force / length] to some thirty digits; None where that is not known.
+
+        For exact points, or as near as `entry_error` says.
         """
         ...
 

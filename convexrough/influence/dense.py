@@ -16,6 +16,7 @@ from convexrough.influence.coupling import (
     Kind,
     Rounding,
     Smoother,
+    Sums,
     cubed,
     inverse_distances,
     squared_distances,
@@ -151,6 +152,9 @@ class DenseInfluence:
 
     def clearances(self) -> Array:
         return self.separations()
+
+    def sums(self, loads: Array) -> Sums | None:
+        return None
 
     def smoother(self, root: Array) -> Smoother | None:
         return None

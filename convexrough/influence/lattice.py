@@ -8,6 +8,7 @@ lattice: Fourier transforms".
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,14 +19,16 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel, neighbours
-from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, cubed
+from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, Sums, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
 from convexrough.influence.packing import beside, lattice_packing, point_packing
+from convexrough.influence.sliced import Distances, sliced_sums
 from convexrough.influence.slopes import Spectra, odd_spectra
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import crowding, separations
+from convexrough.twofold import Twofold, exact_product, whole
 
 #: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
 ENTRY_ROUNDOFFS = 24
@@ -244,6 +247,36 @@ class LatticeInfluence(LatticeCoupling):
         """`neighbours`, and no more than the distance of points that far apart."""
         for on_sites, i, j in neighbours(self.box):
             yield self.spacing * (on_sites - self.blur) * (1.0 - 8 * ROUNDOFF), i, j
+
+    def sums(self, loads: Array) -> Sums | None:
+        """sum_j P_j / r_ij to many more digits than `apply`, with the points where they are."""
+        unit = 2.0 ** np.floor(np.log2(self.spacing))
+        field = np.zeros(self.box.shape)
+        field.ravel()[self.sources] = loads
+        distances = Distances.of(self.lattice.basis, unit, max(self.box.shape))
+        found = sliced_sums(self.box, distances, unit, field)
+        if found is None:
+            return None
+        largest, kernel = float(np.abs(loads).max(initial=0.0)), self._kernel
+        moved = 2.0 * (self._off + math.sqrt(2.0) * self.point_error)
+        # As in `rounding`, with what is known of these points.
+        off = 1.01 * moved / self.spacing**2 / self._least * kernel.norm**2 / found.unit
+        error = found.error + off * largest
+        norm = found.error * math.sqrt(len(self)) + off * float(np.linalg.norm(loads))
+        at = self.sources
+        return Sums(found.whole.ravel()[at], found.rest.ravel()[at], found.unit, error, norm)
+
+    @cached_property
+    def _off(self) -> float:
+        """[length] bound on how far points are from their sites, but for a common shift."""
+        off = []
+        for k in (0, 1):
+            away = -whole(np.full(len(self), self.lattice.origin[k])) + whole(self.points[:, k])
+            for n in (0, 1):
+                step = exact_product(self.places[:, n].astype(np.float64), self.lattice.basis[n, k])
+                away = away + -Twofold(*step)
+            off.append(away.high)
+        return float(np.hypot(*off).max(initial=0.0)) * (1 + 1e-9)
 
     def smoother(self, root: Array) -> Smoother:
         box = self.box

@@ -22,7 +22,7 @@ from convexrough.influence.convolution import Kernel
 from convexrough.influence.coupling import Rounding
 from convexrough.influence.mesh import BLOCK, Interpolation, Mesh
 from convexrough.influence.near_pairs import Near, Order
-from convexrough.influence.softened import lebesgue, weight_roundoffs
+from convexrough.influence.softened import WEIGHT_ROUNDOFFS, lebesgue
 from convexrough.influence.splitting import Splitting
 from convexrough.roundoff import ROUNDOFF
 
@@ -138,7 +138,7 @@ class Product:
     def _weighing(self) -> tuple[float, float]:
         """Rounding of sums with W, to the mesh and from it; adding zeros costs none."""
         order, width = self.splitting.kernel.order, self.splitting.width
-        weights = 2.0 * weight_roundoffs(order) + 2.0
+        weights = 2.0 * WEIGHT_ROUNDOFFS + 2.0
         overlaps = (-(-width // self.splitting.block)) ** 2
         crowded = float(np.diff(self.order.starts).max())
         to_mesh = min(crowded, BLOCK) + overlaps * np.ceil(crowded / BLOCK)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother
+from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, Sums
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.packing import clearances, point_packing
 from convexrough.influence.pair_sums import Product
@@ -116,6 +116,9 @@ class ScatteredInfluence:
 
     def clearances(self) -> Array:
         return self.separations()
+
+    def sums(self, loads: Array) -> Sums | None:
+        return None
 
     def smoother(self, root: Array) -> Smoother | None:
         return coarse_inverse(self.points, self.scale, root)

@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box
-from convexrough.influence.lattice_smoother import differences
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.softened import Softened
 
@@ -37,11 +36,13 @@ def odd_spectra(box: Box, over_cube: Callable[[Array], Array]) -> Spectra:
     """
     from scipy import fft
 
-    i, j = (differences(length) for length in box.padded)
-    x, y = (np.add.outer(i * box.basis[0, k], j * box.basis[1, k]) for k in (0, 1))
-    values = over_cube(x * x + y * y)
-    values *= np.logical_and.outer(np.abs(i) < box.shape[0], np.abs(j) < box.shape[1])
-    return fft.rfft2(values * x, workers=box.workers), fft.rfft2(values * y, workers=box.workers)
+    def values(i: Indices, j: Indices) -> tuple[Array, Array]:
+        x, y = (np.add.outer(i * box.basis[0, k], j * box.basis[1, k]) for k in (0, 1))
+        weights = over_cube(x * x + y * y)
+        return weights * x, weights * y
+
+    x, y = box.laid_out(values, slice(0, box.padded[0]))
+    return fft.rfft2(x, workers=box.workers), fft.rfft2(y, workers=box.workers)
 
 
 def by_mesh(product: Product, spectra: Spectra | None, values: Array) -> Array:

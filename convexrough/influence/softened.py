@@ -12,15 +12,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache, cached_property
 
 import numpy as np
 
 from convexrough.arrays import Array
+from convexrough.twofold import Twofold, exact_sum, whole
 
 #: Near pairs whose part would be less than so much of the error of interpolation are left out. A
 #: heuristic: what is left out is part of the bound.
 CUT_SHARE = 0.1
+
+#: Places weighed at a time: what a cache holds.
+PLACES = 2**12
 
 
 @dataclass(frozen=True)
@@ -150,27 +155,33 @@ def lebesgue(order: int) -> float:
 def lagrange(places: Array, order: int) -> Array:
     """(n, p) Lagrange's polynomials of the nodes 1 - p/2, ..., p/2 at places from 0 to 1.
 
-    In long double, where that is longer than double, to leave little more than its own rounding.
+    In twofold numbers, to leave little more than the rounding of the weights themselves.
     """
-    nodes = np.arange(order) - (order // 2 - 1)
-    away = places[:, None].astype(np.longdouble) - nodes
-    left, right = np.ones_like(away), np.ones_like(away)
-    np.cumprod(away[:, :-1], axis=1, out=left[:, 1:])
-    np.cumprod(away[:, :0:-1], axis=1, out=right[:, -2::-1])
-    left *= right
+    weights = np.empty((len(places), order))
+    for start in range(0, len(places), PLACES):
+        some = slice(start, start + PLACES)
+        weights[some] = _lagrange(places[some], order)
+    return weights
+
+
+def _lagrange(places: Array, order: int) -> Array:
+    nodes = range(1 - order // 2, order // 2 + 1)
+    away = [Twofold(*exact_sum(places, -float(node))) for node in nodes]
+    left, right = [whole(np.ones(len(places)))], [whole(np.ones(len(places)))]
+    for k in range(order - 1):
+        left.append(left[-1] * away[k])
+        right.append(right[-1] * away[-1 - k])
+    weights = np.empty((len(places), order))
     for k in range(order):
-        size = math.factorial(k) * math.factorial(order - 1 - k)
-        left[:, k] /= np.longdouble((-1) ** (order - 1 - k) * size)
-    return left.astype(np.float64)
+        size = (-1) ** (order - 1 - k) * math.factorial(k) * math.factorial(order - 1 - k)
+        scale = Twofold.nearest(Fraction(1, size))
+        weights[:, k] = (left[k] * right[-1 - k] * scale).high
+    return weights
 
 
-def weight_roundoffs(order: int) -> float:
-    """Bound on the relative error of each of them, in roundoffs of float64.
-
-    p - 1 differences, p - 2 products, a quotient and its constant; and the rounding to float64. In
-    the long double of this machine, whatever that is: where it is float64, this is 1 + 2 p.
-    """
-    return 1.0 + 2.0 * order * float(np.finfo(np.longdouble).eps) / 2.0**-52
+#: Bound on the relative error of each of them, in roundoffs of float64: that of the weight, and of
+#: at most 60 operations on twofold numbers.
+WEIGHT_ROUNDOFFS = 1.0 + 2.0**-40
 
 
 @cache

@@ -106,7 +106,8 @@ class Judgement(NamedTuple):
             indentation=indentation,
             errors=everywhere,
             approach=found.approach,
-            approach_error=bounds.approach,
+            approach_error=bounds.approach * (1 + SAFETY)
+            + (0.0 if problem.load is None else 2 * ROUNDOFF * abs(found.approach)),
             duality_gap=_energy_error(box, ball, bounds, loads, found),
             held=int(box.held.sum()),
             rivals=rivals,

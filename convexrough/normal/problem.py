@@ -28,6 +28,7 @@ from convexrough.normal.units import Units
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
+from convexrough.twofold import Twofold, exact_sum, square_sum, whole
 
 #: The part of the room between neighbours that fitted shells share out by size. A heuristic: any
 #: part gives shells that hold, some of them sharper bounds (docs/theory/certificate.md, "Which
@@ -232,6 +233,17 @@ class NormalProblem:
         if self.load is not None:
             rounding += abs(approach) * self.missing(loads)
         return float(np.maximum(charge(loads) - charge(best), 0.0).sum()) + rounding
+
+    def twofold_offsets(self) -> Twofold:
+        """`offsets` from the scene's numbers, to twice as many digits: z - r^2 / (2 R)."""
+        scene, length = self.scene, self.units.length
+        x, y = scene.asperities.positions[self.candidates].T / length
+        further = np.zeros(len(self))
+        if scene.geometry == "closest":
+            further = scene.asperities.tip_radii[self.candidates] / length
+        radius = Twofold(*exact_sum(np.full(len(self), scene.sphere_radius / length), further))
+        drops = square_sum(x, y).over(radius + radius)
+        return whole(scene.asperities.heights[self.candidates] / length) + -drops
 
     def missing(self, loads: Array) -> float:
         """Bound on what loads miss the prescribed total by."""

@@ -1,0 +1,90 @@
+"""Numbers of twice float64's length: unevaluated sums of two, by float64 operations alone.
+
+Exact sums and products (Knuth; Dekker, Numer. Math. 18 (1971) 224) of numbers far from overflow and
+underflow. No fused operations are assumed, nor anything longer than float64.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from convexrough.arrays import Array, Number
+
+#: Relative error of one operation on twofold numbers: above 4 roundoffs squared of sums of one sign
+#: (Joldes, Muller and Popescu, ACM Trans. Math. Softw. 44 (2017) 15).
+TWOFOLD_ROUNDOFF = 2.0**-100
+
+_SPLITTER = 2.0**27 + 1.0
+
+
+class Twofold(NamedTuple):
+    """high + low, |low| at most a roundoff of high."""
+
+    high: Number
+    low: Number
+
+    @classmethod
+    def nearest(cls, value: Fraction) -> Twofold:
+        high = float(value)
+        return cls(high, float(value - Fraction(high)))
+
+    def __add__(self, other: object) -> Twofold:
+        assert isinstance(other, Twofold)
+        high, off = exact_sum(self.high, other.high)
+        low, off_low = exact_sum(self.low, other.low)
+        high, off = _settled(high, off + low)
+        return Twofold(*_settled(high, off + off_low))
+
+    def __neg__(self) -> Twofold:
+        return Twofold(-self.high, -self.low)
+
+    def __mul__(self, other: object) -> Twofold:
+        assert isinstance(other, Twofold)
+        high, off = exact_product(self.high, other.high)
+        off = off + (self.high * other.low + self.low * other.high)
+        return Twofold(*_settled(high, off))
+
+    def over(self, divisor: Twofold) -> Twofold:
+        """The quotient, by one correction of the first."""
+        first = self.high / divisor.high
+        left = self + -(divisor * Twofold(first, 0.0 * first))
+        return Twofold(*_settled(first, (left.high + left.low) / divisor.high))
+
+
+def exact_sum(a: Number, b: Number) -> tuple[Number, Number]:
+    """The rounded sum and what it is off by."""
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
+
+
+def exact_product(a: Number, b: Number) -> tuple[Number, Number]:
+    """The rounded product and what it is off by."""
+    total = a * b
+    (a1, a2), (b1, b2) = _halves(a), _halves(b)
+    return total, ((a1 * b1 - total) + a1 * b2 + a2 * b1) + a2 * b2
+
+
+def square_sum(x: Array, y: Array) -> Twofold:
+    """x^2 + y^2."""
+    return Twofold(*exact_product(x, x)) + Twofold(*exact_product(y, y))
+
+
+def whole(high: Number) -> Twofold:
+    """A float64 number as it is."""
+    return Twofold(high, np.zeros_like(high) if isinstance(high, np.ndarray) else 0.0)
+
+
+def _settled(high: Number, low: Number) -> tuple[Number, Number]:
+    total = high + low
+    return total, low - (total - high)
+
+
+def _halves(a: Number) -> tuple[Number, Number]:
+    """Two of at most 26 bits each."""
+    wide = _SPLITTER * a
+    first = wide - (wide - a)
+    return first, a - first
