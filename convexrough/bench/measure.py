@@ -192,6 +192,8 @@ class CostRow:
 
     outcome, message : as those of `Row`
     seconds  : [s] the whole of it, the least of several
+    first    : [s] making the scene from nothing, and its first press
+    product  : [s] a plain product with the coupling, `plain_product`: what times can be counted in
     assembling, solving, certifying : [s] its parts
     load_error : proved bound on the error of a load, over the largest load
     """
@@ -203,6 +205,8 @@ class CostRow:
     touching: int = 0
     influence: str = ""
     seconds: float = np.nan
+    first: float = np.nan
+    product: float = np.nan
     assembling: float = np.nan
     solving: float = np.nan
     certifying: float = np.nan
@@ -215,19 +219,20 @@ class CostRow:
     load_error: float = np.inf
 
 
-def measure_cost(family: str, scene: Scene, *, patience: float) -> CostRow:
-    """Time and memory of `press`; then its parts, and products counted."""
+def measure_cost(family: str, make: Callable[[], Scene], *, patience: float) -> CostRow:
+    """Time and memory of a scene's first `press` and of later ones; its parts; products counted."""
+    scene, making = timed(make)
     try:
-        return _measure_cost(family, scene, patience)
+        return _measure_cost(family, scene, making, patience)
     except (InputError, SolverError) as error:
         return CostRow(family, len(scene), outcome_of(error), str(error))
 
 
-def _measure_cost(family: str, scene: Scene, patience: float) -> CostRow:
+def _measure_cost(family: str, scene: Scene, making: float, patience: float) -> CostRow:
     memory = MemoryRise()
-    contact, seconds = timed(lambda: press(scene, approach=APPROACH))
+    contact, first = timed(lambda: press(scene, approach=APPROACH))
     risen = memory.risen()
-    spent, repeats = seconds, 1
+    seconds, spent, repeats = first, first, 1
     while repeats < 3 or (spent < patience and repeats < MOST_REPEATS):
         _, again = timed(lambda: press(scene, approach=APPROACH))
         seconds, spent, repeats = min(seconds, again), spent + again, repeats + 1
@@ -239,6 +244,8 @@ def _measure_cost(family: str, scene: Scene, patience: float) -> CostRow:
         touching=int(np.count_nonzero(contact.loads)),
         influence=contact.influence,
         seconds=seconds,
+        first=making + first,
+        product=plain_product(scene),
         assembling=row.assembling,
         solving=row.solving,
         certifying=row.certifying,
@@ -250,6 +257,27 @@ def _measure_cost(family: str, scene: Scene, patience: float) -> CostRow:
         scope=contact.certificate.scope,
         load_error=contact.certificate.load_error / float(contact.loads.max()),
     )
+
+
+def plain_product(scene: Scene) -> float:
+    """[s] nothing but the transforms of a product: of float64, by all cores, as scipy has them.
+
+    On the box of sites that holds all asperities, padded to twice its size; nan off a lattice.
+    """
+    from scipy import fft
+
+    if scene.asperities.layout.sites is None:
+        return np.nan
+    shape = np.ptp(scene.asperities.layout.sites, axis=0) + 1
+    size = [fft.next_fast_len(2 * int(length) - 1, real=True) for length in shape]
+    field, spectrum = np.ones(shape), np.ones((size[0], size[1] // 2 + 1))
+
+    def product() -> None:
+        waves = fft.rfft2(field, size, workers=-1)
+        waves *= spectrum
+        fft.irfft2(waves, size, workers=-1)
+
+    return min(timed(product)[1] for _ in range(3))
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:

@@ -22,8 +22,17 @@ BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 
 WORK_HEADING = ["solver", "setting", "error", "seconds", "assembling", "certifying", "A P"]
 WORK_HEADING += ["single", "iterations", "MB", ""]
-COST_HEADING = ["scene", "asperities", "touching", "seconds", "assembling", "solving"]
-COST_HEADING += ["certifying", "A P", "single", "MB", "B each", "proved error"]
+COST_HEADING = ["scene", "asperities", "touching", "seconds", "from nothing", "in products"]
+COST_HEADING += [
+    "assembling",
+    "solving",
+    "certifying",
+    "A P",
+    "single",
+    "MB",
+    "B each",
+    "proved error",
+]
 PATH_HEADING = ["scene", "asperities", "touching", "presses", "first call, s", "next, s"]
 PATH_HEADING += ["presses per segment", "undecided", "proved error", "MB", "order"]
 GRADIENT_HEADING = ["scene", "asperities", "touching", "press", "cycle", "gradient"]
@@ -138,11 +147,13 @@ def _work_table(panel: Panel) -> list[list[str]]:
 def _cost_table(rows: Sequence[CostRow]) -> list[list[str]]:
     table = [COST_HEADING]
     for row in rows:
-        cells = [f"{row.asperities:,}", row.outcome, *["-"] * 9]
+        cells = [f"{row.asperities:,}", row.outcome, *["-"] * 11]
         if row.outcome == "answered":
             each = "-" if row.memory is None else f"{row.memory / row.asperities:,.0f}"
             proved = f"{row.load_error:.1e}" if row.certified else f"not proved ({row.scope})"
+            counted = row.first / row.product
             cells = [f"{row.asperities:,}", f"{row.touching:,}", _seconds(row.seconds)]
+            cells += [_seconds(row.first), f"{counted:.0f}" if math.isfinite(counted) else "-"]
             cells += [_seconds(row.assembling), _seconds(row.solving), _seconds(row.certifying)]
             cells += [str(row.products), str(row.single), _megabytes(row.memory), each, proved]
         table.append([row.family, *cells])

@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -134,7 +135,8 @@ def run(plan: Plan, announce: Announce | None = None) -> Bench:
     cost = []
     for family, size in plan.cost:
         say(f"cost: {family}, about {size:,}")
-        cost.append(measure_cost(family, scene(family, REFINEMENTS[size]), patience=plan.patience))
+        make = partial(scene, family, REFINEMENTS[size])
+        cost.append(measure_cost(family, make, patience=plan.patience))
     sheared: list[ShearRow] = []
     for what, sizes in (("state", plan.shear), ("loss curve", plan.cycles)):
         for family, size in sizes:

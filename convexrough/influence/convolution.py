@@ -144,7 +144,7 @@ class Box:
         if last:
             np.conj(half[last:0:-1], out=half[-last:])  # row -i is row i read backwards
         spectrum = np.empty(half.shape, dtype=dtype)
-        for each in blocks(half):
+        for each in in_blocks(half):
             spectrum[:, each] = fft.fft(half[:, each], axis=0, workers=self.workers).real
         return spectrum
 
@@ -193,7 +193,7 @@ class Box:
 
         rows, columns = self.padded
         half = fft.rfft(field, columns, axis=1, workers=self.workers)
-        for each in blocks(half):
+        for each in in_blocks(half):
             full = fft.fft(half[:, each], rows, axis=0, workers=self.workers)
             full *= spectrum[:, each]
             full = fft.ifft(full, axis=0, overwrite_x=True, workers=self.workers)
@@ -232,8 +232,8 @@ class Kernel:
     norm: float
 
 
-def blocks(half: NDArray[Any]) -> Iterator[slice]:
-    """Columns transformed at a time."""
+def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
+    """Columns that are transformed together."""
     width, step = half.shape[1], max(1, ROW // half.itemsize)
     for start in range(0, width, step):
         yield slice(start, min(start + step, width))

@@ -45,11 +45,11 @@ class Rounding(NamedTuple):
     def negligible(self, displacement: Array) -> float:
         """2-norm of a residual that solvers need not reduce: small beside these bounds.
 
-        By a factor of 10 beside that of sums, which is near the truth, and of 20 beside that of
+        By a factor of 10 beside that of sums, which is near the truth, and of 50 beside that of
         transforms, which is some thousand times the truth.
         """
         size = math.sqrt(np.vdot(displacement, displacement))
-        return 0.1 * self.relative * size + 0.05 * self.norm
+        return 0.1 * self.relative * size + 0.02 * self.norm
 
     @property
     def component(self) -> float:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
+from convexrough.influence.convolution import in_blocks
 from convexrough.influence.coupling import Smoother
 
 Single = NDArray[np.float32]
@@ -94,6 +95,7 @@ def block_smoother(
     touching = D > 0
     count = 1.0 if blocks.m == 1 else float(blocks.sums(root > 0)[touching].mean())
     w = root.astype(np.float32)
+    touched = (w > 0).astype(np.float32)
     q = np.divide(w, D.ravel()[blocks.which], out=np.zeros_like(w), where=w > 0)
 
     size, spectrum = _block_spectrum(blocks.shape, basis, blocks.m, count, workers)
@@ -104,16 +106,25 @@ def block_smoother(
     energies[:, 1 : (size[1] + 1) // 2] *= 2  # each wave stands for its conjugate, too
     energies *= np.float32(blocks.m * blocks.m / (size[0] * size[1]))
 
+    rows, columns = blocks.shape
+
     def smooth(values: NDArray[Any]) -> tuple[NDArray[Any], float]:
-        waves = fft.rfft2(blocks.sums(q * values), size, workers=workers)
-        power = np.square(waves.real)
-        power += np.square(waves.imag)
-        left = float(np.sqrt(np.vdot(power, energies)))
-        waves *= removed
-        field = fft.irfft2(waves, size, workers=workers)[: blocks.shape[0], : blocks.shape[1]]
-        averages = q * field.ravel()[blocks.which]
-        smoothed: NDArray[Any] = np.where(w > 0, values - averages, np.float32(0))
-        return smoothed, left
+        half = fft.rfft(blocks.sums(q * values), size[1], axis=1, workers=workers)
+        left = 0.0
+        for each in in_blocks(half):
+            waves = fft.fft(half[:, each], size[0], axis=0, workers=workers)
+            power = np.square(waves.real)
+            power += np.square(waves.imag)
+            left += float(np.einsum("ij,ij->", power, energies[:, each]))
+            waves *= removed[:, each]
+            waves = fft.ifft(waves, axis=0, overwrite_x=True, workers=workers)
+            half[:, each] = waves[:rows]
+        field = fft.irfft(half, size[1], axis=1, overwrite_x=True, workers=workers)
+        averages = np.ascontiguousarray(field[:, :columns]).ravel()[blocks.which]
+        averages *= q
+        np.subtract(values, averages, out=averages)
+        averages *= touched
+        return averages, float(np.sqrt(left))
 
     return smooth
 

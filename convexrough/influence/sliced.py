@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence.convolution import Box, Kernel, blocks
+from convexrough.influence.convolution import Box, Kernel, in_blocks
 from convexrough.influence.coupling import Sums
 from convexrough.roundoff import ROUNDOFF
 
@@ -179,7 +179,7 @@ def _convolve(
 
     rows, columns = box.padded
     halves = [fft.rfft(each, columns, axis=1, workers=box.workers) for each in fields]
-    for each in blocks(halves[0]):
+    for each in in_blocks(halves[0]):
         first, second = (
             fft.fft(half[:, each], rows, axis=0, workers=box.workers) for half in halves
         )

@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
+from convexrough.influence.coupling import Coupling
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
@@ -95,10 +96,12 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     displacement = np.empty(len(scene))
     others = np.flatnonzero(weights == 0)
     pressing = weights[touching]
-    for index, coupling in (
-        (touching, sources),
-        (others, sources.onto(scene.contact_points[others])),
-    ):
+    couplings: list[tuple[Indices | slice, Coupling]]
+    if sources.name == "lattice":  # one box for all
+        couplings = [(slice(None), sources.onto(scene.contact_points))]
+    else:
+        couplings = [(touching, sources), (others, sources.onto(scene.contact_points[others]))]
+    for index, coupling in couplings:
         product = coupling.apply(pressing)
         displacement[index] = product + coupling.rounding(pressing).of(product)
     least = scene.offsets - scene.offset_errors

@@ -35,6 +35,9 @@ from convexrough.twofold import Twofold, exact_sum, square_sum, whole
 #: box", 3).
 FITTED = 0.9
 
+#: Candidates looked at together: what a cache holds.
+CHUNK = 2**14
+
 
 @dataclass(frozen=True, eq=False)
 class NormalProblem:
@@ -215,9 +218,30 @@ class NormalProblem:
         """
         if self.convexity_number(box) > 1:
             return np.inf
-        k, shells = self.coefficients, self.shells
-        slope = approach + self.offsets - displacement - shells * loads  # (D - M P)_i
-        best = self._loads_at_slope(slope, box)
+        total = rounding = 0.0
+        error = np.broadcast_to(error, len(self))
+        for start in range(0, len(self), CHUNK):
+            some = slice(start, start + CHUNK)
+            part = loads[some], displacement[some], approach, box[some], error[some]
+            gap, lost = self._duality_terms(some, *part)
+            total, rounding = total + gap, rounding + lost
+        if self.load is not None:
+            rounding += abs(approach) * self.missing(loads)
+        return total + rounding
+
+    def _duality_terms(
+        self,
+        some: slice,
+        loads: Array,
+        displacement: Array,
+        approach: float,
+        box: Array,
+        error: Array,
+    ) -> tuple[float, float]:
+        """The sum of the terms of some candidates, and a bound on its rounding."""
+        k, shells = self.coefficients[some], self.shells[some]
+        slope = approach + self.offsets[some] - displacement - shells * loads  # (D - M P)_i
+        best = _loads_at_slope(slope, box, k, shells)
 
         def charge(x: Array) -> Array:
             return np.asarray(x * (0.6 * hertz.indentation(x, k) - shells * x / 2.0 - slope))
@@ -226,13 +250,11 @@ class NormalProblem:
         rounding = 32 * ROUNDOFF * float(((loads + best) * size).sum())
         # A slope off by e moves a term by e times the distance from P to the best x at most, and
         # the best x by e over the least curvature there.
-        curvature = self.stiffness(box) - shells
-        moved = np.divide(error, curvature, out=np.full(len(self), np.inf), where=curvature > 0)
+        curvature = self.stiffness(box, some) - shells
+        moved = np.divide(error, curvature, out=np.full(len(box), np.inf), where=curvature > 0)
         distance = np.minimum(np.abs(loads - best) + moved, np.maximum(loads, box))
         rounding += float((error * distance).sum()) * (1 + SAFETY)
-        if self.load is not None:
-            rounding += abs(approach) * self.missing(loads)
-        return float(np.maximum(charge(loads) - charge(best), 0.0).sum()) + rounding
+        return float(np.maximum(charge(loads) - charge(best), 0.0).sum()), rounding
 
     def twofold_offsets(self) -> Twofold:
         """`offsets` from the scene's numbers, to twice as many digits: z - r^2 / (2 R)."""
@@ -249,24 +271,6 @@ class NormalProblem:
         """Bound on what loads miss the prescribed total by."""
         assert self.load is not None
         return (abs(math.fsum(loads) - self.load) + 2 * ROUNDOFF * self.load) * (1 + SAFETY)
-
-    def _loads_at_slope(self, slope: Array, box: Array) -> Array:
-        """(n,) the x from 0 to box_i with h_i'(x) = slope_i, or the nearer end: h_i of the above.
-
-        s = (x / box)^(1/3) solves k box^(2/3) s^2 - shell box s^3 = slope: by Newton's method, from
-        a lower bound.
-        """
-        k_box, shell_box = hertz.indentation(box, self.coefficients), self.shells * box
-        target = np.minimum(np.maximum(slope, 0.0), k_box - shell_box)
-        s = np.sqrt(np.divide(target, k_box, out=np.zeros_like(target), where=k_box > 0))
-        for _ in range(60):
-            value = s * s * (k_box - shell_box * s) - target
-            rate = s * (2.0 * k_box - 3.0 * shell_box * s)
-            step = np.divide(value, rate, out=np.zeros_like(s), where=rate > 0)
-            s = np.minimum(np.maximum(s - step, 0.0), 1.0)
-            if np.abs(step).max(initial=0.0) < 1e-15:
-                break
-        return np.asarray(box * s**3)
 
     def overhang(self, weights: Array, displacement: Array) -> float:
         """Upper bound on D0 at every solution of load control, from any trial loads.
@@ -290,3 +294,22 @@ def _middle(values: Array) -> float:
     """The median of about a thousand of these, spread evenly: any number of their size will do."""
     some = np.sort(values[:: max(1, len(values) // 1000)])
     return float(some[len(some) // 2])
+
+
+def _loads_at_slope(slope: Array, box: Array, coefficients: Array, shells: Array) -> Array:
+    """(n,) the x from 0 to box_i with h_i'(x) = slope_i, or the nearer end: h_i of the above.
+
+    s = (x / box)^(1/3) solves k box^(2/3) s^2 - shell box s^3 = slope: by Newton's method, from
+    a lower bound.
+    """
+    k_box, shell_box = hertz.indentation(box, coefficients), shells * box
+    target = np.minimum(np.maximum(slope, 0.0), k_box - shell_box)
+    s = np.sqrt(np.divide(target, k_box, out=np.zeros_like(target), where=k_box > 0))
+    for _ in range(60):
+        value = s * s * (k_box - shell_box * s) - target
+        rate = s * (2.0 * k_box - 3.0 * shell_box * s)
+        step = np.divide(value, rate, out=np.zeros_like(s), where=rate > 0)
+        s = np.minimum(np.maximum(s - step, 0.0), 1.0)
+        if np.abs(step).max(initial=0.0) < 1e-9:  # the next would be about its square
+            break
+    return np.asarray(box * s**3)

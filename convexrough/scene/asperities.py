@@ -62,9 +62,9 @@ class Asperities(Record):
         What follows from the positions alone, such as their lattice and their distances, is found
         once and shared: for many scenes on one array.
 
-        >>> asperities = scene.asperities
-        >>> rougher = asperities.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
-        >>> rougher.positions is asperities.positions
+        >>> array = scene.asperities
+        >>> rougher = array.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
+        >>> rougher.positions is array.positions
         True
         """
         return self._on(self.layout, tip_radii, heights)

@@ -7,9 +7,11 @@ unknown per ring, the displacement w there, and Newton's method on  w = K P(w).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
@@ -38,37 +40,35 @@ def mean_field_indentation(problem: NormalProblem) -> Array:
 
 
 def _mean_field(problem: NormalProblem) -> Array:
-    every = max(1, len(problem) // SAMPLE)
-    rings = max(4, min(RINGS, len(problem) // LEAST))
+    count = max(4, min(RINGS, len(problem) // LEAST))
     squares = problem.scene.asperities.distances[problem.candidates] ** 2
     # Rings of equal area; in the squared distance, sphere and displacement are nearly straight.
-    limits = float(squares.max()) * np.linspace(0.0, 1.0, rings + 1)
-    edges, centres = np.sqrt(limits), (limits[1:] + limits[:-1]) / 2.0
-    middle = np.sqrt(centres)
-    sampled = squares[::every]
-    ring = np.minimum((sampled / limits[1]).astype(np.intp), rings - 1)
-    counts = np.bincount(ring, minlength=rings) * every
+    limits = float(squares.max()) * np.linspace(0.0, 1.0, count + 1)
+    edges, middle = np.sqrt(limits), np.sqrt((limits[1:] + limits[:-1]) / 2.0)
+    every = max(1, len(problem) // SAMPLE)
+    all_rings, rings = (_Rings.of(each / limits[1], count) for each in (squares, squares[::every]))
+    numbers = all_rings.sums(np.ones(len(squares)))
+    sampled = rings.sums(np.ones(len(squares[::every])))
+    share = np.divide(numbers, sampled, out=np.zeros(count), where=sampled > 0)
     areas = np.pi * np.diff(limits)
 
     # K: displacement of each ring by a unit load spread over each; own part of it taken out.
     K = np.diff(_disc(middle[:, None], edges[1:]), axis=1, prepend=0.0)
     K[:, 0] = _disc(middle, edges[1])
     K /= areas
-    density = counts / areas
-    K.ravel()[:: rings + 1] -= OWN_SHARE * 2.0 * np.sqrt(np.pi * density) / np.maximum(counts, 1)
+    K.ravel()[:: count + 1] -= OWN_SHARE * 2.0 * np.sqrt(np.pi / (areas * np.maximum(numbers, 1.0)))
     K *= problem.influence.scale
 
     offsets, coefficients = problem.offsets[::every], problem.coefficients[::every]
     approach = problem.ceiling
     w = hertz.surface_displacement(middle, *_smooth_contact(problem)) / problem.units.length
     for _ in range(30):
-        indentation = approach + offsets - _between(sampled, centres, w)
+        indentation = approach + offsets - rings.between(w)
         loads = hertz.load(indentation, coefficients)
         slopes = 1.5 * loads / np.where(loads > 0, indentation, 1.0)
-        P = every * np.bincount(ring, loads, rings)
-        c = every * np.bincount(ring, slopes, rings)
+        P, c = share * rings.sums(loads), share * rings.sums(slopes)
         defect = w - K @ P
-        system = np.eye(rings) + K * c
+        system = np.eye(count) + K * c
         if problem.load is not None:
             # one more unknown, the change of the approach, and one more equation, the load
             system = np.block([[system, -(K @ c)[:, None]], [-c[None, :], c.sum()]])
@@ -79,10 +79,39 @@ def _mean_field(problem: NormalProblem) -> Array:
         else:
             step = np.linalg.solve(system, -defect)
             w = w + step
-        if np.abs(step).max() <= 1e-4 * abs(approach):
+        if np.abs(step).max() <= 1e-6 * abs(approach):
             break
-    start: Array = approach + problem.offsets - _between(squares, centres, w)
+    start: Array = approach + problem.offsets - all_rings.between(w)
     return start
+
+
+@dataclass(frozen=True, eq=False)
+class _Rings:
+    """Each asperity between the middles of two rings, and how far from the first to the next.
+
+    It is in both, so that rings do not depend on whether it is on this side of an edge or that.
+    """
+
+    first: Indices
+    share: Array
+    count: int
+
+    @classmethod
+    def of(cls, places: Array, count: int) -> _Rings:
+        """places : (n,) squared distances, 1 for each ring"""
+        first = np.clip((places - 0.5).astype(np.intp), 0, count - 2)
+        return cls(first, places - 0.5 - first, count)
+
+    def sums(self, values: Array) -> Array:
+        """(count,) over each ring. Even loads stay even, as none is taken beyond the last ones."""
+        outer = np.clip(self.share, 0.0, 1.0) * values
+        total = np.bincount(self.first, values - outer, self.count).astype(np.float64)
+        total[1:] += np.bincount(self.first, outer, self.count)[:-1]
+        return total
+
+    def between(self, values: Array) -> Array:
+        """(n,) at each asperity, linear between the rings' middles and beyond the last ones."""
+        return np.asarray(values[self.first] + self.share * np.diff(values)[self.first])
 
 
 def _smooth_contact(problem: NormalProblem) -> tuple[float, float]:
@@ -94,13 +123,6 @@ def _smooth_contact(problem: NormalProblem) -> tuple[float, float]:
         return float(np.sqrt(radius * approach)), radius
     load = problem.load * problem.units.force
     return float(hertz.contact_radius(load, modulus, radius)), radius
-
-
-def _between(squares: Array, centres: Array, w: Array) -> Array:
-    """Linear between the rings, and on to the axis."""
-    from_axis = np.append(0.0, centres), np.append(1.5 * w[0] - 0.5 * w[1], w)
-    values: Array = np.interp(squares, *from_axis)
-    return values
 
 
 def _disc(distance: Array, radius: Array) -> Array:

@@ -73,7 +73,9 @@ class Newton:
             near = np.flatnonzero(indentation > -MARGIN * highest)
         iterations = 0
         while True:
-            state, steps = self._iterate(problem, near, indentation[near], announce)
+            begin = indentation[near]
+            del indentation  # half of the memory of a large scene is vectors
+            state, steps = self._iterate(problem, near, begin, announce)
             iterations += steps
             if len(near) == len(problem):
                 residual = problem.residual(state.forces, state.approach, state.displacement)
@@ -132,7 +134,6 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 class _State(NamedTuple):
     unknown: Array  # delta
     forces: Array  # P(delta)
-    slopes: Array  # c = P'(delta), 0 where open
     displacement: Array  # A P
     gap: Array  # k P^(2/3) + A P - D, the gradient of Phi
     defect: Array  # F
@@ -161,7 +162,6 @@ class _Pressing:
         ratio = indentation / problem.coefficients
         root = np.sqrt(ratio)
         loads = ratio * root
-        slopes = 1.5 * root / problem.coefficients
         displacement = problem.influence.apply(loads)
         gap = indentation + displacement - problem.offsets  # less D0; as Phi has it under a load
         approach = problem.approach
@@ -177,15 +177,15 @@ class _Pressing:
         unknown = np.where(touching, indentation, np.minimum(-gap, 0.0))
         defect = np.where(touching, gap, np.minimum(gap, 0.0))
         residual, scale = float(np.abs(defect).max()), abs(approach) + self.farthest
-        return _State(
-            unknown, loads, slopes, displacement, gap, defect, approach, energy, residual, scale
-        )
+        return _State(unknown, loads, displacement, gap, defect, approach, energy, residual, scale)
 
     def direction(self, state: _State, left: float) -> Array:
+        loaded = state.forces > 0
+        slopes = np.divide(1.5 * state.forces, state.unknown, out=state.forces * 0.0, where=loaded)
         return correct(
             self.problem.influence,
             self.problem.shells,
-            np.sqrt(state.slopes),  # W
+            np.sqrt(slopes),  # W
             state.defect,
             balanced=self.problem.load is not None,
             tolerance=left,

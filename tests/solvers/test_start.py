@@ -8,6 +8,7 @@ from scenes import MATERIAL, paper
 
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
+from convexrough.solvers import mean_field
 from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
 
@@ -36,3 +37,16 @@ def test_nothing_where_the_smooth_sphere_would_touch(prescribed: dict[str, Any])
     positions = 0.01 * np.column_stack((ring.real, ring.imag))
     tall = cr.Scene(1.0, cr.Asperities(positions, 0.02, 6e-5), MATERIAL)
     assert cr.press(tall, **prescribed).certificate.holds
+
+
+def test_the_mean_field_is_close_on_a_fine_lattice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where only some asperities are looked at."""
+    fine = cr.Asperities.hexagonal(spacing=0.0025 / 15, tip_radius=0.02 / 15, within=0.01)
+    problem = NormalProblem.assemble(cr.Scene(1.0, fine, MATERIAL), approach=5e-5)
+    for sample in (mean_field.SAMPLE, 2000):
+        monkeypatch.setattr(mean_field, "SAMPLE", sample)
+        loads = hertz.load(start_indentation(problem), problem.coefficients)
+        displacement = problem.influence.apply(loads)
+        level = hertz.indentation(loads, problem.coefficients) + displacement - problem.offsets
+        off = np.abs(level - problem.ceiling)[loads > 0]
+        assert off.mean() <= 1e-4 * problem.ceiling
