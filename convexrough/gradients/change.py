@@ -17,7 +17,7 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.gradients.adjoint import Friction
-from convexrough.gradients.gradient import far_radii, held, pressed
+from convexrough.gradients.origin import far_radii, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.influence import Influence
 from convexrough.influence.choice import couple

@@ -20,8 +20,9 @@ from convexrough.gradients.adjoint import (
     through_rise,
 )
 from convexrough.gradients.doubts import Doubt, LossDoubt, StateDoubt
-from convexrough.gradients.gradient import Gradient, Origin, held, pressed, to_scene
+from convexrough.gradients.gradient import Gradient, to_scene
 from convexrough.gradients.gross import excess_in_gross_sliding, last_to_slide
+from convexrough.gradients.origin import Origin, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.shearing.cycle import Cycle
 from convexrough.shearing.first_loading import FirstLoading
@@ -124,9 +125,9 @@ def history_gradient(
             assert rise.solution is not None
             doubts.append(StateDoubt(rises[i], state, rise.solution, zero, -1.0))
     by_force = np.zeros(m)
+    lost_by, rise_by = by_lost * loading.energy_unit, by_rise * problem.travel_unit
     for each, i in zip(asked, back, strict=True):
-        slope = each.lost * loading.energy_unit * by_lost[i]
-        slope += each.moved * problem.travel_unit * by_rise[i]
+        slope = each.lost * lost_by[i] + each.moved * rise_by[i]
         for step, part in each.ends:
             by_force[step] += slope * part / problem.force_unit
     adjoint = through_pressing(problem, pulled, holding, tolerance)

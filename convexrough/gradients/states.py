@@ -22,8 +22,9 @@ from convexrough.gradients.adjoint import (
     through_pressing,
 )
 from convexrough.gradients.doubts import Doubt, GivenDoubt, StateDoubt
-from convexrough.gradients.gradient import Gradient, Origin, held, pressed, to_scene
+from convexrough.gradients.gradient import Gradient, to_scene
 from convexrough.gradients.gross import last_to_slide, through_gross_sliding
+from convexrough.gradients.origin import Origin, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.influence.choice import couple
 from convexrough.shearing.state import ShearState, indices, onset_of_sliding
