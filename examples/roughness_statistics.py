@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 LOAD, FRICTION, NU = 3.6e-7, 0.5, 0.3
 SPREADS = (0.0, 5e-7, 1e-6, 2e-6, 4e-6)
 TIPS = (0.0, 0.2)
-AMPLITUDES = tuple(round(0.05 + 0.03 * i, 2) for i in range(31))
+AMPLITUDES = tuple(round(0.05 + 0.02 * i, 2) for i in range(46))
 LOSSES = [f"loss_over_smooth_{x!r}" for x in AMPLITUDES]
 
 
@@ -129,7 +129,7 @@ def compare() -> Pairs:
         contact = surface(*drawn, int(columns["seed"][row]))
         name = f"heights {drawn[0]:g}, tips {drawn[1]:g}, seed {columns['seed'][row]}"
         pairs.append((f"crossing, {name}", found[row], crossing_by_bisection(contact)))
-        amplitude = 0.74
+        amplitude = 0.75
         loss = columns[f"loss_{amplitude!r}"][row]
         reference = loss_from_indentation(contact, amplitude)
         pairs.append((f"loss at {amplitude} over that of the curve, {name}", loss / reference, 1.0))
