@@ -28,7 +28,7 @@ from convexrough.influence.slopes import Spectra, odd_spectra
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import crowding, separations
-from convexrough.twofold import Twofold, exact_product, whole
+from convexrough.twofold import exact_product, exact_sum
 
 #: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
 ENTRY_ROUNDOFFS = 24
@@ -39,6 +39,9 @@ CHUNK = 2**14
 #: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree:
 #: a heuristic, which decides speed and how sharp shells are.
 FILLED = 0.2
+
+#: Points looked at together where each is in many operations: what a cache holds.
+CHUNK = 2**13
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,14 +272,21 @@ class LatticeInfluence(LatticeCoupling):
     @cached_property
     def _off(self) -> float:
         """[length] bound on how far points are from their sites, but for a common shift."""
-        off = []
-        for k in (0, 1):
-            away = -whole(np.full(len(self), self.lattice.origin[k])) + whole(self.points[:, k])
-            for n in (0, 1):
-                step = exact_product(self.places[:, n].astype(np.float64), self.lattice.basis[n, k])
-                away = away + -Twofold(*step)
-            off.append(away.high)
-        return float(np.hypot(*off).max(initial=0.0)) * (1 + 1e-9)
+        worst = 0.0
+        for start in range(0, len(self), CHUNK):
+            some = slice(start, start + CHUNK)
+            away = [self._away(k, self.points[some, k], self.places[some]) for k in (0, 1)]
+            worst = max(worst, float(np.hypot(*away).max()))
+        return worst * (1 + 1e-9)
+
+    def _away(self, k: int, coordinates: Array, places: Sites) -> Array:
+        """x - o - i b1 - j b2: sums and products are exact, but for what is left of them."""
+        high, low = exact_sum(coordinates, -self.lattice.origin[k])
+        for n in (0, 1):
+            step, rest = exact_product(places[:, n].astype(np.float64), self.lattice.basis[n, k])
+            high, off = exact_sum(high, -step)
+            low = low + (off - rest)
+        return np.asarray(high + low)
 
     def smoother(self, root: Array) -> Smoother:
         box = self.box

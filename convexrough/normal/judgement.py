@@ -172,12 +172,15 @@ def _energy_error(box: Box, ball: Ball, bounds: Bounds, loads: Array, found: Fit
 
     Phi(P) - Phi(P*) <= g(P)'(P - P*), and each part is at most |e_i| times the error of the load.
     """
-    problem, rounding = box.problem, found.rounding + found.component
-    dual = problem.duality_gap(loads, found.displacement, found.approach, ball.near, rounding)
+    problem = box.problem
     residuals = np.where(box.held, 0.0, found.residual + found.component)
     slope = float(residuals @ bounds.loads) * (1 + SAFETY)
     if problem.load is not None:
         slope += abs(found.approach) * problem.missing(loads)
+    if slope < ROUNDOFF * float(loads @ found.local):  # less than a dual point can say
+        return slope
+    rounding = found.rounding + found.component
+    dual = problem.duality_gap(loads, found.displacement, found.approach, ball.near, rounding)
     return min(dual, slope)
 
 

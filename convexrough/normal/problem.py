@@ -39,6 +39,10 @@ FITTED = 0.9
 CHUNK = 2**14
 
 
+#: Asperities looked at together where each is in many operations: what a cache holds.
+CHUNK = 2**13
+
+
 @dataclass(frozen=True, eq=False)
 class NormalProblem:
     """The asperities of a scene that could touch, and what is prescribed. In own units.
@@ -258,14 +262,22 @@ class NormalProblem:
 
     def twofold_offsets(self) -> Twofold:
         """`offsets` from the scene's numbers, to twice as many digits: z - r^2 / (2 R)."""
+        found = Twofold(np.empty(len(self)), np.empty(len(self)))
+        for start in range(0, len(self), CHUNK):
+            some = slice(start, start + CHUNK)
+            part = self._twofold_offsets(self.candidates[some])
+            found.high[some], found.low[some] = part
+        return found
+
+    def _twofold_offsets(self, which: Indices) -> Twofold:
         scene, length = self.scene, self.units.length
-        x, y = scene.asperities.positions[self.candidates].T / length
-        further = np.zeros(len(self))
+        x, y = scene.asperities.positions[which].T / length
+        further = np.zeros(len(which))
         if scene.geometry == "closest":
-            further = scene.asperities.tip_radii[self.candidates] / length
-        radius = Twofold(*exact_sum(np.full(len(self), scene.sphere_radius / length), further))
+            further = scene.asperities.tip_radii[which] / length
+        radius = Twofold(*exact_sum(np.full(len(which), scene.sphere_radius / length), further))
         drops = square_sum(x, y).over(radius + radius)
-        return whole(scene.asperities.heights[self.candidates] / length) + -drops
+        return whole(scene.asperities.heights[which] / length) + -drops
 
     def missing(self, loads: Array) -> float:
         """Bound on what loads miss the prescribed total by."""

@@ -216,11 +216,14 @@ def test_twofold_numbers(seed: int) -> None:
 
 
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
-@pytest.mark.parametrize("shift", [0.0, 0.3e-3])
-def test_the_sharp_residual(geometry: Any, shift: float) -> None:
+@pytest.mark.parametrize("shift", [0.0, 0.3e-3, None])
+def test_the_sharp_residual(geometry: Any, shift: float | None) -> None:
     """Gaps of loads, whatever these are, in ball arithmetic: within what is said of them."""
     rng = np.random.default_rng(4)
-    lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    if shift is None:  # exactly on their sites
+        lattice, shift = cr.Asperities.square(spacing=2.0**-9, tip_radius=0.02, within=0.01), 0.0
+    else:
+        lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     heights = 1e-6 * rng.standard_normal(len(lattice))
     asperities = cr.Asperities(lattice.positions + shift, 0.02, heights)
     scene = cr.Scene(1.0, asperities, cr.Material(0.7, 0.3), geometry=geometry)
