@@ -21,7 +21,7 @@ from convexrough.normal.sup_norm import SupNorm
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: What conjugate gradients may leave of M mu = 1. Heuristic: what is left is part of the bound.
-LEFT = 1e-6
+LEFT = 1e-4
 
 
 def riding_weights(problem: NormalProblem, loads: Array) -> Array:

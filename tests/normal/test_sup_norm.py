@@ -131,6 +131,30 @@ def test_firmness(packing: float, size: float) -> None:
     assert firmness(packing, size) == pytest.approx(least, abs=1e-6)
 
 
+@pytest.mark.parametrize("count", [6, 12, 24])
+def test_in_space_the_bound_is_nearly_reached(count: int) -> None:
+    """The theorem holds in space: one charge in a cage of others is worse than any in a plane."""
+    rng = np.random.default_rng(count)
+    around = rng.standard_normal((count, 3))
+    for _ in range(2000):  # pushed apart on the sphere
+        apart = around[:, None] - around
+        cubes = (apart**2).sum(axis=2) ** 1.5 + np.eye(count)
+        around += 1e-2 * (apart / cubes[:, :, None]).sum(axis=1)
+        around /= np.linalg.norm(around, axis=1)[:, None]
+    points = np.vstack((np.zeros(3), around))
+    r = np.linalg.norm(points[:, None] - points, axis=2)
+    inverse = np.divide(1.0, r, out=np.zeros_like(r), where=r > 0)
+    A = DenseInfluence(points, SCALE, SCALE * inverse, 0.0, 1e-15)
+    nearest = 1.0 / inverse[1:, 1:].max()
+    h = SCALE / (0.3 * np.append(1.0, np.full(count, min(nearest, 1.0))))
+    sup = SupNorm.of(A, h)
+    assert sup is not None
+    found = np.linalg.inv(np.diag(h) + A.matrix)
+    assert (np.abs(found).sum(axis=1) <= sup.load_errors(np.ones(len(h)), 1.0)).all()
+    assert (np.abs(A.matrix @ found).sum(axis=1) <= sup.moves(A, 1.0)).all()
+    assert (np.abs(found).sum(axis=1) * h).max() > 0.3 * sup.growth
+
+
 def test_no_firmness_without_room() -> None:
     """Shells that meet, and shells that are too close, prove nothing."""
     points = np.array([[0.0, 0.0], [1.0, 0.0]])
