@@ -15,6 +15,9 @@ import convexrough as cr
 #: itself known to a part in 1e13 only.
 CLOSE, NEAR_GROSS = 2e-13, 1e-12
 
+#: At a convexity number of 0.9 rounding is magnified ten times.
+CROWDED = 1e-12
+
 
 def pressed(name: str, control: str) -> cr.Contact:
     scene, approach = NAMED[name]
@@ -201,7 +204,7 @@ def test_backward_increments(low: float, fraction: float, slides: bool, holding:
     gradient = cr.cycle(contact, maximum=force).gradient(holding=holding)
     # The trapezoid rule between P and P - T is not the loss here; the increments' energy is.
     assert gradient.value == pytest.approx(float(judge.at), rel=1e-12)
-    assert_slopes(judge, gradient, CLOSE)
+    assert_slopes(judge, gradient, CROWDED)
 
 
 def test_one_asperity_that_sticks() -> None:
