@@ -18,7 +18,7 @@ _approx = pytest.approx
 def _relative(
     expected: Any, rel: float | None = None, abs: float | None = None, nan_ok: bool = False
 ) -> Any:
-    """`pytest.approx` without its absolute tolerance of 1e-12: many losses are smaller than that."""
+    """`pytest.approx` without its absolute tolerance of 1e-12: many losses are smaller."""
     if abs is None:
         rel, abs = 1e-6 if rel is None else rel, 0.0
     return _approx(expected, rel=rel, abs=abs, nan_ok=nan_ok)
