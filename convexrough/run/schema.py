@@ -1,118 +1,42 @@
 """The tables of a scene file: what each key may hold, and every mistake in words.
 
-Only this module knows pydantic, which takes 0.1 s to import: `read_scene` imports it when a file is
-read.
+`read_scene` imports this when a file is read, and not before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Tag,
-    ValidationError,
-    ValidatorFunctionWrapHandler,
-    WrapValidator,
+from pydantic import Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from convexrough.checks import nearest
+from convexrough.run.path_schema import Path, Shakedown, Steady
+from convexrough.run.sensitivity import BY
+from convexrough.run.values import (
+    By,
+    Chosen,
+    Control,
+    Finite,
+    Fractions,
+    Geometry,
+    InfluenceName,
+    NonNegative,
+    Number,
+    Pattern,
+    Points,
+    Positive,
+    Ratio,
+    Seed,
+    Share,
+    Shares,
+    SolverName,
+    Table,
+    Text,
+    TipRadius,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
-
-from convexrough.checks import SIZED, is_sized, nearest
-from convexrough.influence import KINDS
-from convexrough.run.sensitivity import BY, NUMBERS
-from convexrough.solvers import SOLVERS
-
-
-def _expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
-    """What a message says after "expected", of a wrong type or where `holds` is false."""
-
-    def check(value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
-        try:
-            if holds(result := validated(value)):
-                return result
-        except ValidationError as error:
-            if error.errors()[0]["type"] == "expected":  # said already, inside
-                raise
-        raise PydanticCustomError("expected", "{phrase}", {"phrase": phrase})
-
-    return WrapValidator(check)
-
-
-_SIZED = _expected(SIZED, is_sized)
-
-Finite = Annotated[float, _expected("a finite number"), _SIZED]
-Positive = Annotated[float, _expected("a positive number", lambda value: value > 0), _SIZED]
-NonNegative = Annotated[
-    float, _expected("a number that is not negative", lambda value: value >= 0), _SIZED
-]
-Ratio = Annotated[float, _expected("a number from 0 to 0.5", lambda value: 0 <= value <= 0.5)]
-Share = Annotated[float, _expected("a number from 0 to 1", lambda value: 0 <= value <= 1)]
-Fraction = Annotated[float, _expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
-Shares = Annotated[list[Share], _expected("a list of numbers from 0 to 1", bool)]
-Fractions = Annotated[list[Fraction], _expected("a list of numbers from -1 to 1", bool)]
-TipRadius = Annotated[
-    Annotated[Positive, Tag("number")] | Annotated[list[Positive], Tag("list")],
-    Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
-]
-Seed = Annotated[int, _expected("a whole number that is not negative", lambda value: value >= 0)]
-Points = Annotated[int, _expected("a whole number, at least 4", lambda value: value >= 4)]
-Chosen = Annotated[
-    Literal["all"] | list[Seed], _expected('"all" or a list of indices of asperities, from 0')
-]
-Text = Annotated[str, _expected("text in quotes", bool)]
-Pattern = Annotated[Literal["hexagonal", "square"], _expected('"hexagonal", "square" or "file"')]
-Geometry = Annotated[Literal["summit", "closest"], _expected('"summit" or "closest"')]
-InfluenceName = Annotated[str, _expected(f"one of: {', '.join(KINDS)}", KINDS.__contains__)]
-SolverName = Annotated[str, _expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)]
-
-
-ShakedownKind = Annotated[
-    Literal["exact", "elastic", "vector"], _expected('"exact", "elastic" or "vector"')
-]
-Pair = Annotated[
-    list[Finite], _expected("a pair [x, y] of finite numbers", lambda value: len(value) == 2)
-]
-Force = Annotated[
-    Annotated[Finite, Tag("number")] | Annotated[Pair, Tag("list")],
-    Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
-]
-
-
-Number = Annotated[str, _expected(f"one of: {', '.join(NUMBERS)}", NUMBERS.__contains__)]
-By = Annotated[
-    list[str], _expected(f"a list of some of: {', '.join(BY)}", lambda it: set(it) <= {*BY})
-]
-Control = Annotated[Literal["load", "approach"], _expected('"load" or "approach"')]
-
-
-class Table(BaseModel):
-    """A table: numbers are finite, no text or truth value stands for one, no other keys."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
-
-    alternatives: ClassVar[tuple[str, str] | None] = None  # keys of which exactly one is given
-    needs: ClassVar[dict[str, str]] = {}  # the key on the left is only used with that on the right
-
-    @classmethod
-    def mistakes_between(cls, keys: dict[str, Any]) -> Iterator[str]:
-        """Mistakes in which keys are given together, whatever their values."""
-        if cls.alternatives:
-            given = [key for key in cls.alternatives if key in keys]
-            if len(given) != 1:
-                found = "both" if given else "neither"
-                both = ", ".join(cls.alternatives)
-                yield f"{both}: found {found}, expected exactly one of the two"
-        for key, needed in cls.needs.items():
-            if key in keys and needed not in keys:
-                yield f"{needed}: missing, needed with {key}"
-
-    def mistakes_within(self) -> Iterator[str]:
-        """Mistakes that only show between values each right by itself."""
-        yield from ()
 
 
 class Sphere(Table):
@@ -184,64 +108,10 @@ class History(Table):
     fractions: Fractions
 
 
-class Ellipse(Table):
-    load: Positive
-    load_amplitude: Finite = 0.0
-    force: Finite = 0.0
-    force_amplitude: Finite
-    phase: Finite = 0.0
-    chords: Annotated[int, _expected("a whole number, at least 6", lambda value: value >= 6)] = 96
-
-
-class Path(Table):
-    loads: list[NonNegative] | None = None
-    forces: list[Finite] | None = None
-    ellipse: Ellipse | None = None
-    reference: Positive = 1.0
-
-    def mistakes_within(self) -> Iterator[str]:
-        points = (self.loads, self.forces)
-        if self.ellipse is not None:
-            if points != (None, None):
-                yield "ellipse: found beside loads or forces, expected one of the two ways"
-        elif None in points:
-            yield "loads, forces: missing, both are needed where there is no ellipse"
-        elif len(points[0] or ()) != len(points[1] or ()) or not points[0]:
-            found = f"{len(points[0] or ())} and {len(points[1] or ())} values"
-            yield f"loads, forces: found {found}, expected as many of both, at least one"
-
-
-class Steady(Path):
-    needs: ClassVar = {"phases": "ellipse", "factors": "phases"}
-    phases: Annotated[list[Finite], _expected("a list of finite numbers", bool)] | None = None
-    factors: Annotated[list[Positive], _expected("a list of positive numbers", bool)] = [1.0]
-
-
-class Shakedown(Table):
-    loads: Positive
-    forces: Force = 0.0
-    load_amplitudes: list[Finite] | None = None
-    force_amplitudes: list[Force]
-    kind: ShakedownKind = "exact"
-    reference: Positive = 1.0
-
-    def mistakes_within(self) -> Iterator[str]:
-        if self.load_amplitudes and len(self.load_amplitudes) != len(self.force_amplitudes):
-            found = len(self.load_amplitudes)
-            yield f"load_amplitudes: found {found} values, expected {len(self.force_amplitudes)}"
-        pairs = self.kind == "vector"
-        expected = 'a pair [x, y] with kind = "vector"' if pairs else "a number with this kind"
-        if isinstance(self.forces, list) != pairs and self.forces != 0.0:
-            yield f"forces: found {self.forces}, expected {expected}"
-        for i, force in enumerate(self.force_amplitudes):
-            if isinstance(force, list) != pairs:
-                yield f"force_amplitudes[{i}]: found {force}, expected {expected}"
-
-
 class Gradient(Table):
     of: Number
     fraction: Share | None = None
-    by: By = list(BY)  # pydantic makes a copy of it
+    by: By = Field(list(BY))
     holding: Control | None = None
 
     def mistakes_within(self) -> Iterator[str]:

@@ -9,7 +9,8 @@ from typing import Any, get_args
 from pydantic import Field
 
 from convexrough.checks import nearest
-from convexrough.run.schema import Table, validate_table
+from convexrough.run.schema import validate_table
+from convexrough.run.values import Table
 from convexrough.sweeps.grid import Law
 from convexrough.sweeps.measures import MEASURES
 
