@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import PAPER_APPROACH, paper, scattered
+from scenes import PAPER_APPROACH, paper, scattered, twins
 
 import convexrough as cr
 from convexrough.testing import assert_agree, assert_certified, assert_shear_certified
@@ -113,12 +113,12 @@ def test_shear_forces() -> None:
 
 
 def test_nothing_to_prove() -> None:
-    dense, approach = scattered(4, 5, 3.0, 0.0)
-    loads = cr.press(dense, approach=approach).loads
-    message = failure(assert_certified, dense, loads, approach=approach)
+    dense, load = twins()
+    loads = cr.press(dense, load=load).loads
+    message = failure(assert_certified, dense, loads, load=load)
     assert message.startswith("nothing is proved of the loads: ")
     assert "convexity number" in message
-    found = failure(assert_agree, loads, loads, scene=dense, approach=approach)
+    found = failure(assert_agree, loads, loads, scene=dense, load=load)
     assert found.startswith("nothing is proved of the loads of first: ")
 
 

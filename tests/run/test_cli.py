@@ -164,10 +164,14 @@ def test_nothing_touches(command: Any, tmp_path: Path) -> None:
     assert command("verify", "a.toml", "a-results/asperities.csv").status == 0
 
 
+#: Summits so close that both may touch, but at no least of the energy.
+TWINS = "x,y\n-5e-5,0\n5e-5,0\n"
+
+
 def test_without_a_certificate(command: Any, tmp_path: Path) -> None:
-    """Tips as flat as the sphere: discs overlap, nothing is proved, and everything says so."""
-    dense = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 100.0'
-    (tmp_path / "a.toml").write_text(scene_text(dense))
+    """Two summits that are almost one: nothing is proved, and everything says so."""
+    (tmp_path / "a.toml").write_text(scene_text(SUMMITS, "load = 6.6e-8"))
+    (tmp_path / "summits.csv").write_text(TWINS)
     outcome = command("run", "a.toml", "--json", "--no-figures")
     assert outcome.status == 3
     proof = json.loads(outcome.out)["normal"]["certificate"]
@@ -328,9 +332,8 @@ def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
 
 
 def test_shear_of_a_contact_without_proof(command: Any, tmp_path: Path) -> None:
-    dense = HEXAGONAL.replace("tip_radius = 0.02", "tip_radius = 5.0")
-    assert dense != HEXAGONAL
-    (tmp_path / "a.toml").write_text(scene_text(dense, more=SHEAR))
+    (tmp_path / "a.toml").write_text(scene_text(SUMMITS, "load = 6.6e-8", more=SHEAR))
+    (tmp_path / "summits.csv").write_text(TWINS)
     outcome = command("run", "a.toml", "--no-figures", "--json")
     assert outcome.status == 3
     assert "rows in shear have undecided words" in outcome.err
