@@ -2,8 +2,8 @@
 
 Free space: the smallest box of sites that holds the asperities is padded with zeros to twice its
 size, so that no asperity feels a periodic image of another. Heights and radii of the asperities
-play no part in it. The rounding of the transforms is bounded in docs/theory/operators.md, "On a
-lattice: Fourier transforms".
+play no part in it. The rounding of the transforms is bounded in
+docs/theory/operators-lattice.md, "On a lattice: Fourier transforms".
 """
 
 from __future__ import annotations

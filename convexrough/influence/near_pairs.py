@@ -65,7 +65,7 @@ Piece: TypeAlias = tuple[slice, Indices, Indices]
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """S of docs/theory/operators.md: 1 / r^q less its smooth part, of pairs nearer than the cut.
+    """S of docs/theory/operators-mesh.md: 1 / r^q less its smooth part, of pairs within the cut.
 
     upper   : (n, n) sparse, pairs i < j;  own : what each point gets of itself
     terms   : the most that any sum has;  nearest : [length] the least distance that is not 0

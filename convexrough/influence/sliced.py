@@ -125,7 +125,7 @@ def sliced_sums(box: Box, distances: Distances, spacing: float, loads: Array) ->
 
 
 def each_loss(box: Box) -> float:
-    """Of a component of a product, over both 2-norms: (2) of docs/theory/operators.md.
+    """Of a component of a product, over both 2-norms: (2) of docs/theory/operators-lattice.md.
 
     8 roundoffs instead of 4, as two products are added up before the inverse transform.
     """

@@ -287,7 +287,7 @@ class NormalProblem:
     def overhang(self, weights: Array, displacement: Array) -> float:
         """Upper bound on D0 at every solution of load control, from any trial loads.
 
-        (2) of docs/theory/certificate.md, "Prescribed load".
+        (2) of docs/theory/certificate-rounding.md, "Prescribed load".
 
         weights      : (n,) trial loads, not negative, not all zero
         displacement : A times weights

@@ -1,8 +1,8 @@
 """Judge friction states: bounds on their forces and slips, and which asperities slide.
 
-The proofs are those of docs/theory/shear.md, "Proof" (by convexity, in six steps) and "Close to
-gross sliding" (by exhaustion). All bounds shrink with the shear force. Arrays are (m, n): m states
-of n loaded asperities. In the letters of that page, all displacements over c_t f:
+The proofs are those of docs/theory/shear-proof.md, "Proof" (by convexity, in six steps) and of
+docs/theory/shear-errors.md, "Close to gross sliding" (by exhaustion). All bounds shrink with the
+shear force. Arrays are (m, n): m states of n loaded asperities. In the letters of that page, all displacements over c_t f:
 
     loads P, errors b, ceilings k P^(2/3)     increments u, used t = |u| / P, totals T
     stiffness h of H, convexity_number theta  rises Delta, available Delta - A u
@@ -170,7 +170,7 @@ def _given(problem: TangentialProblem, states: States) -> _Given:
 
 
 def _by_convexity(given: _Given) -> Bounds:
-    """The steps of docs/theory/shear.md, "Proof", in their order."""
+    """The steps of docs/theory/shear-proof.md, "Proof", in their order."""
     known = given.known
     if not known.convexity_number < 1 or not known.sure.any():
         return Bounds.unproved(*given.states.increments.shape)
@@ -307,7 +307,7 @@ def _bounds(given: _Given, near: Nearness, proved: NDArray[np.bool_], increments
 
 
 def _by_exhaustion(given: _Given) -> Bounds:
-    """docs/theory/shear.md, "Close to gross sliding": each u_i is within sum P - T of P_i.
+    """docs/theory/shear-errors.md, "Close to gross sliding": each u_i is within sum P - T of P_i.
 
     With c = Delta - A u - ceiling: no c* of a loaded asperity is less than -`shortfall`, which
     bounds the rise from below and tells who slides; the least c* is not positive, which bounds it

@@ -1,7 +1,7 @@
 """What the certificate of a contact says of its loads, as friction needs it: known to some digits.
 
 Each load is known to its certified bound b. All of them together are known better than that: by
-docs/theory/shear.md, "The pressed loads". In the letters of that page:
+docs/theory/shear-errors.md, "The pressed loads". In the letters of that page:
 
     loads P, errors b, distance || P* - P ||_H    stiffness h of H, convexity_number theta
     coupling Lambda                               reach_i (sum_j A_ij^2 / h_j)^(1/2)
@@ -142,7 +142,7 @@ def _effects(problem: TangentialProblem, strays: Indices, most: Array) -> tuple[
 
 
 def _distance(problem: TangentialProblem, errors: Array, stray_effect: Array) -> float:
-    """|| P* - P ||_H by docs/theory/shear.md, "The pressed loads"; infinite where not convex."""
+    """|| P* - P ||_H, or infinite: docs/theory/shear-errors.md, "The pressed loads"."""
     P, ceilings, length = problem.loads, problem.ceilings, problem.units.length
     softening = np.cbrt(P / (P + errors))
     h = softening / problem.stiffest
@@ -168,7 +168,7 @@ def _distance(problem: TangentialProblem, errors: Array, stray_effect: Array) ->
 
 
 def _flatness(problem: TangentialProblem, theta: float) -> float:
-    """Bound on 1'N^-1 1, N = H + A at the loads P: docs/theory/shear.md, "The pressed loads".
+    """Bound on 1'N^-1 1, N = H + A at P: docs/theory/shear-errors.md, "The pressed loads".
 
     For any x, with r = 1 - N x:  1'N^-1 1 = 1'x + r'x + r'N^-1 r.  Elastic shares make r small.
     """

@@ -4,8 +4,9 @@ A cycle of amplitude T costs 8 c_t f^2 w(T), and w is a sum over asperities of
 
     (3/5) P ceiling e(t) + P slip / 2,      t = |u| / P,   ceiling = k P^(2/3).
 
-The bounds on |w - w*| of m states of n asperities are those of docs/theory/shear.md, "The error of
-the loss", in own units. They rest on how near a state is proved to be to the true one: `Nearness`.
+The bounds on |w - w*| of m states of n asperities are those of
+docs/theory/loss-errors.md, "The error of the loss", in own units. They rest on how
+near a state is proved to be to the true one: `Nearness`.
 """
 
 from __future__ import annotations
