@@ -15,7 +15,8 @@ from convexrough.normal.boxes import Scope
 from convexrough.normal.certificate import Certificate
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.judgement import Bounds, judge_states
+from convexrough.shearing.bounds import Bounds
+from convexrough.shearing.judgement import judge_states
 from convexrough.shearing.normal_map import States, evaluate, gross_sliding, slips
 from convexrough.shearing.problem import TangentialProblem
 

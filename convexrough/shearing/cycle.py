@@ -22,9 +22,9 @@ from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
+from convexrough.shearing.bounds import Bounds
 from convexrough.shearing.certificate import friction_words
 from convexrough.shearing.first_loading import FirstLoading
-from convexrough.shearing.judgement import Bounds
 from convexrough.shearing.loop import Loop, loops_between
 from convexrough.shearing.normal_map import States
 from convexrough.shearing.state import forces_at

@@ -16,7 +16,8 @@ from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.progress import Announce
 from convexrough.roundoff import SAFETY
-from convexrough.shearing.judgement import Bounds, judge_in_turn
+from convexrough.shearing.bounds import Bounds
+from convexrough.shearing.judgement import judge_in_turn
 from convexrough.shearing.many_states import by_matrices
 from convexrough.shearing.normal_map import States
 from convexrough.shearing.problem import TangentialProblem

@@ -1,8 +1,8 @@
 """Judge friction states: bounds on their forces and slips, and which asperities slide.
 
-The proofs are those of docs/theory/shear-proof.md, "Proof" (by convexity, in six steps) and of
-docs/theory/shear-errors.md, "Close to gross sliding" (by exhaustion). All bounds shrink with the
-shear force. Arrays are (m, n): m states of n loaded asperities. In the letters of that page, all displacements over c_t f:
+The proof is that of docs/theory/shear-proof.md, "Proof", by convexity in six steps; what it leaves
+is judged by exhaustion. All bounds shrink with the shear force. Arrays are (m, n): m states of n
+loaded asperities. In the letters of that page, all displacements over c_t f:
 
     loads P, errors b, ceilings k P^(2/3)     increments u, used t = |u| / P, totals T
     stiffness h of H, convexity_number theta  rises Delta, available Delta - A u
@@ -21,47 +21,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array
 from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.shearing.bounds import SHARE_ROUNDOFFS, Bounds, Given, assess, bounds_of
 from convexrough.shearing.energy import TangentialEnergy
-from convexrough.shearing.load_errors import LoadErrors, couple_above
-from convexrough.shearing.loss_errors import Nearness, loss_errors
+from convexrough.shearing.exhaustion import by_exhaustion
+from convexrough.shearing.load_errors import couple_above
+from convexrough.shearing.loss_errors import Nearness
 from convexrough.shearing.normal_map import States
 from convexrough.shearing.problem import TangentialProblem
 
 #: Where P* is within a tenth of P, |ceiling* - ceiling| <= LOCAL h |P* - P|: 1.1 / 0.9^(1/3).
 LOCAL = 1.15
 
-#: Roundoffs of a share u / P that are counted apart: near full slip each changes the own deflection
-#: by (2/3) (1 - t)^(-1/3), up to 1e5, roundoffs of its own.
-SHARE_ROUNDOFFS = 4
-
-#: Roundoffs, for each asperity, of sum P and of T, which is moved to sum P where it is that to
-#: rounding (`TangentialEnergy.at_limit`): 2 (n - 1) and 2 (4 + log2 n), and a few of Q / f.
-LIMIT_ROUNDOFFS = 12
-
 #: Numbers of an array that are judged at once.
 BLOCK = 2**20
-
-
-class Bounds(NamedTuple):
-    """Proved bounds on m states, in own units; infinite where nothing is proved."""
-
-    proved: NDArray[np.bool_]  # (m,)
-    increments: Array  # (m, n) |u - u*|
-    slips: Array  # (m, n) |slip - slip*|
-    rises: Array  # (m,)
-    sliding: NDArray[np.bool_]  # (m, n)
-    partial: NDArray[np.bool_]  # (m, n) proved not to slide
-    losses: Array  # (m,) |w - w*|, of what a cycle of this amplitude costs
-
-    @classmethod
-    def unproved(cls, m: int, n: int) -> Bounds:
-        """Nothing is known of m states of n asperities."""
-        unknown, no = np.full((m, n), np.inf), np.zeros((m, n), dtype=bool)
-        nowhere, unproved = np.full(m, np.inf), np.zeros(m, dtype=bool)
-        return cls(unproved, unknown, unknown.copy(), nowhere, no, no.copy(), nowhere.copy())
 
 
 def judge_states(problem: TangentialProblem, states: States) -> Bounds:
@@ -83,11 +58,11 @@ def judge_in_turn(problem: TangentialProblem, states: States) -> Iterator[tuple[
 def _judge(problem: TangentialProblem, states: States) -> Bounds:
     if problem.certificate.scope == "none":
         return Bounds.unproved(*states.increments.shape)
-    given = _given(problem, states)
+    given = assess(problem, states)
     known, bounds = given.known, _by_convexity(given)
     others = np.flatnonzero(~bounds.proved)
     if len(others):
-        near_gross = _by_exhaustion(given.take(others))
+        near_gross = by_exhaustion(given.take(others))
         for field, values in zip(bounds, near_gross, strict=True):
             field[others] = values
     bounds.slips[:, ~known.sure] = np.inf
@@ -115,7 +90,7 @@ def state_errors(problem: TangentialProblem, state: States) -> StateErrors | Non
     """Of a single state (1,); None where convexity proves nothing of it."""
     if problem.certificate.scope == "none":
         return None
-    given = _given(problem, state)
+    given = assess(problem, state)
     if not given.known.convexity_number < 1 or not given.known.sure.any():
         return None
     image = _image(given)
@@ -130,46 +105,7 @@ def state_errors(problem: TangentialProblem, state: States) -> StateErrors | Non
     return StateErrors(float(distance[0]), carried, image.shifts[0], uncertainty, rise, *words)
 
 
-class _Given(NamedTuple):
-    """What the proofs start from: m states, A u of each, and its rounding."""
-
-    problem: TangentialProblem
-    known: LoadErrors
-    states: States
-    displacement: Array  # (m, n) A u
-    magnitude: Array  # (m, n) upper bounds on A |u|
-    rounding: Array  # (m, n) bounds on the error of A u, less a remainder
-    remainder: Array  # (m,) bounds on the 2-norm of that
-
-    @property
-    def available(self) -> Array:
-        """(m, n) the displacement left to each asperity, its own deflection and its slip."""
-        return self.states.rises[:, None] - self.displacement
-
-    def take(self, rows: Indices) -> _Given:
-        """Some of the states."""
-        rest = (field[rows] for field in self[3:])
-        return _Given(self.problem, self.known, self.states.take(rows), *rest)
-
-
-def _given(problem: TangentialProblem, states: States) -> _Given:
-    u, A = states.increments, problem.influence
-    displacement = problem.couple(u)
-    noise = [A.rounding(each) for each in u]
-    relative = np.array([each.relative for each in noise])[:, None]
-    remainder = np.array([each.norm for each in noise])
-    magnitude = displacement
-    back = np.flatnonzero((u < 0).any(axis=1))  # A |u| is not A u
-    if len(back):
-        magnitude = displacement.copy()
-        magnitude[back] = problem.couple(np.abs(u[back]))
-    # The relative part is of the true product, which the computed one may miss by all of it.
-    magnitude = (np.maximum(magnitude, 0.0) + remainder[:, None]) * (1.0 + 2.0 * relative)
-    known, rounding = LoadErrors.of(problem), relative * magnitude
-    return _Given(problem, known, states, displacement, magnitude, rounding, remainder)
-
-
-def _by_convexity(given: _Given) -> Bounds:
+def _by_convexity(given: Given) -> Bounds:
     """The steps of docs/theory/shear-proof.md, "Proof", in their order."""
     known = given.known
     if not known.convexity_number < 1 or not known.sure.any():
@@ -189,7 +125,7 @@ class _Image(NamedTuple):
     coupled: Array  # (m, n) bounds on A |tau|
 
 
-def _image(given: _Given) -> _Image:
+def _image(given: Given) -> _Image:
     """Steps 1 and 2: t P* misses the total by `missing`, and tau restores it where it sticks.
 
     The shifts are in proportion to du/deta, where |tau_i| < (P_i - |u_i|) / 2 leaves room for them.
@@ -225,7 +161,7 @@ class _Residual(NamedTuple):
     values: Array  # (m, n) bounds on |e|, less what `_distance` adds in norms
 
 
-def _residual(given: _Given, image: _Image) -> _Residual:
+def _residual(given: Given, image: _Image) -> _Residual:
     """Step 3: |e| <= |Delta - A u - own|, or what Delta - A u lacks of the ceiling if t = 1.
 
     With rounding, and with what the shifts change in own deflections.
@@ -255,7 +191,7 @@ def own_change(energy: TangentialEnergy, size: Array, own: Array, change: Array)
     return bound
 
 
-def _distance(given: _Given, image: _Image, residual: _Residual) -> Array:
+def _distance(given: Given, image: _Image, residual: _Residual) -> Array:
     """Step 4, (m,): || d ||_H, d from the image to the solution, with root^2 = 1 - theta,
 
         || d ||_H <= ((|| e ||_{H^-1} + || w ||_H) / root + || w ||_N) / root.
@@ -273,7 +209,7 @@ def _distance(given: _Given, image: _Image, residual: _Residual) -> Array:
     return distance
 
 
-def _words(given: _Given, image: _Image, residual: _Residual, distance: Array) -> Bounds:
+def _words(given: Given, image: _Image, residual: _Residual, distance: Array) -> Bounds:
     """Steps 5 and 6: the rise, known at every asperity sure to stick; the slips; and who slides.
 
     |Delta - Delta*| <= |Delta - A u - own| + the changes of both, the least of those that stick;
@@ -298,46 +234,4 @@ def _words(given: _Given, image: _Image, residual: _Residual, distance: Array) -
     shifts = image.shifts + moved - distances
     near = Nearness(distance, shifts, moved, available, slip_errors, rise_errors, sliding, partial)
     proved = image.restored & np.isfinite(rise_errors)
-    return _bounds(given, near, proved, distances + known.image_distances(P, u))
-
-
-def _bounds(given: _Given, near: Nearness, proved: NDArray[np.bool_], increments: Array) -> Bounds:
-    losses = loss_errors(given.problem, given.known, given.states, near)
-    return Bounds(proved, increments, near.errors, near.rises, near.sliding, near.partial, losses)
-
-
-def _by_exhaustion(given: _Given) -> Bounds:
-    """docs/theory/shear-errors.md, "Close to gross sliding": each u_i is within sum P - T of P_i.
-
-    With c = Delta - A u - ceiling: no c* of a loaded asperity is less than -`shortfall`, which
-    bounds the rise from below and tells who slides; the least c* is not positive, which bounds it
-    from above. Nothing is claimed of T beyond its rounding: not even that it is below sum P*.
-    """
-    problem, known, states = given.problem, given.known, given.states
-    P, u, ceilings, sure = problem.loads, states.increments, problem.ceilings, known.sure
-    complete = known.stray == 0 and bool(sure.all())
-    doubt = known.errors.sum() + known.stray + LIMIT_ROUNDOFFS * len(P) * ROUNDOFF * P.sum()
-    unused = (P.sum() - states.totals)[:, None]
-    most = unused + doubt
-    errors = known.errors + np.minimum(most + (P - u), P + np.abs(u))
-    uncertainty = couple_above(problem, errors) + given.rounding + given.remainder[:, None]
-    sums = given.magnitude + ceilings + states.rises[:, None]
-    uncertainty += SUM_ROUNDOFFS * ROUNDOFF * sums
-    uncertainty += ceilings * known.relative + known.stray_effect
-    lacking = 1.5 * most / P
-    shortfall = ceilings * np.maximum(lacking, lacking ** (2 / 3))
-    beyond = given.available - ceilings  # c
-    above = np.where(sure, beyond + shortfall + uncertainty, np.inf).min(axis=1)  # Delta - Delta*
-    below = (uncertainty.max(axis=1) - beyond.min(axis=1)) if complete else np.inf
-    sliding = sure & (beyond - uncertainty > above[:, None])
-    rise_errors = np.maximum(above, below)
-    # Where all but one are sure to slide, and not all can, that one does not.
-    alone = complete & (unused[:, 0] > doubt) & (sliding.sum(axis=1) == len(P) - 1)
-    partial = ~sliding & alone[:, None]
-    slip_errors = uncertainty + rise_errors[:, None]
-    each = errors + np.abs(u) * (known.relative + SHARE_ROUNDOFFS * ROUNDOFF)  # u* from t P*
-    unknown = np.full(len(u), np.inf)
-    near = Nearness(
-        unknown, each, each, given.available, slip_errors, rise_errors, sliding, partial
-    )
-    return _bounds(given, near, complete | sliding.any(axis=1), errors)
+    return bounds_of(given, near, proved, distances + known.image_distances(P, u))

@@ -22,12 +22,9 @@ from convexrough.arrays import Array
 from convexrough.convex.definite import proved_margin
 from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.judgement import (
-    LIMIT_ROUNDOFFS,
-    SHARE_ROUNDOFFS,
-    Bounds,
-    own_change,
-)
+from convexrough.shearing.bounds import SHARE_ROUNDOFFS, Bounds
+from convexrough.shearing.exhaustion import LIMIT_ROUNDOFFS
+from convexrough.shearing.judgement import own_change
 from convexrough.shearing.load_errors import MARGINS, LoadErrors
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
