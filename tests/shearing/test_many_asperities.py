@@ -152,14 +152,14 @@ def test_one_wrong_load_among_many_is_counted(fraction: float) -> None:
 def test_small_forces_keep_their_digits(fraction: float) -> None:
     """As Q -> 0: the displacement is elastic, and the loss of third order with the elastic shares.
 
-    w = (1/6) f''(...) T^3 comes from the local laws alone: sum P ceiling e(u / P), e = 5 t^3 / 81.
+    w = (1/6) f''(...) T^3 comes from the local laws alone: sum P ceiling e(u / P), e = 5 t^3 / 162.
     """
     loading = FirstLoading(refined("lattice"))
     problem, q = loading.problem, loading.problem.elastic
     total = fraction * problem.limit
     states, _ = loading.states(np.array([total]))
     t = q * total / problem.loads
-    expected = 0.6 * float(problem.loads * problem.ceilings @ t**3) * 5 / 81
+    expected = 0.6 * float(problem.loads * problem.ceilings @ t**3) * 5 / 162
     near = 300 * fraction  # the next order, at the least loaded asperities
     elastic = float(q @ (q / problem.stiffest + problem.couple(q))) * total
     assert states.rises[0] == pytest.approx(elastic, rel=1e-12 + near)
