@@ -59,7 +59,7 @@ def _ending(part: float, what: str) -> Recipe:
     radius = part * math.pi / 2 * SPACING
     relative = 1.0 / (1e-6 + 1.0 / TIP_RADIUS)
     scene = placed(APART, sphere_radius=1e6)
-    why = f"the energy is {what} on the a priori box of a pair: no proof reaches further"
+    why = f"the energy is {what} on the a priori box of a pair: no global proof reaches further"
     return Recipe("convexity", why, scene, approach=radius * radius / relative)
 
 

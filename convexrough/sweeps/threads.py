@@ -7,7 +7,7 @@ from contextlib import ContextDecorator
 from types import TracebackType
 
 import scipy.linalg  # noqa: F401  what is not loaded yet cannot be told
-from threadpoolctl import threadpool_limits
+from threadpoolctl import OpenBLASController, threadpool_limits
 
 
 class OneThread(ContextDecorator):
@@ -22,6 +22,7 @@ class OneThread(ContextDecorator):
         with self._lock:
             self._inside += 1
             if self._limits is None:
+                _free()
                 self._limits = threadpool_limits(1)
         return self
 
@@ -34,8 +35,16 @@ class OneThread(ContextDecorator):
         with self._lock:
             self._inside -= 1
             if self._inside == 0 and self._limits is not None:
+                _free()
                 self._limits.restore_original_limits()
                 self._limits = None
+                _free()
+
+
+def _free() -> None:
+    """Let this thread set limits: threadpoolctl 3.8 heeds only the thread that was first."""
+    if hasattr(OpenBLASController, "clear_controlling_thread"):
+        OpenBLASController.clear_controlling_thread(force=True)
 
 
 one_thread = OneThread()

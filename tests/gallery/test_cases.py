@@ -22,7 +22,10 @@ from convexrough.gallery import answers, any_size, cases, grazing
 NAMES = gallery.names()
 
 #: Where float64 cannot tell, or nothing is proved; one asperity of the first, all of the others.
-UNDECIDED = {"grazing-gap-1e-15": 1, "grazing-indentation-1e-15": 1, "convexity-end-above": 2}
+UNDECIDED = {"grazing-gap-1e-15": 1, "grazing-indentation-1e-15": 1}
+
+#: Proved by a convexity that the exact checker does not know: of a box fitted by Cholesky.
+BEYOND_THE_CHECKER = {"convexity-end-above"}
 
 #: Of the last of 50 digits.
 UNIT = Fraction(1, 10**49)
@@ -119,10 +122,13 @@ def test_words_and_bounds_when_pressed(name: str, operator: Any) -> None:
 
 @pytest.mark.parametrize(
     ("threshold", "below", "above"),
-    [("bound-1", "global", "local"), ("fitted", "local", "none"), ("end", "global", "none")],
+    [("bound-1", "global", "global"), ("fitted", "local", "local"), ("end", "global", "local")],
 )
 def test_proofs_end_where_the_cases_say(threshold: str, below: str, above: str) -> None:
-    """By shells alone, which is all that is known without a matrix; the last by Cholesky."""
+    """By shells, which is all that is known without a matrix: of secants, and such as overlap.
+
+    The last by Cholesky. On this side of each case a proof of what is near still exists.
+    """
     operator = "dense" if threshold == "end" else "scattered"
     scopes = [
         pressed(f"convexity-{threshold}-{side}", operator).certificate.scope
@@ -312,7 +318,7 @@ def test_verify_is_not_fooled(name: str) -> None:
 def test_proofs_are_accepted_or_refused(name: str) -> None:
     """By exact arithmetic that shares no code with anything else here."""
     case, contact = gallery.case(name), pressed(name)
-    if contact.certificate.scope == "none":
+    if contact.certificate.scope == "none" or name in BEYOND_THE_CHECKER:
         with pytest.raises(cr.ProofError):
             contact.proof()
         return

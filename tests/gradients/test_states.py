@@ -209,6 +209,7 @@ def test_history(fractions: list[float], holding: Any) -> None:
     at = getattr(contact, holding)
     assert gradient.value == pytest.approx(value(contact.scene, forces, at), rel=1e-10)
     inside = 1e-3 * rng.uniform(0.5, 1.0, size=m) * forces
+    inside[1:][np.diff(forces) == 0] = inside[:-1][np.diff(forces) == 0]  # else it would turn back
     h = 1e-4
     ends = [value(contact.scene, forces + s * h * inside, at) for s in (1, -1)]
     difference = (ends[0] - ends[1]) / (2 * h)

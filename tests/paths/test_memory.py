@@ -153,7 +153,10 @@ def test_fronts_of_two_paths(path: list[tuple[float, float]], fronts: list[float
     curve = MemoryCurve()
     for point, front in zip(path, fronts, strict=True):
         curve, _ = curve.go(*point)
-        assert (curve.front and float(curve.front)) == pytest.approx(front)
+        if front is None:
+            assert curve.front is None
+        else:
+            assert float(curve.front or 0.0) == pytest.approx(front)
 
 
 def test_pulled_off_everything_is_forgotten() -> None:

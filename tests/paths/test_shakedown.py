@@ -162,6 +162,10 @@ def test_a_path_that_follows_never_slides() -> None:
     assert found.factor == np.inf
 
 
+#: What interior-point answers leave of a slip that has died out, over one that has not.
+LEFT = 1e-5
+
+
 class Stuck:
     """Asperities that stick until they slide, at constant load: |q_i| <= P_i, step by step.
 
@@ -233,7 +237,7 @@ def test_cycles_below_and_above_melans_limit(kind: str) -> None:
     assert n == 37
     assert slid[0.99][0] > 1e-3 * slid[1.01][-1]  # something slides at first
     assert slid[0.99][-1] < 0.03 * slid[1.01][-1]
-    assert slid[0.99][-1] < 0.5 * slid[0.99][19] + 1e-9 * slid[1.01][-1]
+    assert slid[0.99][-1] < 0.5 * slid[0.99][19] + LEFT * slid[1.01][-1]
     assert slid[1.01][-1] == pytest.approx(slid[1.01][-2], rel=0.05)
 
 

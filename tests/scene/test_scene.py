@@ -248,29 +248,10 @@ def test_roughened_is_what_the_patterns_draw() -> None:
     for name in ("positions", "tip_radii", "heights"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
         assert not getattr(one, name).flags.writeable
-    assert one.places is regular.places
+    assert one.layout is regular.layout
     assert one.lattice is regular.lattice
     assert regular.roughened() is regular
     with pytest.raises(cr.InputError, match="seed: found None"):
         regular.roughened(height_std=1e-6)
     with pytest.raises(cr.InputError, match="height_std: found -1"):
         regular.roughened(height_std=-1, seed=1)
-
-
-def test_what_places_keep_is_used_bit_for_bit() -> None:
-    from convexrough.influence.choice import couple
-    from convexrough.influence.dense import inverse_between
-
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    which = np.array([0, 3, 4, 17, 60])
-    for geometry in ("summit", "closest"):
-        scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry=geometry)
-        scene.asperities.__dict__.pop("places", None)
-        alone = couple(scene, which, 0.3)
-        scene.asperities.places.keep(inverse_between)
-        shared = couple(scene, which, 0.3)
-        np.testing.assert_array_equal(alone.matrix, shared.matrix)
-        assert alone.entry_error == shared.entry_error
-        kept = scene.asperities.places.kept(inverse_between)
-        assert kept is not None
-        assert not np.shares_memory(kept, shared.matrix)

@@ -222,7 +222,8 @@ def test_each_state_of_a_history_is_certified(influence: str) -> None:
     assert (path.displacement_errors > 0).all()
     assert (path.displacement_errors < 1e-8 * np.abs(path.displacements)).all()
     single = cr.shear(contact, force=0.6 * limit).certificate.displacement_error
-    assert path.displacement_errors[0] == pytest.approx(single, rel=1e-3)
+    # Found by another solver, so its residual, which is part of the bound, is another.
+    assert path.displacement_errors[0] == pytest.approx(single, rel=0.02)
     assert path.displacement_errors[1] > path.displacement_errors[0]
     assert path.displacement_errors[3] == path.displacement_errors[2]
 
