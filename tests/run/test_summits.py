@@ -48,6 +48,7 @@ def test_a_scan_becomes_a_scene(command: Any) -> None:
     outcome = command("summits", "scan.npz", "--no-figures")
     assert outcome.status == 0
     assert outcome.err.startswith("convexrough: hint: --scene or --radius presses on them")
+    assert outcome.out.endswith("\nwritten here: summits.csv\n")
     summits = cr.surface.read("scan.npz").summits()
     table = rows("summits.csv")
     assert len(table) == len(summits)
