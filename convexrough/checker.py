@@ -20,6 +20,7 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from fractions import Fraction
 from operator import mul
 from pathlib import Path
@@ -500,23 +501,30 @@ def hold(what: str, claimed: Any, proved: Any) -> None:
 
 
 def sentence(document: Any) -> str:
-    """What the claims say."""
+    """What the claims say: a line of the contact, and one of each shear force."""
     claims, ((control, value),) = document["claims"], document["prescribed"].items()
     bounds = [numbers(pair, 2) for pair in claims["loads"]]
     largest = max(high for _, high in bounds) or Fraction(1)
-    known = float(min(max(high - low for low, high in bounds) / largest, Fraction(1)))
+    widest = min(max(high - low for low, high in bounds) / largest, Fraction(1))
+    known = Context(1, ROUND_CEILING).create_decimal(float(widest))
     alone = "the only one" if claims["scope"] == "global" else "the only one inside its box"
     lines = [
-        f"proved: under the {control} {float.fromhex(value)!r} there is a solution, {alone}",
-        f"{counted(claims, 'contact', 'open')}, loads known to {known:.0e} of the largest",
+        f"proved: under the {control} {float.fromhex(value):.10g} there is a solution, {alone}",
+        f"{counted(claims, 'contact', 'open')}, loads known to {known:g} of the largest",
     ]
     for entry, claim in zip(document["sheared"], claims["shear"], strict=True):
-        low, high = (float.fromhex(end) for end in claim["energy"])
+        low, high = map(float.fromhex, claim["energy"])
         lines.append(
-            f"under the shear force {float.fromhex(entry['force'])!r} "
-            f"{counted(claim, 'sliding', 'partial')}, a cycle loses {low!r} to {high!r}"
+            f"under the shear force {float.fromhex(entry['force']):.10g}: "
+            f"{counted(claim, 'sliding', 'partial')}, a cycle loses {outwards(low, high)}"
         )
-    return "; ".join([*lines, f"scene {document['sha256'][:12]}"])
+    return "\n  ".join([*lines, f"scene {document['sha256'][:12]}"])
+
+
+def outwards(low: float, high: float) -> str:
+    """Ten digits of each, rounded away from the other: bounds still."""
+    down, up = (Context(10, rounding) for rounding in (ROUND_FLOOR, ROUND_CEILING))
+    return f"{down.create_decimal(low):g} to {up.create_decimal(high):g}"
 
 
 def counted(claims: Any, *words: str) -> str:
@@ -524,7 +532,7 @@ def counted(claims: Any, *words: str) -> str:
 
 
 def check(document: Any, tell: Tell) -> str:
-    """What is proved, in a line. Raises Refused where more is claimed, and Unreadable."""
+    """What is proved, in words. Raises Refused where more is claimed, and Unreadable."""
     proved = prove(document, tell)
     hold("claims", document["claims"], proved)
     return sentence(document)

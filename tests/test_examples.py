@@ -28,10 +28,13 @@ SCRIPTS = [*sorted(FOLDER.glob("*.py")), *sorted(FOLDER.glob("course/*.py"))]
 
 
 @pytest.fixture(autouse=True)
-def _as_a_script(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def shown(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+    """Run as a script is; numbers of the figures that it shows."""
+    figures: list[int] = []
     plt.switch_backend("agg")
+    monkeypatch.setattr(plt, "show", lambda: figures.extend(plt.get_fignums()))
     monkeypatch.syspath_prepend(FOLDER)  # as for a script: one example may begin with another
-    yield
+    yield figures
     plt.close("all")
 
 
@@ -49,9 +52,12 @@ def load(path: Path) -> Any:
     [path for path in SCRIPTS if path.stem not in ("boundary_elements", "measured_surface")],
     ids=lambda path: path.stem,
 )
-def test_example(path: Path) -> None:
+def test_example(path: Path, shown: list[int]) -> None:
     pairs = load(path).compare()
     assert pairs
+    if path.parent.name == "course":
+        assert shown, "a class that runs the script sees no picture"
+        assert shown == plt.get_fignums()
     for name, computed, reference in pairs:
         tolerance = TOLERANCES.get(path.stem, 1e-9)
         assert computed == pytest.approx(reference, rel=tolerance, abs=1e-12), name

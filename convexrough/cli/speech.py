@@ -20,7 +20,8 @@ DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2,
 
 
 def written(folder: Path, files: Sequence[Path]) -> list[str]:
-    return ["", f"written to {folder}: {', '.join(path.name for path in files)}"]
+    place = "here" if folder == Path() else f"to {folder}"
+    return ["", f"written {place}: {', '.join(path.name for path in files)}"]
 
 
 def say(

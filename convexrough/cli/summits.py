@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from convexrough.cli.options import PATH, Command, json_option
-from convexrough.cli.speech import DONE, NOT_CERTIFIED, blamed_on, progress, say_aside
+from convexrough.cli.speech import DONE, NOT_CERTIFIED, blamed_on, progress, say_aside, written
 from convexrough.errors import InputError, SolverError
 
 if TYPE_CHECKING:
@@ -96,8 +96,7 @@ def summits(
     if as_json:
         click.echo(to_json(summary))
     else:
-        names = ", ".join(path.name for path in files)
-        lines = [*surface_report.describe_surface(scanned), "", f"written  {out.parent}: {names}"]
+        lines = [*surface_report.describe_surface(scanned), *written(out.parent, files)]
         click.echo("\n".join(lines))
     for doubt in surface_report.doubts_of_surface(scanned):
         say_aside("warning", doubt)

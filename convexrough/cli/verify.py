@@ -74,7 +74,11 @@ def verify(
     summary = verdict_report.verdict_summary(found)
     length, force = file.units
     lines = verdict_report.describe_verdict(found, file.units)
-    lines += ["", "the loads as given", *describe(summary, length_unit=length, force_unit=force)]
+    lines += [
+        "",
+        "the loads as given, by themselves",
+        *describe(summary, length_unit=length, force_unit=force),
+    ]
     if out is not None:
         with progress("writing results"):
             files = verdict_report.write_verdict(out, summary, found, file.units)

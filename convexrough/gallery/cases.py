@@ -151,7 +151,8 @@ def names(*wanted: str) -> tuple[str, ...]:
     for each in wanted:
         if each not in RECIPES and each not in families.values():
             valid = [*RECIPES, *sorted(set(families.values()))]
-            raise InputError("names", found=repr(each), expected=checks.nearest(str(each), valid))
+            expected = f"the name of a case or a family; {checks.nearest(str(each), valid)}"
+            raise InputError("names", found=repr(each), expected=expected)
     return tuple(
         name for name in RECIPES if not wanted or name in wanted or families[name] in wanted
     )
@@ -164,7 +165,8 @@ def case(name: str) -> HardCase:
     'one contact: no neighbours, no shells, an answer in closed form'
     """
     if name not in RECIPES:
-        raise InputError("names", found=repr(name), expected=checks.nearest(str(name), RECIPES))
+        expected = f"the name of a case; {checks.nearest(str(name), RECIPES)}"
+        raise InputError("name", found=repr(name), expected=expected)
     recipe = RECIPES[name]()
     stored = answer(name, recipe)
     return HardCase(

@@ -40,7 +40,7 @@ class Proof(Record):
     """Words for all asperities, with bounds on every load, gap, shear force, slip and loss.
 
     document : what the file holds (docs/theory/proof-file.md)
-    proved   : the same in a line of words, as the checker says it
+    proved   : the same in words, as the checker says it
     """
 
     document: dict[str, Any]

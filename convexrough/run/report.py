@@ -13,8 +13,8 @@ from convexrough.run.sensitivity import gradient_lines
 from convexrough.run.summary import NORMAL, Summary
 
 _SCOPES = {
-    "global": "global: the scene has no other solution",
-    "local": "local: no other solution with contacts of such sizes",
+    "global": "global: the scene has exactly one solution",
+    "local": "local: exactly one solution with contacts of such sizes",
     "none": "none: nothing is proved",
 }
 _INFLUENCES = {
@@ -71,7 +71,7 @@ def _describe_shear(summary: Summary, length_unit: str, force_unit: str) -> list
         lines += ["", _titled("steady cycles", f"Qa {force_unit}", f"Xa {length_unit}",
                               f"Qa/Xa {stiffness}", f"loss W {work}")]  # fmt: skip
         heading = ["max/(fP)", "min/(fP)", "Qa", "Xa", "Qa/Xa", "W", "W/(pi Qa Xa)", "W/W0"]
-        heading += ["smooth", "slide"]
+        heading += ["smooth W/W0", "slide"]
         lines += _numbers(heading, [[row[key] for key in keys] for row in rows], digits=6)
     if past := summary.get("history"):
         steps = list(zip(past["fraction"], past["displacement"], past["energy"], strict=True))

@@ -177,7 +177,9 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
     tables: dict[str, Any] = {}
     mistakes = []
     for name, keys in contents.items():
-        if name not in _TABLES:
+        if name == "sweep":
+            mistakes.append("[sweep]: many scenes, which `convexrough sweep` computes")
+        elif name not in _TABLES:
             what = f"[{name}]: unknown table" if isinstance(keys, dict) else f"{name}: in no table"
             mistakes.append(f"{what}, {nearest(name, _TABLES)}")
         elif not isinstance(keys, dict):

@@ -138,6 +138,7 @@ right.text(0.75, 0.85, "both", ha="center", fontsize=11, color="white")
 right.plot(*D, "ko", ms=8)
 right.set(xlabel="asked of 1: $D_1$ [length]", ylabel="asked of 2: $D_2$ [length]")
 right.set(title="which asperities touch", aspect="equal")
+plt.show()
 
 # %%
 # An independent check

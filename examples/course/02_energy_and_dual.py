@@ -134,6 +134,7 @@ right.loglog(gaps / unit, error / loads.max(), "ko", ms=3, label="true error")
 right.loglog(gaps / unit, np.sqrt(2 * gaps / mu) / loads.max(), "k-", label="proved from the gap")
 right.set(xlabel="duality gap / $|\\Phi^*|$ [1]", ylabel="error of the loads / largest load [1]")
 right.legend(fontsize=8)
+plt.show()
 
 # %%
 # An independent check

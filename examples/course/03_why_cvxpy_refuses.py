@@ -131,6 +131,7 @@ right.set(
 )
 right.set(xlabel="300 random layouts of 12 points [1/length]", ylim=(-0.5, 1.5))
 assert max(bare_least) < 0 < min(shell_least)
+plt.show()
 
 # %%
 # Still refused

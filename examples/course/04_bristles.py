@@ -128,6 +128,7 @@ right.set(xlabel="number of bristles", ylabel="relative error [1]")
 right.set_xticks(counts, labels=counts, minor=False)
 right.minorticks_off()
 right.legend(fontsize=8)
+plt.show()
 
 # %%
 # An independent check

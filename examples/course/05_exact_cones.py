@@ -114,6 +114,7 @@ for place, (x, y, w, *names) in enumerate(curves, start=1):
     axes.locator_params(nbins=4)
     axes.view_init(25, -50)
     assert np.allclose(x * y, w**2)
+plt.show()
 
 # %%
 # An independent check: the identity

@@ -155,6 +155,7 @@ for number, (point, a) in enumerate(zip(points, contact.contact_radii, strict=Tr
     right.annotate(str(number), place, **look)
 right.set(xlabel="x / R [1]", ylabel="y / R [1]")
 right.set_title("contact discs of the answer", fontsize=10)
+plt.show()
 
 # %%
 # An independent check: the certificate

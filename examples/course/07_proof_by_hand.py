@@ -144,6 +144,7 @@ axes.contourf(x, y, said, [0.5, 1.5], colors="0.85")
 axes.plot(a1, a2, "ko", ms=6)
 axes.set(xlabel="trial $a_1$ [length]", ylabel="trial $a_2$ [length]")
 axes.set_title("proved distance to the solution; grey: both proved to touch", fontsize=9)
+plt.show()
 
 # %%
 # An independent check

@@ -124,6 +124,7 @@ for axes, part in zip(panels, (0.25, 0.5, 0.8), strict=True):
         f"$Q / (f P)$ = {part}: {int((less.loads[touching] == 0).sum())} slide", fontsize=10
     )
 panels[0].set_ylabel("$y / a_H$ [1]")
+plt.show()
 
 # %%
 # An independent check

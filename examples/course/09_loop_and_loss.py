@@ -116,6 +116,7 @@ right.plot(share, chord, "k--", lw=0.8, label="chord")
 right.fill_between(share, chord, curve, color="0.75")
 right.set(xlabel="load $L / P$ [1]", ylabel="approach $D_0 / D_0(P)$ [1]")
 right.legend(fontsize=8)
+plt.show()
 
 # %%
 # An independent check

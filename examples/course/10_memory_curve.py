@@ -134,6 +134,7 @@ for k, axes in enumerate(places):
     axes.set(xlim=(0, 1.05), ylim=(-0.5, 0.8))
 places[0].set(ylabel="$T = Q / f$ / $P^*$ [1]")
 places[1].legend(fontsize=7, loc="lower left")
+plt.show()
 
 # %%
 # Why it needs no elasticity

@@ -393,9 +393,9 @@ def test_counts_that_are_none(count: Any) -> None:
 def test_names() -> None:
     assert len(NAMES) == len(set(NAMES)) > 50
     assert gallery.names("few") == ("one", "one-under-load", "two-equal")
-    with pytest.raises(cr.InputError, match='did you mean "two-equal"'):
+    with pytest.raises(cr.InputError, match='the name of a case; did you mean "two-equal"'):
         gallery.case("two-equals")
-    with pytest.raises(cr.InputError, match='did you mean "grazing"'):
+    with pytest.raises(cr.InputError, match='of a case or a family; did you mean "grazing"'):
         gallery.names("grasing")
 
 

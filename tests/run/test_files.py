@@ -135,6 +135,7 @@ def test_a_wrong_key(tmp_path: Path, asperities: str, expected: str) -> None:
         ("load = 0", "", "[normal] load: found 0, expected a positive number"),
         ("approach = nan", "", "[normal] approach: found nan, expected a finite number"),
         ("approach = 1e-5", "[frictoin]", '[frictoin]: unknown table, did you mean "friction"?'),
+        ("approach = 1e-5", "[sweep]", "[sweep]: many scenes, which `convexrough sweep` computes"),
         (
             "approach = 1e-5",
             "[shear]\nfractions = [0.1]",

@@ -1,9 +1,12 @@
 """`run --proof`, `verify --proof`, `check`: files, output, exit status."""
 
 import json
+import re
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import pytest
 from scene_files import HEXAGONAL, scene_text
 
 
@@ -15,6 +18,16 @@ def test_run_proves_and_check_accepts(command: Any, tmp_path: Path) -> None:
     path = tmp_path / "first-results" / "proof.json"
     document = json.loads(path.read_text())
     assert len(document["sheared"]) == 3  # forces and amplitudes are the same
+    loads = [[Fraction(float.fromhex(x)) for x in pair] for pair in document["claims"]["loads"]]
+    known = max(high - low for low, high in loads) / max(high for _, high in loads)
+    (printed,) = re.findall("loads known to (.*) of the largest", ran.out)
+    assert known <= Fraction(printed) <= 2 * known
+    said = re.findall("a cycle loses (.*) to (.*)$", ran.out, re.M)
+    for claim, printed in zip(document["claims"]["shear"], said, strict=True):
+        claimed = [float.fromhex(end) for end in claim["energy"]]
+        assert Fraction(printed[0]) <= claimed[0] <= claimed[1] <= Fraction(printed[1])
+        assert claimed == [pytest.approx(float(end), rel=1e-9) for end in printed]
+        assert max(map(len, printed)) <= len("1.234567890e-11")
     checked = command("check", str(path))
     assert (checked.status, checked.err) == (0, "")
     assert checked.out in ran.out

@@ -61,7 +61,7 @@ def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
         next(i for i, line in enumerate(heads) if line.startswith(each))
         for each in ("loads the", "wrong set 2", "claimed open, proved to touch: 1",
                      "claimed to touch, proved open: 1", "undecided none", "loads off",
-                     "total off none prescribed", "suspects", "the loads as given")
+                     "total off none prescribed", "suspects", "the loads as given, by themselves")
     ]  # fmt: skip
     assert places == sorted(places)
     x, y = contact.scene.asperities.positions[36]
