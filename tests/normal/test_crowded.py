@@ -237,3 +237,13 @@ def test_energies_are_bounded(seed: int, count: int, size: float, digits: float)
         assert float(above.mid()) <= judged.duality_gap
     if digits < -10:
         assert judged.duality_gap < 1e-9 * 5e-5 * contact.load
+
+
+def test_nothing_is_eliminated_that_would_take_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loads from anywhere may crowd any number of contacts: an honest "none" comes soon."""
+    monkeypatch.setattr("convexrough.normal.overlap.MOST_ELIMINATED", 100)
+    points = 0.01 * np.stack(np.divmod(np.arange(101.0), 11), axis=1)
+    apart = DenseInfluence.assemble(points, 1.0)
+    assert overlapping_margin(apart, np.full(101, 1e-4), CROWDED_MARGINS) == 0.0
+    few = DenseInfluence.assemble(points[:100], 1.0)
+    assert overlapping_margin(few, np.full(100, 1e-4), CROWDED_MARGINS) > 0.0
