@@ -1,10 +1,11 @@
 """The figures of the pages, drawn again:  python docs/figures.py
 
-That of how-to/design-by-gradients.md is drawn by examples/design_a_damper.py --draw. Those of
-performance.md are the work of `convexrough bench --page docs/performance.md`.
+Those of performance.md show what was measured, so `convexrough bench --page docs/performance.md`
+draws them with its tables.
 """
 
 from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,6 +14,7 @@ from convexrough.paper import example
 from convexrough.paper.figures import paper_figures
 
 FOLDER = Path(__file__).parent / "figures"
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 def once_differentiable() -> Figure:
@@ -34,13 +36,15 @@ def once_differentiable() -> Figure:
 
 
 def main() -> None:
-    figures = paper_figures(example.outcome().contact)
+    figures = paper_figures(example.findings().contact)
     figures["pressure"] = figures.pop("fig3_pressure")  # also at the top of the README
     figures["once-differentiable"] = once_differentiable()
     for name, figure in figures.items():
         path = FOLDER / f"{name}.png"
         figure.savefig(path, dpi=150)
         print(path)
+    example_of_design = run_path(str(EXAMPLES / "design_a_damper.py"))
+    example_of_design["draw"](str(FOLDER / "design.png"))
 
 
 if __name__ == "__main__":

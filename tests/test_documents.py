@@ -7,6 +7,7 @@ before it: `<!-- not run: why -->`.
 """
 
 import re
+import runpy
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
@@ -119,3 +120,16 @@ def test_every_test_that_the_guarantees_name_is_there() -> None:
     tests = "\n".join(path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
     assert len(named) > 40
     assert named <= set(re.findall(r"^def (test_\w+)", tests, re.M))
+
+
+def test_one_command_draws_the_figures_of_the_pages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All but those that show what the benchmark measured; into another folder here."""
+    drawing = runpy.run_path(str(ROOT / "docs/figures.py"))["main"]
+    monkeypatch.setitem(drawing.__globals__, "FOLDER", tmp_path)
+    monkeypatch.setitem(drawing.__globals__, "EXAMPLES", ROOT / "examples")
+    drawing()
+    measured = {"cost.png", "work-precision.png"}
+    drawn = {path.name for path in tmp_path.iterdir()} | measured
+    assert drawn == {path.name for path in (ROOT / "docs/figures").iterdir()}
