@@ -44,7 +44,10 @@ class Shares(NamedTuple):
 def scalar_shares(contact: Contact) -> Shares:
     """With the scalar kernel."""
     problem = TangentialProblem.of(contact)
-    known, y, h = LoadErrors.of(problem), problem.elastic, 1.0 / problem.stiffest
+    y, h = problem.elastic, 1.0 / problem.stiffest
+    if problem.certificate.scope == "none":
+        return _unproved(y, problem)
+    known = LoadErrors.of(problem)
     moved = h * y + problem.couple(y)
     size = h * np.abs(y)
     above = couple_above(problem, np.abs(y))
@@ -62,11 +65,13 @@ def vector_shares(contact: Contact) -> Shares:
     problem = VectorProblem.of(contact)
     n, h = len(problem), problem.stiffness
     checks.fits_in_memory("loaded asperities", n, 3 * 4 * 8, power=2)
-    known = LoadErrors.of(problem.scalar)
     stiffness = problem.kernel + np.diag(np.repeat(h, 2))
     together = np.tile(np.eye(2), (n, 1))
     moved = np.linalg.solve(stiffness, together)
     y = moved @ np.linalg.inv(together.T @ moved)  # (2n, 2)
+    if problem.scalar.certificate.scope == "none":
+        return _unproved(y.reshape(n, 2, 2), problem.scalar)
+    known = LoadErrors.of(problem.scalar)
 
     level = (stiffness @ y).reshape(n, 2, 2)
     off = level - level.mean(axis=0)
@@ -81,6 +86,13 @@ def vector_shares(contact: Contact) -> Shares:
     missing += n * ROUNDOFF * float(sizes.sum())
     errors = (errors + missing * sizes.sum(axis=1, keepdims=True)) / (1.0 - missing)
     return Shares(shares, errors * (1 + SAFETY), problem.scalar.loads, known.errors)
+
+
+def _unproved(values: Array, problem: TangentialProblem) -> Shares:
+    """Shares of loads of which nothing is known."""
+    nowhere = np.full(len(values), np.inf)
+    errors = nowhere if values.ndim == 1 else np.full(values[:, 0].shape, np.inf)
+    return Shares(values, errors, problem.loads, nowhere)
 
 
 def _errors(known: LoadErrors, residual: Array, margin: float) -> Array:

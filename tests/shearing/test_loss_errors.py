@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from friction_scenes import FRICTION, exact, in_doubt, off, pressed, with_friction
-from scenes import OPERATORS, PAPER_APPROACH, paper
+from scenes import OPERATORS, PAPER_APPROACH, paper, twins
 
 import convexrough as cr
 from convexrough.shearing.first_loading import FirstLoading
@@ -195,9 +195,8 @@ def test_an_asperity_that_may_or_may_not_touch(fraction: float, ulps: int) -> No
 
 def test_it_is_infinite_without_proof_and_zero_without_load() -> None:
     contact = pressed("paper")
-    crowded = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=2.0, within=0.0102)
-    scene = cr.Scene(1.0, crowded, contact.scene.material, FRICTION)
-    unproved = cr.press(scene, approach=PAPER_APPROACH)
+    scene, load = twins()
+    unproved = cr.press(scene, load=load)
     assert unproved.certificate.scope == "none"
     assert cr.cycle(unproved, maximum=0.3 * FRICTION * unproved.load).energy_error == np.inf
     light = cr.press(contact.scene, approach=-1e-6)
