@@ -275,7 +275,8 @@ class LatticeInfluence(LatticeCoupling):
         worst = 0.0
         for start in range(0, len(self), CHUNK):
             some = slice(start, start + CHUNK)
-            away = [self._away(k, self.points[some, k], self.places[some]) for k in (0, 1)]
+            points, places = self.array[self.members[some]], self.places[some]
+            away = [self._away(k, points[:, k], places) for k in (0, 1)]
             worst = max(worst, float(np.hypot(*away).max()))
         return worst * (1 + 1e-9)
 
