@@ -92,7 +92,8 @@ def trial(seed: int, durations: dict[str, float], finished: dict[str, dict[str, 
                 _remount(folder)
             status, said = _tried(folder, arguments, fault, rng, durations[name])
             found = contents(folder / "out")
-        what = _wrong(found, before, finished[name], fault, name)
+        refused = status == 2 and name in ("verify", "new")  # what is there already is not theirs
+        what = _wrong(found, before, finished[name], fault, refused)
     allowed = (130, -signal.SIGKILL, 0, 2, 3)
     if not what and (status not in allowed or "Traceback" in said):
         what = f"status {status}: {said[-600:]}"
@@ -217,11 +218,11 @@ def _wrong(
     before: dict[str, bytes],
     finished: dict[str, bytes],
     fault: str,
-    name: str,
+    refused: bool,
 ) -> str:
-    """What a folder holds that it should not."""
+    """What a folder holds that it should not; nothing is touched where another run was refused."""
     for file, data in found.items():
-        killed = fault == "kill" or (fault == "kill, again" and name == "new")
+        killed = fault == "kill" or (fault == "kill, again" and refused)
         if killed and UNFINISHED.fullmatch(file):
             continue
         if data == before.get(file):
@@ -232,8 +233,7 @@ def _wrong(
             return f"{file}: {why}"
     if before and found.get("notes.txt") != before.get("notes.txt"):
         return "a file of the user's is gone"
-    refuses = name in ("verify", "new")  # a folder, or a file, that is there already
-    if fault == "kill, again" and not refuses and set(finished) - set(found):
+    if fault == "kill, again" and not refused and set(finished) - set(found):
         return f"not there after another run: {set(finished) - set(found)}"
     return ""
 
