@@ -186,11 +186,15 @@ def _ended(process: int) -> int:
 
 def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
     """A process that runs the command; limit [bytes] of each file."""
+    # An interrupt of the child must not come before there is somebody to take it.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     if process := os.fork():
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return process
     status = 130  # of an interrupt before the command has begun
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         os.chdir(folder)
         said = os.open("said", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
         os.dup2(said, 2)
