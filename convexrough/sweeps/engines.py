@@ -26,6 +26,9 @@ from convexrough.sweeps.batch import Batch, Rows, compute
 #: Batches that an executor of somebody else's is given at once.
 AT_ONCE = 64
 
+#: [s] that a pool is waited for when it is given up: its workers stop after the scene they are at.
+ENDING = 10.0
+
 #: What an executor raises where a worker died with a batch.
 LOST: tuple[type[BaseException], ...] = (BrokenExecutor,)
 
@@ -109,8 +112,12 @@ class Processes:
         return True
 
     def close(self) -> None:
+        """Waits for the pool to end, if that is soon: one that ends with Python may say so aloud."""
         if self._pool is not None:
-            self._pool.shutdown(wait=False, cancel_futures=True)
+            ending = {"wait": True, "cancel_futures": True}
+            thread = threading.Thread(target=self._pool.shutdown, kwargs=ending, daemon=True)
+            thread.start()
+            thread.join(ENDING)
             self._pool = None
 
 
