@@ -112,7 +112,7 @@ class Processes:
         return True
 
     def close(self) -> None:
-        """Waits for the pool to end, if that is soon: one that ends with Python may say so aloud."""
+        """Waits for the pool to end, if that is soon: Python ending it may leave a traceback."""
         if self._pool is not None:
             ending = {"wait": True, "cancel_futures": True}
             thread = threading.Thread(target=self._pool.shutdown, kwargs=ending, daemon=True)

@@ -110,13 +110,15 @@ def make_folder(path: Path, manifest: Mapping[str, Any]) -> Folder:
     if not (path / MANIFEST).exists():
         try:
             (path / PARTS).mkdir(parents=True, exist_ok=True)
-            strangers = [each.name for each in path.iterdir() if each.name != PARTS]
+            # The manifest may come while this looks: of another process, with the same sweep or not.
+            strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
         except OSError as error:
             raise FileError(f"{path}: cannot hold results: {error.strerror or error}") from error
         if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
             raise FileError(f"{path}: holds {strangers[0]}, and no sweep; --out takes another")
-        with beside(path / MANIFEST) as temporary:
-            temporary.write_text(to_json(dict(manifest)) + "\n", encoding="utf-8")
+        if not (path / MANIFEST).exists():
+            with beside(path / MANIFEST) as temporary:
+                temporary.write_text(to_json(dict(manifest)) + "\n", encoding="utf-8")
     folder = open_folder(path)
     there, asked = folder.manifest, manifest
     if there["sweep"] != asked["sweep"]:
