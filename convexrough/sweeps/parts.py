@@ -110,7 +110,7 @@ def make_folder(path: Path, manifest: Mapping[str, Any]) -> Folder:
     if not (path / MANIFEST).exists():
         try:
             (path / PARTS).mkdir(parents=True, exist_ok=True)
-            # The manifest may come while this looks: of another process, with the same sweep or not.
+            # A manifest may come while this looks: of another process, of the same sweep or not.
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
         except OSError as error:
             raise FileError(f"{path}: cannot hold results: {error.strerror or error}") from error
