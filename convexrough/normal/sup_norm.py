@@ -52,12 +52,15 @@ class SupNorm(NamedTuple):
         def of_equal_neighbours(size: float) -> float:
             return size * alone / (1.0 + alone - size * alone)
 
-        size = min(SIZES, key=lambda each: _weakness(of_equal_neighbours(each), each))
-        packing = max(influence.packing(size * radii) * (1 + SAFETY), LEAST)
-        if not _weakness(packing, size) < np.inf:
-            return None
-        largest = size * float(radii.max(initial=0.0))
-        return cls(size, packing, firmness(packing, size), stiffness, largest)
+        def promise(size: float) -> tuple[float, float]:
+            return _weakness(of_equal_neighbours(size), size), -size
+
+        for size in sorted(SIZES, key=promise):
+            packing = max(influence.packing(size * radii) * (1 + SAFETY), LEAST)
+            if _weakness(packing, size) < np.inf:
+                largest = size * float(radii.max(initial=0.0))
+                return cls(size, packing, firmness(packing, size), stiffness, largest)
+        return None
 
     def load_errors(self, residuals: Array, largest: float) -> Array:
         """(n,) bounds on |v|, from bounds on |f| and the largest of them."""

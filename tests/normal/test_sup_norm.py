@@ -5,7 +5,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scenes import CASES, NAMED, reference
@@ -53,6 +53,7 @@ def stiffness(rng: np.random.Generator, points: Array, crowding: float, spread: 
     return np.asarray(SCALE / (2.0 / np.pi * radii))
 
 
+@example(seed=0, lattice=False, count=5, crowding=1.0, spread=1.0)  # discs of all sizes touch
 @settings(max_examples=60, deadline=None)
 @given(
     st.integers(0, 2**32 - 1),
