@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arrays import Array, Indices
 
 #: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.5 for the
@@ -17,9 +18,6 @@ from convexrough.arrays import Array, Indices
 #: (1 for p = 2). Radices 4 and 8 cost less than two and three passes of radix 2. "One pass" of
 #: docs/theory/operators-lattice.md, "On a lattice: Fourier transforms".
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
-
-#: Transforms of more numbers than this use every core.
-PARALLEL = 2**18
 
 #: Columns are transformed some at a time: so many bytes of each row, what a cache holds.
 ROW = 512
@@ -67,8 +65,8 @@ class Box:
 
     @property
     def workers(self) -> int:
-        """Threads: all cores (-1) where that pays."""
-        return -1 if self.padded[0] * self.padded[1] > PARALLEL else 1
+        """Threads."""
+        return threads.worthwhile(self.padded[0] * self.padded[1])
 
     @cached_property
     def loss(self) -> float:
@@ -116,24 +114,29 @@ class Box:
 
         rows, columns = self.padded
         shape, whole = (rows, columns // 2 + 1), np.result_type(dtype, np.complex64)
+        last = rows // 2 + 1
+        block = max(1, 2**17 // columns)
+        blocks = [slice(start, min(start + block, last)) for start in range(0, last, block)]
         halves: list[NDArray[Any]] = []
-        sums: list[Array] = []  # of each kernel and of its squares
-        block = max(1, 2**18 // columns)
-        for start in range(0, rows // 2 + 1, block):
-            taken = slice(start, min(start + block, rows // 2 + 1))
+        sums: dict[int, list[Array]] = {}  # by block, of each kernel and of its squares
+
+        def transform(taken: slice) -> None:
             i = np.arange(taken.start, taken.stop)
             weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # i and -i
+            sums[taken.start] = []
             for k, each in enumerate(values(taken)):
                 if k == len(halves):
                     halves.append(np.zeros(shape, dtype=whole))
-                    sums.append(np.zeros(2))
-                sums[k] += weights @ each.sum(axis=1), weights @ np.einsum("ij,ij->i", each, each)
-                halves[k][taken] = fft.rfft(
-                    each.astype(dtype, copy=False), axis=1, workers=self.workers
-                )
+                squares = np.einsum("ij,ij->i", each, each)
+                sums[taken.start].append(weights @ np.stack((each.sum(axis=1), squares), axis=1))
+                halves[k][taken] = fft.rfft(each.astype(dtype, copy=False), axis=1)
+
+        transform(blocks[0])  # says how many kernels there are
+        threads.each(transform, blocks[1:], self.workers)
+        whole_sums = np.sum([sums[taken.start] for taken in blocks], axis=0)
         return [
             Kernel(self._spectrum(half, dtype), float(total), float(np.sqrt(square)))
-            for half, (total, square) in zip(halves, sums, strict=True)
+            for half, (total, square) in zip(halves, whole_sums, strict=True)
         ]
 
     def _spectrum(self, half: NDArray[Any], dtype: Any) -> NDArray[Any]:
@@ -144,8 +147,11 @@ class Box:
         if last:
             np.conj(half[last:0:-1], out=half[-last:])  # row -i is row i read backwards
         spectrum = np.empty(half.shape, dtype=dtype)
-        for each in in_blocks(half):
-            spectrum[:, each] = fft.fft(half[:, each], axis=0, workers=self.workers).real
+
+        def transform(each: slice) -> None:
+            spectrum[:, each] = fft.fft(half[:, each], axis=0).real
+
+        threads.each(transform, in_blocks(half), self.workers)
         return spectrum
 
     def _squares(self, taken: slice) -> Array:
@@ -193,11 +199,14 @@ class Box:
 
         rows, columns = self.padded
         half = fft.rfft(field, columns, axis=1, workers=self.workers)
-        for each in in_blocks(half):
-            full = fft.fft(half[:, each], rows, axis=0, workers=self.workers)
+
+        def multiply(each: slice) -> None:
+            full = fft.fft(half[:, each], rows, axis=0)
             full *= spectrum[:, each]
-            full = fft.ifft(full, axis=0, overwrite_x=True, workers=self.workers)
+            full = fft.ifft(full, axis=0, overwrite_x=True)
             half[:, each] = full[: self.shape[0]]
+
+        threads.each(multiply, in_blocks(half), self.workers)
         result: NDArray[Any] = fft.irfft(
             half, columns, axis=1, overwrite_x=True, workers=self.workers
         )

@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel, neighbours
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, Sums, cubed
@@ -39,9 +40,6 @@ CHUNK = 2**14
 #: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree:
 #: a heuristic, which decides speed and how sharp shells are.
 FILLED = 0.2
-
-#: Points looked at together where each is in many operations: what a cache holds.
-CHUNK = 2**13
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,13 +270,15 @@ class LatticeInfluence(LatticeCoupling):
     @cached_property
     def _off(self) -> float:
         """[length] bound on how far points are from their sites, but for a common shift."""
-        worst = 0.0
-        for start in range(0, len(self), CHUNK):
-            some = slice(start, start + CHUNK)
+        found: list[float] = []
+
+        def look(some: slice) -> None:
             points, places = self.array[self.members[some]], self.places[some]
             away = [self._away(k, points[:, k], places) for k in (0, 1)]
-            worst = max(worst, float(np.hypot(*away).max()))
-        return worst * (1 + 1e-9)
+            found.append(float(np.hypot(*away).max()))
+
+        threads.each(look, threads.chunks(len(self), CHUNK), threads.worthwhile(len(self)))
+        return max(found, default=0.0) * (1 + 1e-9)
 
     def _away(self, k: int, coordinates: Array, places: Sites) -> Array:
         """x - o - i b1 - j b2: sums and products are exact, but for what is left of them."""

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import in_blocks
 from convexrough.influence.coupling import Smoother
@@ -110,21 +111,24 @@ def block_smoother(
 
     def smooth(values: NDArray[Any]) -> tuple[NDArray[Any], float]:
         half = fft.rfft(blocks.sums(q * values), size[1], axis=1, workers=workers)
-        left = 0.0
-        for each in in_blocks(half):
-            waves = fft.fft(half[:, each], size[0], axis=0, workers=workers)
+        left = np.zeros(half.shape[1])
+
+        def remove(each: slice) -> None:
+            waves = fft.fft(half[:, each], size[0], axis=0)
             power = np.square(waves.real)
             power += np.square(waves.imag)
-            left += float(np.einsum("ij,ij->", power, energies[:, each]))
+            left[each] = np.einsum("ij,ij->j", power, energies[:, each])
             waves *= removed[:, each]
-            waves = fft.ifft(waves, axis=0, overwrite_x=True, workers=workers)
+            waves = fft.ifft(waves, axis=0, overwrite_x=True)
             half[:, each] = waves[:rows]
+
+        threads.each(remove, in_blocks(half), workers)
         field = fft.irfft(half, size[1], axis=1, overwrite_x=True, workers=workers)
         averages = np.ascontiguousarray(field[:, :columns]).ravel()[blocks.which]
         averages *= q
         np.subtract(values, averages, out=averages)
         averages *= touched
-        return averages, float(np.sqrt(left))
+        return averages, float(np.sqrt(left.sum()))
 
     return smooth
 

@@ -14,6 +14,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel, in_blocks
 from convexrough.influence.coupling import Sums
@@ -179,18 +180,19 @@ def _convolve(
 
     rows, columns = box.padded
     halves = [fft.rfft(each, columns, axis=1, workers=box.workers) for each in fields]
-    for each in in_blocks(halves[0]):
-        first, second = (
-            fft.fft(half[:, each], rows, axis=0, workers=box.workers) for half in halves
-        )
+
+    def multiply(each: slice) -> None:
+        first, second = (fft.fft(half[:, each], rows, axis=0) for half in halves)
         both = first + second
         both *= kernels[1].spectrum[:, each]
         first *= kernels[0].spectrum[:, each]
         second *= kernels[0].spectrum[:, each]
         second += both
         for half, full in zip(halves, (first, second), strict=True):
-            full = fft.ifft(full, axis=0, overwrite_x=True, workers=box.workers)
+            full = fft.ifft(full, axis=0, overwrite_x=True)
             half[:, each] = full[: box.shape[0]]
+
+    threads.each(multiply, in_blocks(halves[0]), box.workers)
     exact, remaining = (
         fft.irfft(half, columns, axis=1, workers=box.workers)[:, : box.shape[1]] for half in halves
     )

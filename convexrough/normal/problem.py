@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks
+from convexrough import checks, threads
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.shells import fitted_shells, shells
@@ -37,10 +37,6 @@ FITTED = 0.9
 
 #: Candidates looked at together: what a cache holds.
 CHUNK = 2**14
-
-
-#: Asperities looked at together where each is in many operations: what a cache holds.
-CHUNK = 2**13
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,10 +259,11 @@ class NormalProblem:
     def twofold_offsets(self) -> Twofold:
         """`offsets` from the scene's numbers, to twice as many digits: z - r^2 / (2 R)."""
         found = Twofold(np.empty(len(self)), np.empty(len(self)))
-        for start in range(0, len(self), CHUNK):
-            some = slice(start, start + CHUNK)
-            part = self._twofold_offsets(self.candidates[some])
-            found.high[some], found.low[some] = part
+
+        def find(some: slice) -> None:
+            found.high[some], found.low[some] = self._twofold_offsets(self.candidates[some])
+
+        threads.each(find, threads.chunks(len(self), CHUNK), threads.worthwhile(len(self)))
         return found
 
     def _twofold_offsets(self, which: Indices) -> Twofold:
