@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -18,6 +19,25 @@ def frozen(values: NDArray[Any]) -> NDArray[Any]:
     """The array itself, made read-only."""
     values.flags.writeable = False
     return values
+
+
+def even(value: float, length: int) -> Array:
+    """(length,) read-only, this value everywhere: one number in memory stands for all."""
+    return np.broadcast_to(np.float64(value), (length,))
+
+
+def evenly(function: Callable[[Array], Array], values: Array) -> Array:
+    """function(values), of each on its own: worked out once where one number stands for all."""
+    if values.strides == (0,) and len(values):
+        return even(function(values[:1])[0], len(values))
+    return function(values)
+
+
+def taken(values: Array, which: Indices) -> Array:
+    """values[which]; still one number where that stands for all."""
+    if values.strides == (0,) and len(values):
+        return even(values[0], len(which))
+    return np.asarray(values[which])
 
 
 def among_zeros(

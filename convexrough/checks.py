@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, even
 from convexrough.errors import InputError
 
 #: Sizes of numbers, in a scene's own units, whose products and powers float64 can hold.
@@ -57,24 +57,25 @@ def array(
     try:
         if np.iscomplexobj(values) or np.asarray(values).dtype.kind in "USV":
             raise TypeError("no real numbers")
-        vector = np.array(values, dtype=np.float64)
+        vector: Array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(what, found=repr(values)[:60], expected="numbers") from error
     if vector.ndim == 0 and length is not None:
-        vector = np.full(length, float(vector))
+        vector = even(float(vector), length)
     if vector.ndim != 1 or (length is not None and vector.size != length):
         count = "a list of numbers" if length is None else f"{length} values, one per asperity"
         raise InputError(what, found=f"shape {np.shape(values)}", expected=count)
-    good = np.abs(vector) <= LARGEST  # nan is not
+    each = vector[:1] if vector.strides == (0,) else vector
+    good = np.abs(each) <= LARGEST  # nan is not
     if sign == "positive":
-        good &= vector > 0
+        good &= each > 0
     elif sign == "not negative":
-        good &= vector >= 0
+        good &= each >= 0
     if not good.all():
         first = int(np.argmin(good))
         kind = f"{sign}, finite" if sign else "finite"
         raise InputError(f"{what}[{first}]", found=vector[first], expected=f"a {kind} number")
-    if not (good := (vector == 0) | (np.abs(vector) >= smallest)).all():
+    if not (good := (each == 0) | (np.abs(each) >= smallest)).all():
         first = int(np.argmin(good))
         raise InputError(f"{what}[{first}]", found=vector[first], expected=SIZED)
     vector.flags.writeable = False

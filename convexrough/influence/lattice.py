@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import threads
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, even
 from convexrough.influence.convolution import Box, Kernel, neighbours
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, Sums, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
@@ -218,7 +218,7 @@ class LatticeInfluence(LatticeCoupling):
         if not self._filled:
             return separations(self.points, self.point_error)
         nearest = self.spacing * self._least * (1.0 - 8 * ROUNDOFF) if len(self) > 1 else np.inf
-        return np.full(len(self), nearest)
+        return even(nearest, len(self))
 
     def crowding(self, radii: Array) -> float:
         """Pairs in the order of their distance, until none further apart can be more crowded."""

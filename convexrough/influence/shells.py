@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, evenly
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import SAFETY
 
@@ -18,9 +18,12 @@ def shells(influence: Influence) -> Array:
     With them A + diag(shells) is positive semidefinite (docs/theory/convexity.md). A single
     asperity has no neighbour; infinite where rounding leaves no shell.
     """
-    with np.errstate(divide="ignore"):
-        values: Array = 2.0 * influence.scale / influence.separations()
-    return values
+
+    def about(separations: Array) -> Array:
+        with np.errstate(divide="ignore"):
+            return np.asarray(2.0 * influence.scale / separations)
+
+    return evenly(about, influence.separations())
 
 
 def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks, threads
-from convexrough.arrays import Array, Indices, among_zeros
+from convexrough.arrays import Array, Indices, among_zeros, evenly, taken
 from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.shells import fitted_shells, shells
 from convexrough.normal.load_control import approach_bound, highest_approach, shifted_to_load
@@ -88,7 +89,7 @@ class NormalProblem:
         checks.exactly_one("approach", approach, "load", load)
         errors = scene.offset_errors
         modulus = scene.material.contact_modulus
-        coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
+        coefficients = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
         if approach is not None:
             ceiling = approach = checks.finite("approach", approach)
         else:
@@ -108,7 +109,7 @@ class NormalProblem:
             scene=scene,
             units=units,
             candidates=candidates,
-            coefficients=coefficients[candidates] * units.local,
+            coefficients=evenly(lambda k: k * units.local, taken(coefficients, candidates)),
             offsets=scene.offsets[candidates] / units.length,
             offset_errors=errors[candidates] / units.length,
             influence=coupling,
@@ -123,11 +124,11 @@ class NormalProblem:
         return replace(
             self,
             candidates=self.candidates[which],
-            coefficients=self.coefficients[which],
+            coefficients=taken(self.coefficients, which),
             offsets=self.offsets[which],
             offset_errors=self.offset_errors[which],
             influence=self.influence.among(which),
-            shells=self.shells[which],
+            shells=taken(self.shells, which),
         )
 
     def fitted_to(self, loads: Array) -> NormalProblem:

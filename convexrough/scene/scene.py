@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, evenly, frozen
 from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.scene.asperities import Asperities
@@ -63,8 +63,11 @@ class Scene(Record):
     @cached_property
     def relative_radii(self) -> Array:
         """(n,) [length]  1/R_i = 1/R + 1/rho_i."""
-        rho = self.asperities.tip_radii
-        return frozen(1.0 / (1.0 / self.sphere_radius + 1.0 / rho))
+
+        def relative(rho: Array) -> Array:
+            return frozen(1.0 / (1.0 / self.sphere_radius + 1.0 / rho))
+
+        return evenly(relative, self.asperities.tip_radii)
 
     @cached_property
     def contact_points(self) -> Array:
@@ -92,7 +95,7 @@ class Scene(Record):
             return 0.0
         return 3 * 2.0**-53 * float(np.abs(self.contact_points).max())
 
-    @cached_property
+    @property
     def drops(self) -> Array:
         """(n,) [length] how much further away the sphere's surface is than on the axis.
 
@@ -107,7 +110,7 @@ class Scene(Record):
         """(n,) [length]  d_i = z_i - drop_i: prescribed approach of each asperity, less D0."""
         return frozen(self.asperities.heights - self.drops)
 
-    @cached_property
+    @property
     def offset_errors(self) -> Array:
         """(n,) [length] bound on the rounding error of `offsets`."""
         return frozen(6 * 2.0**-53 * (np.abs(self.asperities.heights) + self.drops))
