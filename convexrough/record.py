@@ -59,7 +59,8 @@ class Record:
     def _rows(self) -> Iterator[tuple[str, str]]:
         """The name of each line, and what stands there."""
         for name in (*self._shown, *(each.name for each in self._fields())):
-            yield name, in_words(getattr(self, name))
+            if words := in_words(getattr(self, name)):  # nothing is said where there is nothing
+                yield name, words
 
     def _headline(self) -> str:
         """All of it in one line."""

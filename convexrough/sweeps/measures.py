@@ -141,6 +141,21 @@ def columns(measures: Sequence[str], stages: Stages) -> list[str]:
     return [each for name in measures for each in MEASURES[name].columns(name, stages)]
 
 
+def said(column: str) -> str:
+    """What a measured column is, as a figure says it: "loss at Q/(fP) = 0.37"."""
+    own = [name for name in MEASURES if column == name or column.startswith(f"{name}_")]
+    name = max(own, key=len, default=column)
+    words, suffix = name.replace("_", " "), column.removeprefix(name).strip("_")
+    if not own or not suffix:
+        return words
+    if name == "onset":
+        return f"onset of sliding, Q/(fP), quantile {suffix}"
+    if MEASURES[name].stage not in ("cycle", "shear"):
+        return suffix.replace("_", " ")
+    low, _, high = suffix.rpartition("_")
+    return f"{words} at Q/(fP) = {high}" if not low else f"{words}, Q/(fP) from {low} to {high}"
+
+
 def units(measures: Sequence[str], stages: Stages, length: str, force: str) -> dict[str, str]:
     """What each measured column is in, where the names of both units are known."""
     if not (length and force):

@@ -14,6 +14,7 @@ from convexrough import checks, frames
 from convexrough.errors import ExtraError, InputError
 from convexrough.record import Record, in_words
 from convexrough.sweeps.batch import Columns, Rows
+from convexrough.sweeps.measures import said
 from convexrough.sweeps.parts import Folder, Part, length, missing, once, open_folder, read_part
 
 if TYPE_CHECKING:
@@ -180,10 +181,13 @@ class SweepTable(Record):
 
     def _said(self, name: str) -> str:
         """A column in words, with its unit."""
-        table, _, key = name.rpartition(".") if name in self.swept else ("", "", name)
+        if name in self.swept:
+            table, _, key = name.rpartition(".")
+            words = (f"{table}: {key}" if table else key).replace("_", " ")
+        else:
+            words = said(name)
         unit = self.manifest["units"].get(name, "")
-        words = f"{table}: {key}" if table else key
-        return f"{words} ({unit})".replace("_", " ") if unit else words.replace("_", " ")
+        return f"{words} ({unit})" if unit else words
 
     def _parts(self) -> list[Part]:
         assert self.folder is not None  # or it is held

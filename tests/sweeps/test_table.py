@@ -221,10 +221,23 @@ def test_labels_have_the_units_of_the_scene(here: Executor) -> None:
     named = {**SMALL, "units": {"length": "mm", "force": "N"}}
     axes = cr.sweep(named, executor=here).plot("loss_0.37", "asperities.height_std")
     assert axes.get_xlabel() == "asperities: height std (mm)"
-    assert axes.get_ylabel() == "loss 0.37 (N mm)"
+    assert axes.get_ylabel() == "loss at Q/(fP) = 0.37 (N mm)"
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [
         "load 1e-07", "load 3e-07"
     ]  # fmt: skip
+
+
+def test_columns_in_words() -> None:
+    words = {
+        "contacts": "contacts",
+        "words_contact": "contact",
+        "certificate_load_error": "load error",
+        "onset_0.25": "onset of sliding, Q/(fP), quantile 0.25",
+        "displacement_0.5": "displacement at Q/(fP) = 0.5",
+        "loss_normalised_0.37": "loss normalised at Q/(fP) = 0.37",
+        "loss_factor_0.1_0.5": "loss factor, Q/(fP) from 0.1 to 0.5",
+    }
+    assert {name: measures.said(name) for name in words} == words
 
 
 def test_scenes_computed_twice_are_there_once(here: Executor, tmp_path: Path) -> None:
