@@ -23,7 +23,7 @@ from convexrough.influence.convolution import Box, Kernel, neighbours
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, Sums, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
-from convexrough.influence.packing import beside, lattice_packing, point_packing
+from convexrough.influence.packing import largest, lattice_packing, point_packing
 from convexrough.influence.sliced import Distances, sliced_sums
 from convexrough.influence.slopes import Spectra, odd_spectra
 from convexrough.roundoff import ROUNDOFF
@@ -230,8 +230,7 @@ class LatticeInfluence(LatticeCoupling):
         for distance, i, j in self._pairs():
             if most <= worst * distance:
                 break
-            here, there = beside(field, i, j)
-            worst = max(worst, float((here + there).max(initial=0.0)) / distance)
+            worst = max(worst, largest(_sum, field, i, j) / distance)
         return worst
 
     def packing(self, radii: Array) -> float:
@@ -292,6 +291,10 @@ class LatticeInfluence(LatticeCoupling):
     def smoother(self, root: Array) -> Smoother:
         box = self.box
         return block_smoother(box.shape, box.basis, self.sources, self._unit, root, box.workers)
+
+
+def _sum(radii: Array, others: Array) -> float:
+    return float((radii + others).max(initial=0.0))
 
 
 def _boxed(lattice: Lattice, places: Sites) -> tuple[Box, Indices]:

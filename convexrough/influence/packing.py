@@ -7,12 +7,17 @@ couple looks through pairs in its own way.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arrays import Array
+
+#: Sites of a box that are looked at together: what a cache holds.
+CACHED = 2**15
 
 #: Neighbours looked at for each point before any others.
 NEAREST = 8
@@ -52,19 +57,27 @@ def lattice_packing(field: Array, pairs: Iterable[tuple[float, int, int]]) -> fl
     for distance, i, j in pairs:
         if distance > most and most <= worst * (distance - most):
             break
-        here, there = beside(field, i, j)
-        worst = max(worst, pair_packing(here, there, distance))
+        worst = max(worst, largest(partial(pair_packing, distances=distance), field, i, j))
         if not worst < 1:
             return np.inf
     return worst
 
 
-def beside(field: Array, i: int, j: int) -> tuple[Array, Array]:
-    """All pairs of sites that are i rows and j columns apart."""
+def largest(of: Callable[[Array, Array], float], field: Array, i: int, j: int) -> float:
+    """Of all pairs of sites that are i rows and j columns apart, some rows at a time; or 0."""
     here, there = field[i:], field[: len(field) - i]
     if j >= 0:
-        return here[:, j:], there[:, : there.shape[1] - j]
-    return here[:, :j], there[:, -j:]
+        here, there = here[:, j:], there[:, : there.shape[1] - j]
+    else:
+        here, there = here[:, :j], there[:, -j:]
+    found = [0.0]
+
+    def look(rows: slice) -> None:
+        found.append(of(here[rows], there[rows]))
+
+    rows = max(1, CACHED // max(here.shape[1], 1))
+    threads.each(look, threads.chunks(len(here), rows), threads.worthwhile(here.size))
+    return max(found)
 
 
 def point_packing(points: Array, radii: Array, error: float) -> float:
