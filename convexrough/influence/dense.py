@@ -155,6 +155,9 @@ class DenseInfluence:
     def clearances(self) -> Array:
         return self.separations()
 
+    def semidefinite_with(self, radius: float) -> bool:
+        return False
+
     def sums(self, loads: Array) -> Sums | None:
         return None
 
