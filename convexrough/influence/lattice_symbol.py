@@ -76,7 +76,7 @@ class _Symbol:
         """With the alpha that both sums need about as many terms for."""
         area = abs(float(np.linalg.det(basis)))
         alpha = float(np.sqrt(np.pi / area))
-        dual: Array = 2.0 * np.pi * np.linalg.inv(basis).T
+        dual = np.asarray(2.0 * np.pi * np.linalg.inv(basis).T, dtype=np.float64)
         sites = _points(basis, 1.0 + REACH / alpha)
         distances = np.hypot(*sites.T)
         images = _points(dual, 2.0 * REACH * alpha)
