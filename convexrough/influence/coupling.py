@@ -164,6 +164,13 @@ class Influence(Coupling, Protocol):
         """
         ...
 
+    def semidefinite_with(self, radius: float) -> bool:
+        """Whether A + (scale / radius) I >= 0 is known, shells of that radius may well overlap.
+
+        From what is known of a lattice; elsewhere False.
+        """
+        ...
+
     def sums(self, loads: Array) -> Sums | None:
         """sum_j P_j / r_ij [force / length] to some thirty digits; None where that is not known.
 

@@ -100,6 +100,8 @@ class DenseInfluence:
     def apply(self, loads: Array) -> Array:
         """A P, summed in blocks of about sqrt(n) so that rounding grows as sqrt(n), not n."""
         size = self._block
+        if len(self) <= size:
+            return np.asarray(self.matrix @ loads)
         total: Array = self.matrix[:, :size] @ loads[:size]
         for start in range(size, len(self), size):
             total += self.matrix[:, start : start + size] @ loads[start : start + size]
@@ -148,10 +150,13 @@ class DenseInfluence:
         return float((np.add.outer(radii, radii) * self.matrix).max()) / self.scale
 
     def packing(self, radii: Array) -> float:
-        return matrix_packing(self.matrix * ((1.0 + 2.0 * self.entry_error) / self.scale), radii)
+        return matrix_packing(self.matrix, radii * ((1.0 + 2.0 * self.entry_error) / self.scale))
 
     def clearances(self) -> Array:
         return self.separations()
+
+    def semidefinite_with(self, radius: float) -> bool:
+        return False
 
     def sums(self, loads: Array) -> Sums | None:
         return None

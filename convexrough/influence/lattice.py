@@ -23,10 +23,11 @@ from convexrough.influence.convolution import Box, Kernel, neighbours
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, Sums, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
+from convexrough.influence.lattice_symbol import least_symbol
 from convexrough.influence.packing import largest, lattice_packing, point_packing
 from convexrough.influence.sliced import Distances, sliced_sums
 from convexrough.influence.slopes import Spectra, odd_spectra
-from convexrough.roundoff import ROUNDOFF
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import crowding, separations
 from convexrough.twofold import exact_product, exact_sum
@@ -40,6 +41,9 @@ CHUNK = 2**14
 #: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree:
 #: a heuristic, which decides speed and how sharp shells are.
 FILLED = 0.2
+
+#: The symbol of any lattice goes as low as that of a row, -2 log 2. Decides speed only.
+LEAST_NEGATIVE = 1.386
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +71,7 @@ class LatticeCoupling:
     def rounding(self, loads: Array) -> Rounding:
         # Points off their sites change 1/r by blur / r^2 at most; the sum of that over a row
         # bounds the effect on the 2-norm and on the largest.
-        kernel, off = self._kernel, self.blur / self._least * self._kernel.norm**2
+        kernel, off = self._kernel, self._displaced
         size, largest = float(np.linalg.norm(loads)), float(np.abs(loads).max(initial=0.0))
         norm = self.box.bound(kernel, ROUNDOFF) * size + off * size
         each = self.box.bound_each(kernel, ROUNDOFF) * size + off * largest
@@ -97,6 +101,11 @@ class LatticeCoupling:
     def _least(self) -> float:
         """[spacing] the least that the shortest distance of two points can be."""
         return 1.0 - min(self.blur, 0.5)
+
+    @property
+    def _displaced(self) -> float:
+        """[1 / spacing] norm of what points off their sites change 1/r by, by its row sums."""
+        return self.blur / self._least * self._kernel.norm**2
 
     @cached_property
     def _kernel(self) -> Kernel:
@@ -248,6 +257,13 @@ class LatticeInfluence(LatticeCoupling):
         for on_sites, i, j in neighbours(self.box):
             yield self.spacing * (on_sites - self.blur) * (1.0 - 8 * ROUNDOFF), i, j
 
+    def semidefinite_with(self, radius: float) -> bool:
+        """By the least of the lattice's symbol, and by how far points are off their sites."""
+        if radius * LEAST_NEGATIVE > self.spacing:
+            return False
+        least = self.lattice.keep(_least_symbol) - self._displaced
+        return -least * radius * (1.0 + SAFETY) <= self.spacing
+
     def sums(self, loads: Array) -> Sums | None:
         """sum_j P_j / r_ij to many more digits than `apply`, with the points where they are."""
         unit = 2.0 ** np.floor(np.log2(self.spacing))
@@ -295,6 +311,10 @@ class LatticeInfluence(LatticeCoupling):
 
 def _sum(radii: Array, others: Array) -> float:
     return float((radii + others).max(initial=0.0))
+
+
+def _least_symbol(lattice: Lattice) -> float:
+    return least_symbol(lattice.basis / lattice.spacing)
 
 
 def _boxed(lattice: Lattice, places: Sites) -> tuple[Box, Indices]:

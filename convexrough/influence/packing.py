@@ -37,7 +37,7 @@ def pair_packing(radii: Array, others: Array, distances: NDArray[np.float64] | f
 
 
 def matrix_packing(inverse: Array, radii: Array) -> float:
-    """Of all pairs; inverse : (n, n) no less than 1 / r_ij, 0 on the diagonal."""
+    """Of all pairs; inverse : (n, n) no less than 1 / r_ij, in any unit, 0 on the diagonal."""
     some = np.flatnonzero(radii)
     if len(some) < 2:
         return 0.0

@@ -117,6 +117,9 @@ class ScatteredInfluence:
     def clearances(self) -> Array:
         return self.separations()
 
+    def semidefinite_with(self, radius: float) -> bool:
+        return False
+
     def sums(self, loads: Array) -> Sums | None:
         return None
 

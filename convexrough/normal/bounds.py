@@ -6,6 +6,7 @@ the smaller of the two bounds counts.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +48,7 @@ def bounds_of(
     """The smaller of (1) and of docs/theory/sup-norm.md, for each asperity."""
     problem = box.problem
     A, errors, shift = problem.influence, ball.load_errors, 0.0
-    sup = SupNorm.of(A, problem.stiffness(ball.near))
+    sup = SupNorm.of(A, ball.stiffness)
     if weights is not None:
         shift = np.inf
         if sup is not None:
@@ -89,7 +90,8 @@ class Ball(NamedTuple):
         """
         if len(influence) == 0:
             return moved
-        extent = max(float(np.hypot(*np.ptp(influence.points, axis=0))), checks.SMALLEST)
+        x, y = influence.points.T
+        extent = max(math.hypot(x.max() - x.min(), y.max() - y.min()), checks.SMALLEST)
         total = float((1.0 / self.stiffness).sum()) - 1.0 / float(self.stiffness.min())
         least = self.radius * influence.scale / extent * np.sqrt(max(total, 0.0))
         if float(moved.max(initial=0.0)) <= least:
@@ -107,8 +109,8 @@ def ball_of(box: Box, found: Fit, loads: Array) -> Ball | None:
         return None
     near = np.minimum(box.loads, loads + errors)
     # The margin of the whole box holds, in parts of H, on any smaller one, where H is no less.
-    theta = min(box.convexity_number, box.problem.convexity_number(near))
     h = box.problem.stiffness(near)
+    theta = min(box.convexity_number, box.problem.convexity_at(h))
     return Ball(_norm(found, h, theta), h, near)
 
 

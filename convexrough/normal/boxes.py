@@ -64,7 +64,7 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
     corner = np.maximum(problem.bounds(ceiling), loads)  # the box must hold both states
     h = problem.stiffness(corner)
     nowhere, none = np.full(len(problem), np.inf), np.zeros(len(problem), dtype=bool)
-    if (theta := problem.convexity_number(corner)) < 1:
+    if (theta := problem.convexity_at(h)) < 1:
         yield Box("global", problem, corner, h, theta, nowhere, none)
         return
     if (margin := convex_margin(problem.influence, h, MARGINS)) > 0:
@@ -106,7 +106,7 @@ def box_of_touching(
     box = np.where(touching, loads + np.maximum(least, room), 0.0)
     h = problem.stiffness(box)
     shelled = replace(problem, shells=_shells(influence, h, which))
-    number = shelled.convexity_number(box)
+    number = shelled.convexity_at(h)
     if not number < 1:
         number = 1.0 - _crowded_margin(influence, h[which])
     if not number < 1:

@@ -195,7 +195,9 @@ class _Screened(NamedTuple):
 
 def _screened(problem: NormalProblem, loads: Array, approach: float) -> _Screened:
     scene, length = problem.scene, problem.units.length
-    others = np.delete(np.arange(len(scene)), problem.candidates)
+    left = np.ones(len(scene), dtype=bool)
+    left[problem.candidates] = False
+    others = left.nonzero()[0]
     if len(others) == 0:
         return _Screened(others, None, np.zeros(0), np.zeros(0))
     coupling = problem.influence.onto(scene.contact_points[others])

@@ -191,7 +191,11 @@ class NormalProblem:
         The smallest eigenvalue of the Hessian, relative to its diagonal, is at least 1 - theta:
         (3) of docs/theory/convexity.md.
         """
-        ratio = self.shells / self.stiffness(loads)
+        return self.convexity_at(self.stiffness(loads))
+
+    def convexity_at(self, stiffness: Array) -> float:
+        """`convexity_number` up to loads of which the stiffness is known."""
+        ratio = self.shells / stiffness
         return float(ratio.max(initial=0.0)) * (1 + SAFETY)
 
     def duality_gap(

@@ -1,7 +1,8 @@
-"""What any other solution would have to be like: docs/theory/crowded.md, "Rivals".
+"""What any other solution would have to be like: docs/theory/rivals.md, "Other solutions".
 
 Two solutions have contact radii a and b. With t_i = (2 / pi) m_i, m = (2/3) (a^2 + a b + b^2) /
-(a + b), they are one and the same if t_i + t_j <= r_ij for all pairs.
+(a + b), they are one and the same if t_i + t_j <= r_ij for all pairs, or where the diagonal
+1 / (pi E* t_i) is known to make A semidefinite otherwise.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ class Rivals(NamedTuple):
         A = problem.influence
         blur = 1.0 + SAFETY + 2.0 * A.entry_error
         a, most = (_radii(problem, loads) for loads in (near, problem.bounds(ceiling)))
-        if A.crowding(2.0 / np.pi * _mean(a, most)) * blur <= 1:
+        t = 2.0 / np.pi * _mean(a, most)
+        if A.crowding(t) * blur <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
             return NO_RIVALS
         crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * blur
         cover = bool((a <= ROOMY * A.separations()).all())

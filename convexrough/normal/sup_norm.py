@@ -14,6 +14,7 @@ The letters, and the names here:
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -109,10 +110,11 @@ def firmness(packing: float, size: float) -> float:
     """
     q = packing
     slope = (size - q) / (1.0 - q)  # 1 / kappa
-    distance = np.clip(np.cbrt((1.0 - q * q) * slope), 1.0 - q, 1.0 + q)  # w, to the cap's rim
+    # w, to the cap's rim
+    distance = min(max(math.cbrt((1.0 - q * q) * slope), 1.0 - q), 1.0 + q)
     height = (1.0 + q * q - distance * distance) / (2.0 * q)  # y, the cosine of its angle
     measure = (1.0 - q * q) / (2.0 * q) * (1.0 / (1.0 - q) - 1.0 / distance)  # omega
-    return float(2.0 * (1.0 - measure) * slope - height) - FIRMNESS_ROUNDING
+    return 2.0 * (1.0 - measure) * slope - height - FIRMNESS_ROUNDING
 
 
 def _weakness(packing: float, size: float) -> float:

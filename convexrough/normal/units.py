@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from convexrough.checks import SIZED
 from convexrough.errors import InputError
@@ -24,13 +23,12 @@ class Units:
     @property
     def local(self) -> float:
         """What a local coefficient k is multiplied by: force^(2/3) / length, a power of two."""
-        return float(2.0 ** np.round(np.log2(self.force) * 2 / 3) / self.length)
+        return 2.0 ** round(math.log2(self.force) * 2 / 3) / self.length
 
     @classmethod
     def of(cls, approach: float, coefficient: float) -> Units:
         """For an approach [length] and a local coefficient k; InputError if there are none."""
-        if not 0 < approach < np.inf:
+        if not 0 < approach < math.inf:
             raise InputError("scene", found=f"indentations of {approach:g}", expected=SIZED)
-        length = 2.0 ** np.round(np.log2(approach))
-        force = 8.0 ** np.round(np.log2(length / coefficient) / 2.0)
-        return cls(float(length), float(force))
+        length = 2.0 ** round(math.log2(approach))
+        return cls(length, 8.0 ** round(math.log2(length / coefficient) / 2.0))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.checks import SMALLEST
+from convexrough.kept import Keeper
 
 Sites = NDArray[Any]  # of whole numbers
 
@@ -28,7 +29,7 @@ SPARSEST = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
+class Lattice(Keeper):
     """The points origin + i b1 + j b2, i and j whole numbers.
 
     basis   : (2, 2) [length] rows b1 and b2, reduced to rounding

@@ -1,0 +1,142 @@
+"""The symbol of a lattice's coupling: against closed forms, pieces of lattices, sums of pairs."""
+
+import numpy as np
+import pytest
+from flint import arb
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from convexrough.influence.coupling import inverse_distances
+from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.lattice import LEAST_NEGATIVE, LatticeInfluence
+from convexrough.influence.lattice_symbol import LOST, TOLERANCE, _Symbol, least_symbol
+from convexrough.scene.lattice import Lattice, _shortest
+
+Array = NDArray[np.float64]
+
+HEXAGONAL = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
+SCALE = 0.37
+
+
+def half_line(power: arb, step: int, start: int) -> arb:
+    """sum over n >= 0 of (step n + start)^-power, continued."""
+    return arb(step) ** -power * power.zeta(arb(start) / step)
+
+
+def closed_forms() -> tuple[float, float]:
+    """Epstein's sums of 1 / r at the corner: of the hexagonal and of the square lattice."""
+    s = arb(1) / 2
+    zeta = s.zeta(arb(1))
+    by_three = half_line(s, 3, 1) - half_line(s, 3, 2)
+    by_four = half_line(s, 4, 1) - half_line(s, 4, 3)
+    # Every third site has the sign 1, the others -1/2: 3/2 times a lattice of 3^(1/2) the size.
+    hexagonal = 6 * zeta * by_three * (3 * 3**-s - 1) / 2
+    square = -4 * (1 - 2 ** (1 - s)) * zeta * by_four
+    return float(hexagonal), float(square)
+
+
+def bases() -> st.SearchStrategy[Array]:
+    """Reduced, with a shortest vector of length 1."""
+
+    def basis(x: float, length: float) -> Array:
+        return np.array([[1.0, 0.0], [x, np.sqrt(max(length**2 - x * x, 0.0))]])
+
+    return st.builds(basis, st.floats(0, 0.5), st.floats(0, 2.5).map(lambda e: 10**e / 1.0)).filter(
+        lambda b: bool(np.hypot(*b[1]) >= 1)
+    )
+
+
+def test_closed_forms() -> None:
+    """The least is at the corner, where it is known."""
+    for basis, exact in zip((HEXAGONAL, np.eye(2)), closed_forms(), strict=True):
+        bound = least_symbol(basis)
+        assert exact - 1.01 * TOLERANCE < bound < exact
+    row = -2 * np.log(2)
+    assert row - 1.01 * TOLERANCE < least_symbol(np.diag([1.0, 40.0])) < row
+    assert -row > LEAST_NEGATIVE
+    assert least_symbol(np.diag([1.0, 51.0])) == -np.inf
+
+
+@settings(max_examples=40, deadline=None)
+@given(bases(), st.integers(0, 2**32 - 1))
+def test_no_piece_of_a_lattice_has_less(basis: Array, seed: int) -> None:
+    """Eigenvalues of 1 / r among any sites; the bound is not far below those of large pieces."""
+    bound = least_symbol(basis)
+    if bound == -np.inf:
+        return
+    rng = np.random.default_rng(seed)
+    across = max(1, round(24 / np.hypot(*basis[1])))
+    i, j = np.divmod(np.arange(400), across)
+    sites = np.stack((i, j), axis=1) @ basis
+    for taken in (np.arange(400), rng.choice(400, 120, replace=False), np.arange(7)):
+        points = sites[taken]
+        assert np.linalg.eigvalsh(inverse_distances(points, points))[0] > bound
+    least = float(np.linalg.eigvalsh(inverse_distances(sites, sites))[0])
+    assert least < bound + 0.06
+
+
+@settings(max_examples=40, deadline=None)
+@given(bases(), st.integers(0, 2**32 - 1))
+def test_bounds_hold_in_all_of_a_cell(basis: Array, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    symbol = _Symbol.of(basis)
+    cells, size = rng.uniform(-0.5, 0.5, (20, 2)), 10 ** rng.uniform(-3, -0.5)
+    values, bounds = symbol.over(cells, size)
+    assert (bounds <= values).all()
+    corners = rng.choice([-0.5, 0.5], (20, 2))
+    for away in (corners, rng.uniform(-0.5, 0.5, (20, 2))):
+        elsewhere = symbol.over(cells + size * away, size)[0]
+        assert (bounds <= elsewhere + LOST).all()
+
+
+@pytest.mark.parametrize("basis", [HEXAGONAL, np.eye(2), np.array([[1.0, 0.0], [0.3, 1.7]])])
+def test_the_symbol_is_that_of_the_sum(basis: Array) -> None:
+    """sum v_i v_j / r_ij over pairs is the mean of f |v|^2 over waves."""
+    rng = np.random.default_rng(1)
+    steps = rng.choice(25, 9, replace=False)
+    sites = np.stack(np.divmod(steps, 5), axis=1)
+    v = rng.normal(size=9)
+    v -= v.mean()  # where f is infinite it then counts for nothing
+    points = sites @ basis
+    exact = float(v @ inverse_distances(points, points) @ v)
+    symbol = _Symbol.of(basis)
+    means = []
+    for count in (40, 80):
+        steps = (np.arange(count) + 0.5) / count - 0.5
+        cells = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        waves = np.exp(2j * np.pi * cells @ sites.T) @ v
+        means.append(float((symbol.over(cells, 0.0)[0] * np.abs(waves) ** 2).mean()))
+    assert abs(means[1] - exact) < 1e-4 * float(v @ v)
+    assert abs(means[1] - exact) < 0.2 * abs(means[0] - exact)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(1.3, 1.7), st.floats(0, 0.02))
+def test_points_off_their_sites_are_counted(seed: int, share: float, off: float) -> None:
+    """Whatever is said to be semidefinite is so, though no shells of that radius are apart."""
+    rng = np.random.default_rng(seed)
+    basis = _shortest(np.stack(np.divmod(np.arange(25.0), 5), axis=1) @ rng.normal(size=(2, 2)))
+    assert basis is not None
+    lattice = Lattice(np.zeros(2), basis, 1e-13 + off * float(np.hypot(*basis[0])))
+    sites = np.stack(np.divmod(np.arange(100), 10), axis=1) @ basis
+    points = sites + rng.uniform(-off, off, sites.shape) * lattice.spacing * (1 - 1e-9)
+    A = LatticeInfluence.assemble(points, lattice, SCALE)
+    radius = lattice.spacing / share
+    if not A.semidefinite_with(radius):
+        return
+    matrix = DenseInfluence.assemble(points, SCALE).matrix
+    assert np.linalg.eigvalsh(matrix + SCALE / radius * np.eye(100))[0] >= 0
+
+
+def test_what_is_known_of_lattices() -> None:
+    points = np.stack(np.divmod(np.arange(900), 30), axis=1) @ HEXAGONAL
+    lattice = Lattice.through(points)
+    assert lattice is not None
+    A = LatticeInfluence.assemble(points, lattice, SCALE)
+    exact = -1 / closed_forms()[0]
+    assert A.semidefinite_with(exact * 0.998)
+    assert not A.semidefinite_with(exact * 1.0001)
+    assert not DenseInfluence.assemble(points, SCALE).semidefinite_with(0.1)
+    far = Lattice(lattice.origin, lattice.basis, 0.01)
+    assert not LatticeInfluence.assemble(points, far, SCALE).semidefinite_with(exact * 0.998)
