@@ -11,15 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, Kernel
 from convexrough.influence.near_pairs import Order
-from convexrough.influence.softened import Softened, lagrange
+from convexrough.influence.softened import Softened, twofold_lagrange
 from convexrough.influence.splitting import Splitting
 from convexrough.roundoff import ROUNDOFF
+from convexrough.twofold import Twofold
 
 #: Points of one block at most: what keeps sums short, and a matrix product in the cache.
 BLOCK = 256
+
+#: Points weighed together: what a cache holds.
+PLACES = 2**12
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +86,13 @@ class Interpolation:
             start, stop = order.starts[key : key + 2].tolist()
             for first in range(start, stop, BLOCK):
                 patches.append((first, min(first + BLOCK, stop), i, j))
-        offsets = order.cells - np.repeat(corners, np.diff(order.starts), axis=0)
-        factors = [
-            _rows(order.shares[:, k], offsets[:, k], splitting).astype(dtype) for k in (0, 1)
-        ]
+        x, y = (np.empty((len(order.places), splitting.width), dtype=dtype) for _ in (0, 1))
+        for start in range(0, len(x), PLACES):
+            some = slice(start, start + PLACES)
+            x[some], y[some] = (factor.high for factor in twofold_weights(order, splitting, some))
         extra = splitting.kernel.order - 1
         shape = (rows * splitting.block + extra, columns * splitting.block + extra)
-        return cls(factors[0], factors[1], patches, shape)
+        return cls(x, y, patches, shape)
 
     def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
         """W^T P on the mesh; of the sizes of the weights if `absolute`."""
@@ -114,10 +117,15 @@ class Interpolation:
         return result
 
 
-def _rows(shares: Array, offsets: Indices, splitting: Splitting) -> Array:
-    """(n, width) weights of one direction, each set where its stencil is."""
-    order = splitting.kernel.order
-    rows = np.zeros((len(shares), splitting.width))
-    columns = offsets[:, None] + np.arange(order)
-    np.put_along_axis(rows, columns, lagrange(shares, order), axis=1)
-    return rows
+def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Twofold, Twofold]:
+    """(n, width) weights of some points in x and y, each set where its stencil is."""
+    stencil = np.arange(splitting.kernel.order)
+    factors = []
+    for k in (0, 1):
+        weights = twofold_lagrange(order.shares[some, k], len(stencil))
+        rows = Twofold(*(np.zeros((len(weights.high), splitting.width)) for _ in weights))
+        columns = (order.cells[some, k] % splitting.block)[:, None] + stencil
+        for row, values in zip(rows, weights, strict=True):
+            np.put_along_axis(row, columns, values, axis=1)
+        factors.append(rows)
+    return factors[0], factors[1]

@@ -15,6 +15,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import squared_distances
 from convexrough.influence.splitting import Splitting
+from convexrough.twofold import Twofold, exact_sum, whole
 
 #: Pairs looked at together, and how many such pieces are held at once.
 PIECE, BATCH = 2**17, 32
@@ -41,8 +42,9 @@ class Order:
     @classmethod
     def of(cls, points: Array, splitting: Splitting) -> Order:
         low = points.min(axis=0) if len(points) else np.zeros(2)
-        away = (points - low) / splitting.spacing if splitting.meshed else np.zeros_like(points)
-        cells = np.floor(away).astype(np.intp)
+        cells, shares = np.zeros(points.shape, dtype=np.intp), np.zeros_like(points)
+        if splitting.meshed:
+            cells, shares = _placed(points, low, splitting.spacing)
         blocks = cells // splitting.block
         rows, columns = (blocks.max(axis=0, initial=0) + 1).tolist()
         key = blocks[:, 0] * columns + blocks[:, 1]
@@ -52,11 +54,19 @@ class Order:
             places,
             points[places],
             cells[places],
-            (away - cells)[places],
+            shares[places],
             keys,
             np.append(starts, len(points)).astype(np.intp),
             (rows, columns),
         )
+
+
+def _placed(points: Array, low: Array, spacing: float) -> tuple[Indices, Array]:
+    """Cells, and shares of them that are rounded once: at most half a roundoff off."""
+    away = Twofold(*exact_sum(points, -low)).over(whole(spacing))
+    cells = np.floor(away.high)
+    cells -= (away.high == cells) & (away.low < 0)
+    return cells.astype(np.intp), (away.high - cells) + away.low
 
 
 #: Points from and to, and where their neighbours begin and end in the order, row by row of blocks.

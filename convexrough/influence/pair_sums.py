@@ -110,8 +110,7 @@ class Product:
         """
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 8) * ROUNDOFF
-        extent = float(np.ptp(self.order.points, axis=0).max()) if len(self.order.points) else 0.0
-        relative += kernel.moved(2.0 * np.sqrt(2.0) * 2.0 * ROUNDOFF * extent)
+        relative += kernel.moved(2.0 * ROUNDOFF * self.splitting.spacing)
         relative += kernel.far_error(self.splitting.spacing)
         own = (kernel.roundoffs + 8) * ROUNDOFF * kernel.centre
         return 1.01 * relative, 1.01 * own

@@ -6,6 +6,7 @@ What happens on the mesh, and the bounds, are in `pair_sums`, `mesh`, `near_pair
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -18,12 +19,13 @@ from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.packing import clearances, point_packing
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered_smoother import coarse_inverse
+from convexrough.influence.sharp_sums import sharp_sums
 from convexrough.influence.slopes import Spectra, by_mesh, mesh_spectra
 from convexrough.influence.splitting import Splitting
 from convexrough.scene.neighbours import crowding, separations
 
 #: Error of a product, relative to its own size, that is left to interpolation.
-TOLERANCE = 1e-13
+TOLERANCE = 1e-15
 
 #: The same where loads are in single precision, and for sums that need not be sharp.
 SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
@@ -121,7 +123,14 @@ class ScatteredInfluence:
         return False
 
     def sums(self, loads: Array) -> Sums | None:
-        return None
+        found = sharp_sums(self._double, loads)
+        if found is None or self.point_error == 0.0:
+            return found
+        # Distances are off by this at most, and 1 / r by so much over r^2.
+        moved = 2.0 * math.sqrt(2.0) * self.point_error
+        off = 1.01 * moved / found.unit * self.falloff(np.abs(loads), 2)
+        error = found.error + float(off.max())
+        return found._replace(error=error, norm=found.norm + float(np.linalg.norm(off)))
 
     def smoother(self, root: Array) -> Smoother | None:
         return coarse_inverse(self.points, self.scale, root)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +28,21 @@ SURE = 0.45
 VALUE_ERROR, REST_ERROR = 2.0**-69, 2.0**-53
 
 
+class Values(Protocol):
+    """An even kernel of size 1 at most, at differences of sites."""
+
+    def sliced(self, i: Indices, j: Indices) -> tuple[Array, Array]:
+        """(len(i), len(j)) values as float32 numbers and rests, to `VALUE_ERROR`."""
+        ...
+
+    def norm(self, shape: tuple[int, int]) -> float:
+        """About the 2-norm over all differences of two sites of a box."""
+        ...
+
+
 @dataclass(frozen=True)
 class Distances:
-    """Squares of |i b1 + j b2| for whole i and j, of a basis over a power of two.
+    """1 / |i b1 + j b2| for whole i and j, of a basis over a power of two.
 
     gram : three slices (3, 3) of b1 b1, 2 b1 b2 and b2 b2, the first two of so few bits that their
         sums over i^2, i j and j^2 are exact
@@ -53,8 +66,8 @@ class Distances:
             slices[2, k] = float(value)
         return cls(slices)
 
-    def inverse(self, i: Indices, j: Indices) -> tuple[Array, Array]:
-        """1 / |i b1 + j b2| as a float32 number and a rest, to 2^-70; 0 for none."""
+    def sliced(self, i: Indices, j: Indices) -> tuple[Array, Array]:
+        """To 2^-70 of each; 0 for no difference."""
         squares, cross = np.square(j, dtype=np.float64), j.astype(np.float64)
         parts = []
         for one, both, two in self.gram.tolist():
@@ -73,6 +86,16 @@ class Distances:
         if nowhere is not None:
             head[nowhere] = rest[nowhere] = 0.0
         return head, rest
+
+    def norm(self, shape: tuple[int, int]) -> float:
+        one, both, two = (float(each) for each in self.gram.sum(axis=0))
+        i, j = np.arange(-8, 9)[:, None], np.arange(-8, 9)
+        squares = one * i * i + both * i * j + two * j * j
+        squares[8, 8] = np.inf
+        near = float((1.0 / squares).sum())
+        area = math.sqrt(max(one * two - both * both / 4.0, 1e-300))
+        wide = max(shape) / 8.0
+        return math.sqrt(near + 2.0 * math.pi / area * max(math.log(wide), 0.0) + 1.0)
 
 
 def _correction(high: Array, low: Array, head: Array) -> Array:
@@ -95,31 +118,35 @@ def _correction(high: Array, low: Array, head: Array) -> Array:
     return factor
 
 
-def sliced_sums(box: Box, distances: Distances, spacing: float, loads: Array) -> Sums | None:
-    """sum_j P_j / r_ij over the sites of a box; None where no slices are small enough.
+def sliced_sums(
+    box: Box, values: Values, spacing: float, loads: Array, rest: Array | float = 0.0
+) -> Sums | None:
+    """sum_j P_j g_ij / spacing over the sites of a box; None where no slices are small enough.
 
-    loads : of the whole box, 0 where there is no asperity;  spacing : the unit of `distances`
+    loads : of the whole box, 0 where there is no asperity;  rest : less than a roundoff of the
+        largest of them, if they are known so well;  spacing : the unit of `values`, a power of two
     """
     top = float(np.abs(loads).max(initial=0.0))
     if top == 0.0:
         return Sums(np.zeros(box.shape), np.zeros(box.shape), 1.0, 0.0, 0.0)
     size = 2.0 ** np.ceil(np.log2(top))
     shares = loads / size  # exact
-    kernel_bits, load_bits = _bits(box, distances, shares)
+    kernel_bits, load_bits = _bits(box, values, shares)
     if kernel_bits < 1 or load_bits < 1:
         return None
     fine = shares * 2.0**load_bits
     first = np.rint(fine)
     second = fine - first
-    whole, rest = _kernels(box, distances, kernel_bits)
+    second += rest * (2.0**load_bits / size)
+    whole, left = _kernels(box, values, kernel_bits)
     sizes = [float(np.linalg.norm(each)) for each in (first, second)]
     loss = each_loss(box)
     if not loss * whole.norm * sizes[0] < SURE:
         return None
-    exact, remaining = _convolve(box, (first, second), (whole, rest))
-    error = loss * (whole.norm * sizes[1] + rest.norm * (sizes[0] + sizes[1]))
+    exact, remaining = _convolve(box, (first, second), (whole, left))
+    error = loss * (whole.norm * sizes[1] + left.norm * (sizes[0] + sizes[1]))
     of_values = VALUE_ERROR * 2.0**kernel_bits + REST_ERROR
-    error += of_values * float(np.abs(fine).sum()) * (1 + 1e-9)
+    error += of_values * float(np.abs(first).sum() + np.abs(second).sum()) * (1 + 1e-9)
     unit = 2.0 ** -(kernel_bits + load_bits) * size / spacing
     count = math.sqrt(box.shape[0] * box.shape[1])
     return Sums(np.rint(exact), remaining, unit, 1.01 * error, 1.01 * error * count)
@@ -128,15 +155,16 @@ def sliced_sums(box: Box, distances: Distances, spacing: float, loads: Array) ->
 def each_loss(box: Box) -> float:
     """Of a component of a product, over both 2-norms: (2) of docs/theory/operators-lattice.md.
 
-    8 roundoffs instead of 4, as two products are added up before the inverse transform.
+    9 roundoffs instead of 4, as two products are added up before the inverse transform, and loads
+    that are known better than to a roundoff have a rest to be added.
     """
-    return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 8.0)
+    return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 9.0)
 
 
-def _bits(box: Box, distances: Distances, shares: Array) -> tuple[int, int]:
+def _bits(box: Box, values: Values, shares: Array) -> tuple[int, int]:
     """Of the kernel's and of the loads' whole parts: all that are exact, shared out evenly."""
     rows, columns = box.shape
-    norm, size = _norm(distances, rows, columns), float(np.linalg.norm(shares))
+    norm, size = values.norm(box.shape), float(np.linalg.norm(shares))
     bits = np.floor(np.log2(0.9 * SURE / (each_loss(box) * norm * size)))
     count, places = float(np.count_nonzero(shares)), 4.0 * rows * columns
     more = np.log2(np.sqrt(places) * size / (norm * np.sqrt(count)))
@@ -144,23 +172,11 @@ def _bits(box: Box, distances: Distances, shares: Array) -> tuple[int, int]:
     return min(of_kernel, 22), int(bits) - min(of_kernel, 22)
 
 
-def _norm(distances: Distances, rows: int, columns: int) -> float:
-    """About the 2-norm of the kernel over all differences."""
-    one, both, two = (float(each) for each in distances.gram.sum(axis=0))
-    i, j = np.arange(-8, 9)[:, None], np.arange(-8, 9)
-    squares = one * i * i + both * i * j + two * j * j
-    squares[8, 8] = np.inf
-    near = float((1.0 / squares).sum())
-    area = math.sqrt(max(one * two - both * both / 4.0, 1e-300))
-    wide = max(rows, columns) / 8.0
-    return math.sqrt(near + 2.0 * math.pi / area * max(math.log(wide), 0.0) + 1.0)
-
-
-def _kernels(box: Box, distances: Distances, bits: int) -> tuple[Kernel, Kernel]:
-    """The whole part of 2^bits / r, and the rest."""
+def _kernels(box: Box, kernel: Values, bits: int) -> tuple[Kernel, Kernel]:
+    """The whole part of 2^bits g, and the rest."""
 
     def values(i: Indices, j: Indices) -> tuple[Array, Array]:
-        head, rest = distances.inverse(i, j)
+        head, rest = kernel.sliced(i, j)
         head *= 2.0**bits
         rest *= 2.0**bits
         whole = np.rint(head)

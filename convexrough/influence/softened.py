@@ -24,9 +24,6 @@ from convexrough.twofold import Twofold, exact_sum, whole
 #: heuristic: what is left out is part of the bound.
 CUT_SHARE = 0.1
 
-#: Places weighed at a time: what a cache holds.
-PLACES = 2**12
-
 
 @dataclass(frozen=True)
 class Softened:
@@ -71,10 +68,15 @@ class Softened:
     def roundoffs(self) -> float:
         """Roundoffs of one computed L, relative.
 
-        4 p + 4 for Horner's rule and its coefficients; t is off by 7 roundoffs at most, and L by as
-        many times its slope; a few for the power of the reach.
+        Term k of the series: 2 k + 1 by Horner's rule, one of its coefficient and k of t's own
+        rounding, k on average at most as at r = 0. Distances are squared and divided by a^2 within
+        7, which 1 - t is off by; that counts with (1 - t) / L times the slope of L by t at most.
         """
-        return 4.0 * self.order + 8.0 + 7.0 * self._slope
+        terms = _series(self.order, self.power)
+        mean = self._slope / float(terms.sum())
+        q = self.power
+        steepest = self._slope * (q / (2.0 * self._slope)) ** (2.0 / (q + 2))
+        return float(3.0 * mean + 4.0 + q + 7.0 * steepest)
 
     @property
     def beyond_roundoffs(self) -> float:
@@ -153,42 +155,45 @@ def lebesgue(order: int) -> float:
 
 
 def lagrange(places: Array, order: int) -> Array:
-    """(n, p) Lagrange's polynomials of the nodes 1 - p/2, ..., p/2 at places from 0 to 1.
-
-    In twofold numbers, to leave little more than the rounding of the weights themselves.
-    """
-    weights = np.empty((len(places), order))
-    for start in range(0, len(places), PLACES):
-        some = slice(start, start + PLACES)
-        weights[some] = _lagrange(places[some], order)
+    """(n, p) Lagrange's polynomials of the nodes 1 - p/2, ..., p/2 at places from 0 to 1."""
+    weights: Array = twofold_lagrange(places, order).high
     return weights
 
 
-def _lagrange(places: Array, order: int) -> Array:
+def twofold_lagrange(places: Array, order: int) -> Twofold:
+    """The same in twofold numbers."""
     nodes = range(1 - order // 2, order // 2 + 1)
     away = [Twofold(*exact_sum(places, -float(node))) for node in nodes]
     left, right = [whole(np.ones(len(places)))], [whole(np.ones(len(places)))]
     for k in range(order - 1):
         left.append(left[-1] * away[k])
         right.append(right[-1] * away[-1 - k])
-    weights = np.empty((len(places), order))
+    weights = Twofold(np.empty((len(places), order)), np.empty((len(places), order)))
     for k in range(order):
         size = (-1) ** (order - 1 - k) * math.factorial(k) * math.factorial(order - 1 - k)
         scale = Twofold.nearest(Fraction(1, size))
-        weights[:, k] = (left[k] * right[-1 - k] * scale).high
+        weights.high[:, k], weights.low[:, k] = left[k] * right[-1 - k] * scale
     return weights
 
 
-#: Bound on the relative error of each of them, in roundoffs of float64: that of the weight, and of
-#: at most 60 operations on twofold numbers.
+#: Bounds on the relative error of each of them: of at most 60 operations on twofold numbers and of
+#: a low part in single precision; and, in roundoffs, of float64 numbers alone.
+TWOFOLD_WEIGHT = 2.0**-76
 WEIGHT_ROUNDOFFS = 1.0 + 2.0**-40
 
 
 @cache
 def _series(order: int, power: int) -> Array:
-    """c_k of (1 - t)^(-q/2) = sum c_k t^k, up to k = p."""
-    k = np.arange(1, order + 1)
-    return np.concatenate(([1.0], np.cumprod((k - 1 + power / 2) / k)))
+    """c_k of (1 - t)^(-q/2) = sum c_k t^k, up to k = p, each rounded once."""
+    return np.array([float(term) for term in exact_series(order, power)])
+
+
+def exact_series(order: int, power: int) -> list[Fraction]:
+    """The same, exactly."""
+    terms = [Fraction(1)]
+    for k in range(1, order + 1):
+        terms.append(terms[-1] * (2 * k - 2 + power) / (2 * k))
+    return terms
 
 
 @cache

@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from point_layouts import COUNT, LAYOUTS, clustered, disc, jittered
 
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
@@ -21,49 +22,6 @@ from convexrough.influence.softened import (
 from convexrough.influence.splitting import Splitting
 
 SCALE = 0.37
-COUNT = 4000
-
-
-def _disc(rng: np.random.Generator, count: int = COUNT) -> np.ndarray:
-    angle, radius = rng.uniform(0, 2 * np.pi, count), np.sqrt(rng.random(count))
-    return np.stack((radius * np.cos(angle), radius * np.sin(angle)), axis=1)
-
-
-def _clustered(rng: np.random.Generator) -> np.ndarray:
-    centres = rng.uniform(-1, 1, (20, 2))
-    sizes = 10.0 ** rng.uniform(-3, -1, 20)
-    which = rng.integers(0, 20, COUNT)
-    return centres[which] + sizes[which, None] * rng.standard_normal((COUNT, 2))
-
-
-def _two(rng: np.random.Generator) -> np.ndarray:
-    return np.concatenate(
-        (_disc(rng, COUNT // 2), _disc(rng, COUNT // 2) + np.array([300.0, 40.0]))
-    )
-
-
-def _line(rng: np.random.Generator) -> np.ndarray:
-    return np.stack((rng.uniform(-1, 1, COUNT), np.zeros(COUNT)), axis=1)
-
-
-def _jittered(rng: np.random.Generator) -> np.ndarray:
-    sites = np.stack(np.meshgrid(np.arange(63.0), np.arange(63.0)), axis=-1).reshape(-1, 2)
-    return (sites + rng.uniform(-0.3, 0.3, sites.shape)) * 1e-4
-
-
-def _coincident(rng: np.random.Generator) -> np.ndarray:
-    points = _disc(rng, COUNT // 2)
-    return np.concatenate((points, points + 10.0 ** rng.uniform(-12, -6, points.shape)))
-
-
-LAYOUTS = {
-    "disc": _disc,
-    "clustered": _clustered,
-    "two": _two,
-    "line": _line,
-    "jittered": _jittered,
-    "coincident": _coincident,
-}
 
 
 def exact(points: np.ndarray, others: np.ndarray, values: np.ndarray, power: int = 1) -> np.ndarray:
@@ -107,7 +65,7 @@ def test_product_and_its_bound(layout: str) -> None:
 def test_interpolation_is_within_its_bound(tolerance: float) -> None:
     """Coarse enough that interpolation is all of the error."""
     rng = np.random.default_rng(2)
-    points = _disc(rng)
+    points = disc(rng)
     splitting = Splitting.choose(points, 1, tolerance)
     assert splitting.meshed
     product = Product.assemble(points, splitting, np.float64)
@@ -269,7 +227,7 @@ def test_falloff(layout: str, power: int) -> None:
 
 def test_among_and_onto() -> None:
     rng = np.random.default_rng(6)
-    points = _disc(rng)
+    points = disc(rng)
     operator = ScatteredInfluence(points, SCALE)
     which = np.flatnonzero(points[:, 0] > 0.1)
     loads = rng.random(len(which))
@@ -313,7 +271,7 @@ def test_the_most_crowded_pair_is_not_one_of_nearest_neighbours() -> None:
 
 def test_point_error_is_counted() -> None:
     rng = np.random.default_rng(8)
-    points = _jittered(rng)
+    points = jittered(rng)
     blur = 1e-13
     moved = points + rng.choice([-blur, blur], points.shape)
     operator = ScatteredInfluence(points, SCALE, blur)
@@ -350,7 +308,7 @@ def test_few_points(count: int) -> None:
 
 def test_bounds_on_what_is_near() -> None:
     rng = np.random.default_rng(9)
-    points, strengths = _clustered(rng), rng.random(COUNT)
+    points, strengths = clustered(rng), rng.random(COUNT)
     for distance in (0.001, 0.1, 10.0):
         with np.errstate(divide="ignore"):
             near = inverse_distances(points, points) > 1 / distance
@@ -364,7 +322,7 @@ def test_bounds_on_what_is_near() -> None:
 def contact() -> tuple[ScatteredInfluence, np.ndarray]:
     """Jittered asperities; W of a Hertzian contact in the middle, at 0.45 of the convex range."""
     rng = np.random.default_rng(10)
-    points = _jittered(rng) - 31 * 1e-4
+    points = jittered(rng) - 31 * 1e-4
     operator = ScatteredInfluence(points, SCALE)
     inside = np.maximum(1 - (points**2).sum(axis=1) / 0.0025**2, 0.0)
     theta = 0.45 * np.sqrt(inside) * rng.uniform(0.5, 1.0, len(points))

@@ -50,7 +50,7 @@ def test_values_of_the_kernel(name: str, size: str, largest: int) -> None:
     rng = np.random.default_rng(largest)
     i, j = rng.integers(0, largest, 12), rng.integers(-largest + 1, largest, 12)
     i[0] = j[0] = 0
-    head, rest = distances.inverse(i, j)
+    head, rest = distances.sliced(i, j)
     with ctx.workprec(200):
         for m, n in np.ndindex(head.shape):
             value = arb(head[m, n]) + arb(rest[m, n])
@@ -86,7 +86,7 @@ def test_the_whole_part_is_exact(
     first, second, computed, norm = kept[0]
     kernel_bits, _ = sliced._bits(box, distances, loads / 2.0 ** np.ceil(np.log2(loads.max())))
     i, j = np.arange(-shape[0] + 1, shape[0]), np.arange(-shape[1] + 1, shape[1])
-    head, _ = distances.inverse(np.abs(i), j)  # the kernel is even
+    head, _ = distances.sliced(np.abs(i), j)  # the kernel is even
     head = np.where(i[:, None] < 0, head[:, ::-1], head)
     whole = np.rint(head * 2.0**kernel_bits)
     assert norm == pytest.approx(float(np.linalg.norm(whole)), rel=1e-12)

@@ -1,0 +1,383 @@
+"""Sharp sums on a mesh against exact fractions and ball arithmetic: each step, and all together."""
+
+from fractions import Fraction
+from math import ceil, floor, log2
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+from numpy.typing import NDArray
+from point_layouts import LAYOUTS, clustered, disc, jittered
+
+import convexrough as cr
+from convexrough.bench.scenes import APPROACH, scene
+from convexrough.influence import sharp_sums as sharp
+from convexrough.influence.convolution import Box
+from convexrough.influence.coupling import Sums
+from convexrough.influence.near_pairs import Order
+from convexrough.influence.pair_sums import Product
+from convexrough.influence.scattered import ScatteredInfluence
+from convexrough.influence.sliced import Distances, sliced_sums
+from convexrough.influence.softened import Softened, exact_series
+from convexrough.influence.splitting import Splitting
+from convexrough.normal.certificate import judge
+from convexrough.normal.problem import NormalProblem
+from convexrough.normal.residual import fit
+from convexrough.roundoff import ROUNDOFF
+from convexrough.solvers import Newton
+
+Array = NDArray[np.float64]
+
+#: Layouts where near pairs are a small part of all.
+EVEN = ("disc", "jittered")
+
+SPACING = 0.0371
+KERNELS = {order: Softened(1, order, 0.43) for order in (4, 12, 26)}
+
+
+def assembled(order: int, points: Array) -> Product:
+    return Product.assemble(points, Splitting(KERNELS[order], SPACING, 5), np.float64)
+
+
+def soft(kernel: Softened, squares: Fraction) -> arb:
+    """L, at working precision."""
+    t = 1 - squares / Fraction(kernel.reach) ** 2
+    a = arb(kernel.reach)
+    if t <= 0:
+        return 1 / ball(squares).sqrt() ** kernel.power
+    terms = exact_series(kernel.order, kernel.power)
+    return ball(sum((c * t**k for k, c in enumerate(terms)), Fraction(0))) / a**kernel.power
+
+
+def ball(x: Fraction) -> arb:
+    return arb(x.numerator) / arb(x.denominator)
+
+
+def exact(points: Array, loads: Array, row: int) -> arb:
+    """sum_j P_j / r_ij."""
+    x, y = (arb(float(each)) for each in points[row])
+    total = arb(0)
+    for k in np.flatnonzero(loads):
+        if k != row:
+            u, v = x - arb(float(points[k, 0])), y - arb(float(points[k, 1]))
+            total += arb(float(loads[k])) / (u * u + v * v).sqrt()
+    return total
+
+
+def value(found: Sums, row: int) -> arb:
+    return (arb(float(found.whole[row])) + arb(float(found.rest[row]))) * arb(found.unit)
+
+
+def weight(place: float, node: int, order: int) -> Fraction:
+    result = Fraction(1)
+    for other in range(1 - order // 2, order // 2 + 1):
+        if other != node:
+            result *= (Fraction(place) - other) / (node - other)
+    return result
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+@pytest.mark.parametrize("order", [4, 12, 26])
+def test_roundoffs_of_the_smooth_part(order: int, power: int) -> None:
+    """Of squares that are off by 4 roundoffs themselves; and of what is left to near pairs."""
+    kernel = Softened(power, order, 0.43)
+    rng = np.random.default_rng(order)
+    squares = (0.43 * np.append(rng.random(150), [1e-9, 0.1, 0.999])) ** 2
+    worst = 0.0
+    with ctx.workprec(300):
+        for off in (-4, 0, 4):
+            moved = squares * (1 + off * ROUNDOFF)
+            smooth, local = kernel.smooth(moved), kernel.local(moved)
+            for s, m, n in zip(squares.tolist(), smooth.tolist(), local.tolist(), strict=True):
+                true, plain = soft(kernel, Fraction(s)), 1 / arb(s).sqrt() ** power
+                roundoffs = abs(arb(m) - true) / (true * ROUNDOFF)
+                assert roundoffs <= kernel.roundoffs
+                worst = max(worst, float(roundoffs.mid()))
+                allowed = kernel.beyond_roundoffs + kernel.roundoffs + 8
+                assert abs(arb(n) - (plain - true)) <= allowed * ROUNDOFF * plain
+    assert power > 1 or worst > 0.1 * kernel.roundoffs
+
+
+@pytest.mark.parametrize("order", [4, 12, 26])
+def test_terms_of_the_series_are_rounded_once(order: int) -> None:
+    from convexrough.influence.softened import _series
+
+    for power in (1, 2, 3):
+        terms = _series(order, power)
+        for k, (term, true) in enumerate(zip(terms, exact_series(order, power), strict=True)):
+            assert abs(Fraction(float(term)) - true) <= true / 2**53
+            assert power != 2 or true == 1
+            assert power != 3 or true == (2 * k + 1) * exact_series(order, 1)[k]
+
+
+@pytest.mark.parametrize("order", [4, 26])
+def test_how_far_the_smooth_part_moves(order: int) -> None:
+    kernel, shift = Softened(1, order, 0.43), 1e-9
+    r = np.linspace(0.003, 1.0, 500)
+    with ctx.workprec(200):
+        moved = [
+            float(((soft(kernel, Fraction(x)) - soft(kernel, Fraction(y))) * z).mid())
+            for x, y, z in zip(r**2, (r + shift) ** 2, r, strict=True)
+        ]
+    assert max(moved) <= kernel.moved(shift) * (1 + 1e-6)
+    assert max(moved) >= 0.3 * kernel.moved(shift)
+
+
+def test_places_in_cells_are_rounded_once() -> None:
+    rng = np.random.default_rng(0)
+    spacing = 0.1
+    edges = spacing * rng.integers(0, 900, 200)
+    edges = np.concatenate((edges, np.nextafter(edges, np.inf), np.nextafter(edges, -np.inf)))
+    x = np.concatenate((rng.uniform(-3, 90, 400), edges)) + 1e-3
+    points = np.stack((x, rng.permutation(x)), axis=1)
+    order = Order.of(points, Splitting(Softened(1, 8, 1.0), spacing, 6))
+    assert ((order.shares >= 0) & (order.shares <= 1)).all()
+    low = [Fraction(float(each)) for each in points.min(axis=0)]
+    for point, cell, share in zip(order.points, order.cells, order.shares, strict=True):
+        for k in (0, 1):
+            away = (Fraction(float(point[k])) - low[k]) / Fraction(spacing)
+            off = abs(int(cell[k]) + Fraction(float(share[k])) - away)
+            assert off <= Fraction(1001, 1000) / 2**54
+
+
+@pytest.mark.parametrize("order", [4, 12, 26])
+def test_values_within_the_reach_and_beyond(order: int) -> None:
+    product = assembled(order, disc(np.random.default_rng(1), 60))
+    unit = 2.0 ** floor(log2(SPACING))
+    values = sharp.SoftValues.of(product, unit)
+    assert len(values.heads) == ceil((0.43 / SPACING) ** 2)
+    i, j = np.arange(0, 20), np.arange(-14, 15)
+    head, rest = values.sliced(i, j)
+    assert (head == head.astype(np.float32)).all()
+    with ctx.workprec(300):
+        for m, n in np.ndindex(head.shape):
+            squares = Fraction(SPACING) ** 2 * int(i[m] ** 2 + j[n] ** 2)
+            true = soft(KERNELS[order], squares) * arb(unit)
+            off = abs(arb(head[m, n]) + arb(rest[m, n]) - true)
+            assert off <= arb(2.0**-70) * true
+    near = (i[:, None] * SPACING) ** 2 + (j * SPACING) ** 2 < 0.43**2
+    assert near.any()
+    assert not near.all()
+    assert float(np.abs(head).max()) < 1
+
+
+def test_sums_of_loads_known_to_more_than_a_roundoff() -> None:
+    """The rest of the loads counts."""
+    basis = np.array([[1.0, 0.0], [0.5, 0.8660254037844386]])
+    rng = np.random.default_rng(5)
+    loads = rng.random((11, 13))
+    rest = loads * rng.uniform(-1, 1, loads.shape) * 2.0**-54
+    distances = Distances.of(basis, 0.5, 13)
+    found = sliced_sums(Box((11, 13), basis), distances, 0.5, loads, rest)
+    assert found is not None
+    with ctx.workprec(200):
+        true = known = arb(0)
+        for (m, n), load in np.ndenumerate(loads):
+            if (m, n) != (5, 6):
+                i, j = 5 - m, 6 - n
+                x, y = (i * arb(basis[0, k]) + j * arb(basis[1, k]) for k in (0, 1))
+                inverse = 1 / (x * x + y * y).sqrt()
+                known += arb(load) * inverse
+                true += (arb(load) + arb(float(rest[m, n]))) * inverse
+        computed = (arb(found.whole[5, 6]) + arb(found.rest[5, 6])) * arb(found.unit)
+        assert abs(computed - true) <= arb(found.error) * arb(found.unit)
+        assert abs(computed - known) > arb(found.error) * arb(found.unit)
+
+
+def scattered_loads(rng: np.random.Generator, count: int) -> Array:
+    return np.asarray(rng.choice([-1.0, 1.0], count) * rng.random(count) ** 3)
+
+
+@pytest.mark.parametrize("order", [4, 12, 26])
+@pytest.mark.parametrize("crowded", [False, True])
+def test_loads_on_nodes(order: int, crowded: bool) -> None:
+    """Against exact weights: so well that a weight known to a roundoff alone would not do."""
+    rng = np.random.default_rng(order)
+    points = disc(rng, 300) * (0.05 if crowded else 0.4)
+    points[0] = 0.7, 0.6
+    product, loads = assembled(order, points), scattered_loads(rng, 300)
+    weights, placed = product.weights, product.order
+    assert weights is not None
+    lows = sharp._low_weights(product)
+    field, error = sharp._to_nodes(product, lows, loads[placed.places])
+    plain = weights.to_nodes(loads[placed.places])
+    assert field.high.shape == weights.shape
+    missed = 0
+    heavy = np.stack(np.unravel_index(np.argsort(-np.abs(plain), axis=None)[:200], plain.shape))
+    for a, b in rng.permutation(heavy.T)[:15].tolist():
+        true = total = Fraction(0)
+        # A stencil begins at its cell, as nodes are counted from 1 - p/2.
+        nodes = np.stack((a - placed.cells[:, 0], b - placed.cells[:, 1]), axis=1)
+        for k in np.flatnonzero(((nodes >= 0) & (nodes < order)).all(axis=1)):
+            x, y = (
+                weight(float(placed.shares[k, c]), int(nodes[k, c]) + 1 - order // 2, order)
+                for c in (0, 1)
+            )
+            part = Fraction(float(loads[placed.places[k]])) * x * y
+            true, total = true + part, total + abs(part)
+        found = Fraction(float(field.high[a, b])) + Fraction(float(field.low[a, b]))
+        assert abs(found - true) <= min(error, 1e-19 * total + 1e-20)
+        missed += abs(Fraction(float(plain[a, b])) - true) > 1e-19 * total + 1e-20
+    assert missed > 2
+    alone = np.bincount(np.unique(placed.cells // 5, axis=0, return_inverse=True)[1])
+    assert sharp._met(product) >= 4 * alone.max()
+
+
+@pytest.mark.parametrize("order", [4, 12, 26])
+def test_values_at_points(order: int) -> None:
+    rng = np.random.default_rng(order)
+    product = assembled(order, disc(rng, 200))
+    weights, placed = product.weights, product.order
+    assert weights is not None
+    whole = np.rint(rng.uniform(-1, 1, weights.shape) * 2.0**43)
+    rest = rng.uniform(-1, 1, weights.shape) * 2.0**20
+    on_mesh = Sums(whole, rest, 2.0**-40, 0.0, 0.0)
+    lows = sharp._low_weights(product)
+    exactly, left, unit, rounding = sharp._from_nodes(product, lows, on_mesh)
+    assert (exactly == np.rint(exactly)).all()
+    plain = weights.from_nodes(whole + rest) * 2.0**-40
+    missed = 0
+    for k in range(0, 200, 8):
+        true = Fraction(0)
+        factors = [
+            [weight(float(placed.shares[k, c]), n + 1 - order // 2, order) for n in range(order)]
+            for c in (0, 1)
+        ]
+        i, j = placed.cells[k].tolist()
+        for m, x in enumerate(factors[0]):
+            line = sum(
+                (
+                    y * (Fraction(whole[i + m, j + n]) + Fraction(rest[i + m, j + n]))
+                    for n, y in enumerate(factors[1])
+                ),
+                Fraction(0),
+            )
+            true += x * line
+        true /= 2**40
+        found = (Fraction(float(exactly[k])) + Fraction(float(left[k]))) * Fraction(unit)
+        assert abs(found - true) <= Fraction(rounding) * Fraction(unit)
+        missed += abs(Fraction(float(plain[k])) - true) > Fraction(rounding) * Fraction(unit)
+    assert missed > 5
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("kind", ["smooth", "rough", "few"])
+def test_sharp_sums_against_ball_arithmetic(layout: str, kind: str) -> None:
+    rng = np.random.default_rng(3)
+    points = LAYOUTS[layout](rng)
+    loads = rng.random(len(points))
+    if kind == "rough":
+        loads = rng.standard_normal(len(points)) * 1e-7
+    elif kind == "few":
+        loads = np.where(rng.random(len(points)) < 0.01, 1e5 * loads, 0.0)
+    operator = ScatteredInfluence(points, 0.37)
+    found = operator.sums(loads)
+    assert found is not None
+    assert (found.whole == np.rint(found.whole)).all()
+    sizes = operator.apply(np.abs(loads)) / 0.37
+    with ctx.workprec(200):
+        for row in rng.integers(0, len(points), 8).tolist():
+            off = abs(value(found, row) - exact(points, loads, row))
+            assert off <= arb(found.error) * arb(found.unit)
+            if layout in EVEN:
+                assert float(off.mid()) <= 1e-16 * sizes.max()
+    if layout in EVEN:
+        plain = operator.rounding(loads).of(0.37 * sizes).max()
+        assert found.error * found.unit * 0.37 < 0.1 * plain
+    assert found.norm >= found.error
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
+def test_interpolation_counts(tolerance: float) -> None:
+    """Where it is all of the error."""
+    rng = np.random.default_rng(6)
+    points = disc(rng)
+    operator = ScatteredInfluence(points, 1.0, tolerance=tolerance)
+    loads = rng.random(len(points))
+    found = operator.sums(loads)
+    assert found is not None
+    worst = 0.0
+    with ctx.workprec(200):
+        for row in range(0, 4000, 400):
+            off = float(abs(value(found, row) - exact(points, loads, row)).mid())
+            worst = max(worst, off)
+    assert 1e-4 * found.error * found.unit < worst <= found.error * found.unit
+
+
+def test_near_pairs_count_beside_their_own_sum() -> None:
+    """Two points very near: their pair is all of the error, and nothing else is allowed for it."""
+    rng = np.random.default_rng(7)
+    points = disc(rng)
+    points[1::2] = points[::2] + rng.uniform(1, 2, (2000, 2)) * 1e-9
+    operator = ScatteredInfluence(points, 1.0)
+    loads = rng.random(len(points))
+    found = operator.sums(loads)
+    assert found is not None
+    product = operator._double
+    others = float(product.interpolation(loads).max())
+    worst = 0.0
+    with ctx.workprec(200):
+        for row in range(0, 4000, 100):
+            off = abs(value(found, row) - exact(points, loads, row))
+            worst = max(worst, float(off.mid()))
+    assert 10 * others < worst <= found.error * found.unit
+
+
+def test_points_that_are_not_known() -> None:
+    rng = np.random.default_rng(8)
+    points, blur = jittered(rng), 1e-13
+    moved = points + rng.choice([-blur, blur], points.shape)
+    loads = rng.random(len(points))
+    found = ScatteredInfluence(points, 1.0, blur).sums(loads)
+    exactly = ScatteredInfluence(points, 1.0).sums(loads)
+    assert found is not None
+    assert exactly is not None
+    with ctx.workprec(200):
+        offs = [abs(value(found, row) - exact(moved, loads, row)) for row in range(0, 3900, 300)]
+    worst = max(float(off.mid()) for off in offs)
+    assert exactly.error * exactly.unit < worst <= found.error * found.unit
+
+
+def test_where_there_is_no_mesh() -> None:
+    points = clustered(np.random.default_rng(9))
+    assert ScatteredInfluence(points[:40], 1.0).sums(np.ones(40)) is None
+    assert ScatteredInfluence(points, 1.0).sums(np.zeros(len(points))) is None
+    assert ScatteredInfluence(points[:0], 1.0).sums(np.zeros(0)) is None
+
+
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
+    """Gaps of a press in ball arithmetic; loads are then proved to eleven digits."""
+    made = scene("scattered", 10.0)
+    given = cr.Scene(1.0, made.asperities, made.material, friction=0.5, geometry=geometry)
+    problem = NormalProblem.assemble(given, approach=APPROACH)
+    assert problem.influence.name == "scattered"
+    loads = Newton().solve(problem).loads
+    found = fit(problem, loads)
+    force, length = arb(problem.units.force), arb(problem.units.length)
+    touching = np.flatnonzero(loads)
+    tip = float(given.asperities.tip_radii[0])
+    with ctx.workprec(200):
+        R, rho = arb(1.0), arb(tip)
+        modulus = arb(float(given.material.contact_modulus))
+        factor = R / (R + rho) if geometry == "closest" else arb(1)
+        further = rho if geometry == "closest" else arb(0)
+        k = (9 * (1 / R + 1 / rho) / (16 * modulus**2)).root(3)
+        positions = [[arb(float(c)) for c in p] for p in given.asperities.positions]
+        for m in range(3, len(problem), len(problem) // 12):
+            x, y = positions[problem.candidates[m]]
+            gap = (x * x + y * y) / (2 * (R + further)) - arb(APPROACH)
+            if loads[m] > 0:
+                gap += k * (arb(float(loads[m])) * force).root(3) ** 2
+            for n in touching.tolist():
+                if n != m:
+                    u, v = positions[problem.candidates[n]]
+                    r = factor * ((x - u) ** 2 + (y - v) ** 2).sqrt()
+                    gap += arb(float(loads[n])) * force / (arb.pi() * modulus * r)
+            off = abs(gap / length - arb(float(found.gap[m])))
+            assert off <= arb(float(found.rounding[m])) + arb(found.component)
+    assert found.component < 2e-14 * problem.approach
+    certificate = judge(problem, problem.to_scene(loads) * problem.units.force)
+    assert certificate.scope == "local"
+    assert certificate.load_error < 1e-11 * loads.max() * problem.units.force
