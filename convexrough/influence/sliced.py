@@ -124,12 +124,12 @@ def sliced_sums(box: Box, distances: Distances, spacing: float, loads: Array) ->
     return Sums(np.rint(exact), remaining, unit, 1.01 * error, 1.01 * error * count)
 
 
-def each_loss(box: Box) -> float:
+def each_loss(box: Box, roundoff: float = ROUNDOFF) -> float:
     """Of a component of a product, over both 2-norms: (2) of docs/theory/operators-lattice.md.
 
     8 roundoffs instead of 4, as two products are added up before the inverse transform.
     """
-    return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 8.0)
+    return 1.01 * roundoff * ((2.0 + math.sqrt(2.0)) * box.loss + 8.0)
 
 
 def _bits(box: Box, distances: Distances, shares: Array) -> tuple[int, int]:
