@@ -223,7 +223,7 @@ def _contact(
     radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
     if announce is not None:
         announce("certifying")
-    certificate = judge(problem, loads)
+    certificate = judge(problem, loads, solution.displaced)
     if not abs(solution.approach * length - certificate.approach) <= certificate.approach_error:
         solution = replace(solution, approach=certificate.approach / length)
     model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])

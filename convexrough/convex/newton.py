@@ -104,11 +104,14 @@ class Stopping:
     accurate  : residual, over its scale, that every answer must reach unless it is asked for less
     tolerance : residual, over its scale, at which it ends at once; 0 asks for all float64 can do
     most      : steps, at most
+    linear    : 2-norm of a defect that is as good as none: it also ends where another step is
+        expected to leave no more, because what is left of the law is linear; 0 for not
     """
 
     accurate: float
     tolerance: float
     most: int
+    linear: float = 0.0
 
 
 def solve(
@@ -136,7 +139,10 @@ def solve(
         done = state.residual <= max(stopping.tolerance * state.scale, 0.0)
         if done or (accurate and size <= noise):
             return state, step - 1
-        forcing = min(MOST_LEFT, (size / before) ** 2) if 0 < before < np.inf else MOST_LEFT
+        expected = (size / before) ** 2 if 0 < before < np.inf else 1.0
+        if expected * size <= stopping.linear:
+            return state, step - 1
+        forcing = min(MOST_LEFT, expected)
         enough = max(noise / size, stopping.tolerance * state.scale / state.residual)
         direction = law.direction(state, max(forcing, OVERSOLVED * enough))
         following = descend(law, state, direction)

@@ -31,12 +31,13 @@ class Rounding(NamedTuple):
     """How far a computed product A P can be from the true one, for loads of either sign.
 
     Component i is off by at most  relative * (A |P|)_i + r_i,  |r_i| <= each,  ||r||_2 <= norm:
-    eta, rho_inf and rho_2 of docs/theory/operators.md.
+    eta, rho_inf and rho_2 of docs/theory/operators.md. And (A |P|)_i <= most.
     """
 
     relative: float
     norm: float
     each: float = np.inf
+    most: float = np.inf
 
     def of(self, displacement: Array) -> Array:
         """A bound for each component; `displacement` is A |P| as computed."""
@@ -105,6 +106,7 @@ class Influence(Coupling, Protocol):
     points : (n, 2) [length];  scale : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
     at_hand : the matrix is stored, so that to use it, or a part of it, costs nothing
     prefers_single : products of float32 loads are cheaper than those of float64 loads
+    sharp : `sums` are known, as a rule
     """
 
     @property
@@ -117,6 +119,8 @@ class Influence(Coupling, Protocol):
     def at_hand(self) -> bool: ...
     @property
     def prefers_single(self) -> bool: ...
+    @property
+    def sharp(self) -> bool: ...
 
     @property
     def matrix(self) -> Array:

@@ -80,6 +80,7 @@ class DenseInfluence:
     name: ClassVar[Kind] = "dense"
     at_hand: ClassVar[bool] = True
     prefers_single: ClassVar[bool] = False
+    sharp: ClassVar[bool] = False
 
     @classmethod
     def assemble(cls, points: Array, scale: float, point_error: float = 0.0) -> DenseInfluence:

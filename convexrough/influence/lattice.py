@@ -17,20 +17,19 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import threads
 from convexrough.arrays import Array, Indices, even
 from convexrough.influence.convolution import Box, Kernel, neighbours
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, Sums, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
 from convexrough.influence.lattice_symbol import least_symbol
+from convexrough.influence.off_sites import first_order, off_sites
 from convexrough.influence.packing import largest, lattice_packing, point_packing
 from convexrough.influence.sliced import Distances, sliced_sums
 from convexrough.influence.slopes import Spectra, odd_spectra
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import crowding, separations
-from convexrough.twofold import exact_product, exact_sum
 
 #: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
 ENTRY_ROUNDOFFS = 24
@@ -76,7 +75,8 @@ class LatticeCoupling:
         norm = self.box.bound(kernel, ROUNDOFF) * size + off * size
         each = self.box.bound_each(kernel, ROUNDOFF) * size + off * largest
         relative = 1.01 * ENTRY_ROUNDOFFS * ROUNDOFF
-        return Rounding(relative, self._unit * norm, self._unit * each)
+        most = 1.01 * kernel.norm / self._least * size  # by Cauchy's inequality
+        return Rounding(relative, self._unit * norm, self._unit * each, self._unit * most)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         """In single precision, with a bound on its rounding added."""
@@ -151,6 +151,7 @@ class LatticeInfluence(LatticeCoupling):
     name: ClassVar[Kind] = "lattice"
     at_hand: ClassVar[bool] = False
     prefers_single: ClassVar[bool] = True
+    sharp: ClassVar[bool] = True
 
     @classmethod
     def assemble(
@@ -273,36 +274,36 @@ class LatticeInfluence(LatticeCoupling):
         found = sliced_sums(self.box, distances, unit, field)
         if found is None:
             return None
-        largest, kernel = float(np.abs(loads).max(initial=0.0)), self._kernel
-        moved = 2.0 * (self._off + math.sqrt(2.0) * self.point_error)
-        # As in `rounding`, with what is known of these points.
-        off = 1.01 * moved / self.spacing**2 / self._least * kernel.norm**2 / found.unit
-        error = found.error + off * largest
-        norm = found.error * math.sqrt(len(self)) + off * float(np.linalg.norm(loads))
+        off, error = self._off_sites(loads, found.error * found.unit)
         at = self.sources
-        return Sums(found.whole.ravel()[at], found.rest.ravel()[at], found.unit, error, norm)
+        rest = found.rest.ravel()[at] + off / found.unit
+        more = error / found.unit + 2 * ROUNDOFF * float(np.abs(rest).max(initial=0.0))
+        bounds = found.error + more, found.norm + more * math.sqrt(len(self))
+        return Sums(found.whole.ravel()[at], rest, found.unit, *bounds)
+
+    def _off_sites(self, loads: Array, little: float) -> tuple[Array, float]:
+        """What points off their sites change in sum_j P_j / r_ij, and a bound on each one's error.
+
+        little : [force / length] an error that does not matter
+        """
+        x, y, rounded = self._away
+        furthest = float(np.hypot(x, y).max(initial=0.0)) * (1 + 1e-9)
+        top, spacing = float(np.abs(loads).max(initial=0.0)), self.spacing * self._least
+        # By |P| at most, |r| times 1 / r^2 and for the second order 1 / r^3, as in `rounding`.
+        each = top / spacing**2 * self._kernel.norm**2
+        unknown = 2.0 * (rounded + math.sqrt(2.0) * self.point_error) * each
+        if 2.0 * furthest * each <= little:
+            return np.zeros(len(self)), 1.01 * (unknown + 2.0 * furthest * each)
+        units = top / self.spacing**2 * furthest
+        change, error = first_order(
+            self.box, self.sources, loads / top, (x / furthest, y / furthest)
+        )
+        second = (2.0 * furthest) ** 2 / spacing * each
+        return change * units, 1.01 * (unknown + error * units + 1.01 * second)
 
     @cached_property
-    def _off(self) -> float:
-        """[length] bound on how far points are from their sites, but for a common shift."""
-        found: list[float] = []
-
-        def look(some: slice) -> None:
-            points, places = self.array[self.members[some]], self.places[some]
-            away = [self._away(k, points[:, k], places) for k in (0, 1)]
-            found.append(float(np.hypot(*away).max()))
-
-        threads.each(look, threads.chunks(len(self), CHUNK), threads.worthwhile(len(self)))
-        return max(found, default=0.0) * (1 + 1e-9)
-
-    def _away(self, k: int, coordinates: Array, places: Sites) -> Array:
-        """x - o - i b1 - j b2: sums and products are exact, but for what is left of them."""
-        high, low = exact_sum(coordinates, -self.lattice.origin[k])
-        for n in (0, 1):
-            step, rest = exact_product(places[:, n].astype(np.float64), self.lattice.basis[n, k])
-            high, off = exact_sum(high, -step)
-            low = low + (off - rest)
-        return np.asarray(high + low)
+    def _away(self) -> tuple[Array, Array, float]:
+        return off_sites(self.lattice, self.array, self.members, self.places)
 
     def smoother(self, root: Array) -> Smoother:
         box = self.box

@@ -52,6 +52,7 @@ class ScatteredInfluence:
     name: ClassVar[Kind] = "scattered"
     at_hand: ClassVar[bool] = False
     prefers_single: ClassVar[bool] = True
+    sharp: ClassVar[bool] = False
 
     def __len__(self) -> int:
         return len(self.points)

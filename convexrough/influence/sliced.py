@@ -152,13 +152,13 @@ def sliced_sums(
     return Sums(np.rint(exact), remaining, unit, 1.01 * error, 1.01 * error * count)
 
 
-def each_loss(box: Box) -> float:
+def each_loss(box: Box, roundoff: float = ROUNDOFF) -> float:
     """Of a component of a product, over both 2-norms: (2) of docs/theory/operators-lattice.md.
 
     9 roundoffs instead of 4, as two products are added up before the inverse transform, and loads
     that are known better than to a roundoff have a rest to be added.
     """
-    return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 9.0)
+    return 1.01 * roundoff * ((2.0 + math.sqrt(2.0)) * box.loss + 9.0)
 
 
 def _bits(box: Box, values: Values, shares: Array) -> tuple[int, int]:

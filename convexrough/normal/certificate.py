@@ -19,6 +19,7 @@ from convexrough.influence import Kind, couple
 from convexrough.normal.boxes import Scope
 from convexrough.normal.judgement import Judgement
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.residual import Displaced
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
@@ -146,11 +147,17 @@ def certify(
     return judge(problem, values)
 
 
-def judge(problem: NormalProblem, scene_loads: Array) -> Certificate:
-    """`certify` for a problem already assembled; loads (n,) [force] of the whole scene."""
+def judge(
+    problem: NormalProblem, scene_loads: Array, nearby: Displaced | None = None
+) -> Certificate:
+    """`certify` for a problem already assembled; loads (n,) [force] of the whole scene.
+
+    nearby : loads (of the candidates, in the problem's units) near these, of which A P is known to
+        many digits: this saves work where they are of this problem, and proves the same
+    """
     length, force = problem.units.length, problem.units.force
     given = scene_loads[problem.candidates]
-    found = Judgement.of(problem, given / force)
+    found = Judgement.of(problem, given / force, nearby)
     # The screened asperities carry nothing: a load there is off by all of it.
     load_errors = scene_loads if found.scope != "none" else np.full(len(scene_loads), np.inf)
     load_errors = load_errors.copy()

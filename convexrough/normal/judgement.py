@@ -34,7 +34,7 @@ from convexrough.normal.bounds import Ball, Bounds, ball_of, bounds_of, reach
 from convexrough.normal.boxes import Box, Scope, box_of_touching, crowded, lowest_ceiling, tried
 from convexrough.normal.prescribed_load import riding_weights
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.residual import SUM_ROUNDOFFS, Fit, fit, scaled_to
+from convexrough.normal.residual import SUM_ROUNDOFFS, Displaced, Fit, fit, scaled_to
 from convexrough.normal.rivals import NO_RIVALS, UNKNOWN, Rivals
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.sphere import hertz
@@ -70,13 +70,13 @@ class Judgement(NamedTuple):
     obstacle: Obstacle
 
     @classmethod
-    def of(cls, problem: NormalProblem, given: Array) -> Judgement:
-        """Of loads (n,) of the candidates, not negative."""
+    def of(cls, problem: NormalProblem, given: Array, nearby: Displaced | None = None) -> Judgement:
+        """Of loads (n,) of the candidates, not negative; `nearby` as `fit` takes it."""
         loads, weights = given, None
         if problem.load is not None:
             loads = scaled_to(problem.load, given)
             weights = riding_weights(problem, loads)
-        found = fit(problem, loads, weights)
+        found = fit(problem, loads, weights, nearby)
         screened = _screened(problem, loads, found.approach)
         indentation = problem.to_scene(found.indentation)
         indentation[screened.which] = screened.indentation

@@ -5,6 +5,8 @@ docs/theory/certificate.md, "A bound on the loads" and "Rounding".
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -13,8 +15,9 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.errors import InputError
-from convexrough.influence.coupling import Sums
+from convexrough.influence.coupling import Influence
 from convexrough.normal.problem import NormalProblem
+from convexrough.record import Record
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.sphere import hertz
 from convexrough.twofold import TWOFOLD_ROUNDOFF, Twofold, exact_sum, whole
@@ -47,24 +50,101 @@ class Fit(NamedTuple):
         return self._replace(residual=np.where(which, self.residual, 0.0))
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Displaced(Record):
+    """Loads, and A times them to many more digits than a product has: from nothing but both.
+
+    docs/theory/last-step.md, "Loads nearby"
+
+    loads   : (n,);  product : A P
+    error   : bound on the error of each component, beside the rounding of twofold numbers
+    norm    : bound on the 2-norm of these errors
+    """
+
+    influence: Influence
+    loads: Array
+    product: Twofold
+    error: float
+    norm: float
+
+    @classmethod
+    def of(cls, problem: NormalProblem, loads: Array) -> Displaced | None:
+        """None where products are known to a product's digits only."""
+        sums = problem.influence.sums(loads)
+        if sums is None:
+            return None
+        scale = _twofold_scale(problem)
+        total = Twofold(*exact_sum(sums.whole, sums.rest))
+        product = Twofold(total.high * sums.unit, total.low * sums.unit) * scale
+        error, norm = (
+            each * sums.unit * scale.high * (1 + SAFETY) for each in (sums.error, sums.norm)
+        )
+        return cls(problem.influence, loads, product, error, norm)
+
+    def moved_to(self, loads: Array) -> Displaced:
+        """With an ordinary product, of what loads nearby differ by: so small is its rounding."""
+        change = loads - self.loads
+        if not change.any():
+            return self
+        product = self.influence.apply(change)
+        off = self.influence.rounding(change)
+        # A |change| is at most off.most; subtracting loads may have lost a roundoff of each.
+        relative = (off.relative + ROUNDOFF) * off.most
+        error = off.component + relative
+        norm = off.norm + relative * math.sqrt(len(loads))
+        moved = self.product + whole(product)
+        bounds = self.error + error * (1 + SAFETY), self.norm + norm * (1 + SAFETY)
+        return Displaced(self.influence, loads, moved, *bounds)
+
+
+def displaced(problem: NormalProblem, loads: Array, nearby: Displaced | None) -> Displaced | None:
+    """Of these loads: from those nearby, if these are of this problem and near enough."""
+    if nearby is not None and nearby.influence is problem.influence:
+        moved = nearby.moved_to(loads)
+        if moved.error - nearby.error <= max(
+            nearby.error, ROUNDOFF * _middle_local(problem, loads)
+        ):
+            return moved
+    return Displaced.of(problem, loads)
+
+
+def _middle_local(problem: NormalProblem, loads: Array) -> float:
+    """The mean of k P^(2/3): what its rounding is a part of."""
+    return float(hertz.indentation(loads, problem.coefficients).sum()) / np.count_nonzero(loads)
+
+
+def local_rounding(local: Array) -> Array:
+    """Bound on the error of k P^(2/3) as computed."""
+    return LOCAL_ROUNDOFFS * ROUNDOFF * local
+
+
 def scaled_to(load: float, given: Array) -> Array:
-    """Loads that add up to what is prescribed: "Prescribed load"."""
+    """Loads that add up to what is prescribed: "Prescribed load".
+
+    As they are, if they do so already.
+    """
     total = float(given.sum())
     if total == 0.0:
         expected = "a load on some asperity that could touch, as the total is prescribed"
         raise InputError("loads", found="none", expected=expected)
-    return given / total * load
+    return given if abs(total - load) <= 2 * ROUNDOFF * load else given / total * load
 
 
-def fit(problem: NormalProblem, loads: Array, weights: Array | None = None) -> Fit:
+def fit(
+    problem: NormalProblem,
+    loads: Array,
+    weights: Array | None = None,
+    nearby: Displaced | None = None,
+) -> Fit:
     """The residual e, with its "Rounding"; D0 so that the sum of e with the weights is 0.
 
     weights : (n,) of touching asperities, for a prescribed load
+    nearby  : loads near these, of which A P is known to many digits
     """
+    known = displaced(problem, loads, nearby)
+    if known is not None:
+        return sharp_fit(problem, known, weights)
     local = hertz.indentation(loads, problem.coefficients)
-    sums = problem.influence.sums(loads)
-    if sums is not None:
-        return _sharp_fit(problem, loads, weights, local, sums)
     displacement = problem.influence.apply(loads)
     approach = problem.approach
     if approach is None:
@@ -96,13 +176,10 @@ def _residual(loads: Array, gap: Array, rounding: Array) -> Array:
     return residual
 
 
-def _sharp_fit(
-    problem: NormalProblem, loads: Array, weights: Array | None, local: Array, sums: Sums
-) -> Fit:
+def sharp_fit(problem: NormalProblem, known: Displaced, weights: Array | None) -> Fit:
     """The same with A P and D in twofold numbers: what is left is the rounding of k P^(2/3)."""
-    scale = _twofold_scale(problem)
-    product = Twofold(*exact_sum(sums.whole, sums.rest))
-    displacement = Twofold(product.high * sums.unit, product.low * sums.unit) * scale
+    loads, displacement = known.loads, known.product
+    local = hertz.indentation(loads, problem.coefficients)
     above = problem.twofold_offsets() + -displacement  # D - D0 - A P
     if problem.approach is None:
         assert weights is not None
@@ -116,11 +193,9 @@ def _sharp_fit(
         level = whole(approach)
     indentation = above + level
     gap = (local - indentation.high) - indentation.low
-    error = sums.error * sums.unit * scale.high * (1 + SAFETY)
-    rounding = LOCAL_ROUNDOFFS * ROUNDOFF * local + 4 * ROUNDOFF * np.abs(gap)
+    rounding = local_rounding(local) + 4 * ROUNDOFF * np.abs(gap)
     sizes = np.abs(displacement.high) + np.abs(problem.offsets) + abs(approach)
     rounding += SHARP_OPERATIONS * TWOFOLD_ROUNDOFF * (sizes + problem.offset_errors / ROUNDOFF)
-    norm = sums.norm * sums.unit * scale.high * (1 + SAFETY)
     # The rounded values are given, and their own rounding with them.
     residual = _residual(loads, gap, rounding)
     rounding = rounding + 2 * ROUNDOFF * np.abs(indentation.high)
@@ -130,8 +205,8 @@ def _sharp_fit(
         gap,
         local,
         rounding,
-        norm,
-        error,
+        known.norm,
+        known.error,
         residual,
         approach,
     )

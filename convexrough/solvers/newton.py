@@ -14,19 +14,17 @@ looked at once it has ended; where one of them would touch, it goes on with more
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex import newton
-from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
-from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.residual import Displaced
 from convexrough.progress import Announce
-from convexrough.roundoff import SAFETY
+from convexrough.solvers.pressing import LastStep, Pressed, Pressing, negligible, on_constraint
 from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
@@ -66,7 +64,7 @@ class Newton:
         announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates, from any start that is not negative (own units)."""
-        indentation = _on_constraint(problem, _start(problem, start))
+        indentation = on_constraint(problem, _start(problem, start))
         highest = float(np.maximum(problem.ceiling + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
         if len(problem) > ALL_ITERATED and start is None:
@@ -77,18 +75,17 @@ class Newton:
             del indentation  # half of the memory of a large scene is vectors
             state, steps = self._iterate(problem, near, begin, announce)
             iterations += steps
-            if len(near) == len(problem):
+            if len(near) == len(problem) and state.displaced is None:
                 residual = problem.residual(state.forces, state.approach, state.displacement)
                 return Solution(state.forces, state.approach, iterations, residual)
             # What do the others feel?
-            loads = among_zeros(state.forces, near, len(problem))
-            displacement = problem.influence.apply(loads)
-            gap = displacement - problem.offsets - state.approach
+            loads, gap = _everywhere(problem, near, state)
             touched = gap < 0
             touched[near] = False
             if not touched.any():
-                residual = problem.residual(loads, state.approach, displacement)
-                return Solution(loads, state.approach, iterations, residual)
+                least = np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0))
+                residual = float(least.max(initial=0.0))
+                return Solution(loads, state.approach, iterations, residual, state.displaced)
             indentation = -gap
             indentation[near] = state.unknown
             touched[near] = True  # none leaves, so that this ends
@@ -100,19 +97,35 @@ class Newton:
         near: Indices,
         indentation: Array,
         announce: Announce | None,
-    ) -> tuple[_State, int]:
+    ) -> tuple[Pressed, int]:
         """The solution of some of the candidates: all others carry nothing."""
         part = problem if len(near) == len(problem) else problem.among(near)
-        law = _Pressing(part, float(np.abs(problem.offsets).max()))
+        law = Pressing(part, float(np.abs(problem.offsets).max()))
 
-        def tell(step: int, state: _State) -> None:
+        def tell(step: int, state: Pressed) -> None:
             if announce is not None:
                 residual, touching = state.residual / state.scale, np.count_nonzero(state.forces)
                 announce(f"step {step}, residual {residual:.1e}, {touching:,} touching")
 
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
-            return newton.solve(law, law.evaluate(indentation), stopping, tell=tell)
+            state = law.evaluate(indentation)
+            if not problem.influence.sharp:
+                return newton.solve(law, state, stopping, tell=tell)
+            linear = replace(stopping, linear=negligible(indentation))
+            state, steps = newton.solve(law, state, linear, tell=tell)
+            if state.residual <= self.tolerance * state.scale:
+                return state, steps
+            base = Displaced.of(problem, among_zeros(state.forces, near, len(problem)))
+            if base is None:
+                state, more = newton.solve(law, state, stopping, tell=tell)
+            else:
+                last = LastStep(part, law.farthest, problem, near, base)
+                state = last.at(base)
+                state, more = newton.solve(
+                    last, state, stopping, before=last.before(state), tell=tell
+                )
+            return state, steps + more
         except SolverError as error:
             if error.iterate is not None:
                 error.iterate = among_zeros(error.iterate, near, len(problem))
@@ -124,96 +137,11 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
     From an error e it leaves about e^2, and it tells open asperities from lightly loaded ones.
     """
-    law = _Pressing(problem, float(np.abs(problem.offsets).max()))
+    law = Pressing(problem, float(np.abs(problem.offsets).max()))
     before = law.evaluate(_start(problem, loads))
     state = newton.descend(law, before, law.direction(before, 0.0))
     residual = problem.residual(state.forces, state.approach, state.displacement)
     return Solution(state.forces, state.approach, 1, residual)
-
-
-class _State(NamedTuple):
-    unknown: Array  # delta
-    forces: Array  # P(delta)
-    displacement: Array  # A P
-    gap: Array  # k P^(2/3) + A P - D, the gradient of Phi
-    defect: Array  # F
-    approach: float  # D0, under load control its latest estimate
-    energy: float
-    residual: float  # max |F|
-    scale: float  # |D0| + max |d_i|
-
-
-@dataclass(frozen=True)
-class _Pressing:
-    """The law of contact, for `convex.newton`.
-
-    farthest : max |d_i| over all candidates, of which these may be some
-    """
-
-    problem: NormalProblem
-    farthest: float
-
-    solver: ClassVar[str] = "newton"
-    unit: ClassVar[str] = "the approach"
-
-    def evaluate(self, unknown: Array) -> _State:
-        problem = self.problem
-        indentation = np.maximum(_on_constraint(problem, unknown), 0.0)
-        ratio = indentation / problem.coefficients
-        root = np.sqrt(ratio)
-        loads = ratio * root
-        displacement = problem.influence.apply(loads)
-        gap = indentation + displacement - problem.offsets  # less D0; as Phi has it under a load
-        approach = problem.approach
-        if approach is None:
-            approach = float(root @ gap / root.sum())
-            energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
-            gap -= approach
-        else:
-            gap -= approach
-            energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
-        # What delta is at an open asperity does not matter: its gap, or 0 where that is negative.
-        touching = loads > 0
-        unknown = np.where(touching, indentation, np.minimum(-gap, 0.0))
-        defect = np.where(touching, gap, np.minimum(gap, 0.0))
-        residual, scale = float(np.abs(defect).max()), abs(approach) + self.farthest
-        return _State(unknown, loads, displacement, gap, defect, approach, energy, residual, scale)
-
-    def direction(self, state: _State, left: float) -> Array:
-        loaded = state.forces > 0
-        slopes = np.divide(1.5 * state.forces, state.unknown, out=state.forces * 0.0, where=loaded)
-        return correct(
-            self.problem.influence,
-            self.problem.shells,
-            np.sqrt(slopes),  # W
-            state.defect,
-            balanced=self.problem.load is not None,
-            tolerance=left,
-        )
-
-    def gradient(self, state: _State) -> Array:
-        """The gap."""
-        return state.gap
-
-    def energy_rounding(self, state: _State) -> float:
-        return SAFETY * float(state.forces.sum()) * state.scale
-
-    def noise(self, state: _State) -> float:
-        return self.problem.influence.rounding(state.forces).negligible(state.displacement)
-
-    def advice(self, state: _State) -> str:
-        """By how crowded the contact is where it stopped."""
-        number = self.problem.convexity_number(state.forces)
-        if number < 1:
-            return (
-                f"the energy is convex there (convexity number {number:.3g}): allow more steps, or "
-                "start from loads of a neighbouring problem"
-            )
-        return (
-            f"contacts are so crowded there that the energy need not be convex (convexity number "
-            f"{number:.3g}, convex below 1): use a smaller approach or load, sharper tips, or "
-            "asperities further apart"
-        )
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
@@ -223,8 +151,9 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
 
 
-def _on_constraint(problem: NormalProblem, indentation: Array) -> Array:
-    """Cut to the a priori box (approach control), or shifted to the prescribed total load."""
-    if problem.load is not None:
-        return shifted_to_load(indentation, problem.coefficients, problem.load)
-    return np.minimum(indentation, problem.ceiling + problem.offsets)
+def _everywhere(problem: NormalProblem, near: Indices, state: Pressed) -> tuple[Array, Array]:
+    """Loads and gaps of all candidates where those that are not near carry nothing."""
+    if state.displaced is not None and state.fit is not None:
+        return state.displaced.loads, state.fit.gap
+    loads = among_zeros(state.forces, near, len(problem))
+    return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)

@@ -9,6 +9,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.residual import Displaced
 from convexrough.progress import Announce
 from convexrough.record import Record
 
@@ -17,13 +18,16 @@ from convexrough.record import Record
 class Solution(Record):
     """Loads of the candidates and the approach, in the problem's units.
 
-    residual : problem.residual(loads, approach), recomputed from the loads
+    residual  : problem.residual(loads, approach), recomputed from the loads
+    displaced : these loads and A times them to many digits, where the solver knows that: it saves
+        the certificate some work
     """
 
     loads: Array
     approach: float
     iterations: int
     residual: float
+    displaced: Displaced | None = None
 
     @classmethod
     def of(cls, problem: NormalProblem, loads: Array, approach: float, iterations: int) -> Solution:

@@ -1,0 +1,182 @@
+"""The law of contact for Newton's method, and its last step, in many more digits.
+
+docs/theory/newton.md, "The normal map", and docs/theory/last-step.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from convexrough.arrays import Array, Indices, among_zeros
+from convexrough.convex.newton_step import correct
+from convexrough.normal.load_control import shifted_to_load
+from convexrough.normal.problem import NormalProblem
+from convexrough.normal.residual import Displaced, Fit, local_rounding, scaled_to, sharp_fit
+from convexrough.roundoff import SAFETY
+from convexrough.sphere import hertz
+
+#: Part of what is not known of a residual, anyway, that it may be: both in the 2-norm. A heuristic:
+#: bounds are about so much less sharp.
+NEGLIGIBLE = 0.5
+
+
+class Pressed(NamedTuple):
+    unknown: Array  # delta
+    forces: Array  # P(delta)
+    displacement: Array  # A P
+    gap: Array  # k P^(2/3) + A P - D, the gradient of Phi
+    defect: Array  # F
+    approach: float  # D0, under load control its latest estimate
+    energy: float
+    residual: float  # max |F|
+    scale: float  # |D0| + max |d_i|
+    displaced: Displaced | None = None  # the loads of all candidates, and A P, where known so well
+    fit: Fit | None = None  # and their gaps
+
+
+@dataclass(frozen=True)
+class Pressing:
+    """The law of contact, for `convex.newton`.
+
+    farthest : max |d_i| over all candidates, of which these may be some
+    """
+
+    problem: NormalProblem
+    farthest: float
+
+    solver: ClassVar[str] = "newton"
+    unit: ClassVar[str] = "the approach"
+
+    def evaluate(self, unknown: Array) -> Pressed:
+        problem = self.problem
+        indentation = np.maximum(on_constraint(problem, unknown), 0.0)
+        ratio = indentation / problem.coefficients
+        root = np.sqrt(ratio)
+        loads = ratio * root
+        displacement = problem.influence.apply(loads)
+        gap = indentation + displacement - problem.offsets  # less D0
+        approach = problem.approach
+        if approach is None:
+            approach = float(root @ gap / root.sum())
+        gap -= approach
+        return self._pressed(indentation, loads, displacement, gap, approach)
+
+    def _pressed(
+        self,
+        indentation: Array,
+        loads: Array,
+        displacement: Array,
+        gap: Array,
+        approach: float,
+        displaced: Displaced | None = None,
+        fit: Fit | None = None,
+    ) -> Pressed:
+        energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
+        if self.problem.load is not None:  # Phi has the gap less D0
+            energy += approach * float(loads.sum())
+        # What delta is at an open asperity does not matter: its gap, or 0 where that is negative.
+        touching = loads > 0
+        unknown = np.where(touching, indentation, np.minimum(-gap, 0.0))
+        defect = np.where(touching, gap, np.minimum(gap, 0.0))
+        return Pressed(
+            unknown,
+            loads,
+            displacement,
+            gap,
+            defect,
+            approach,
+            energy,
+            residual=float(np.abs(defect).max()),
+            scale=abs(approach) + self.farthest,
+            displaced=displaced,
+            fit=fit,
+        )
+
+    def direction(self, state: Pressed, left: float) -> Array:
+        loaded = state.forces > 0
+        slopes = np.divide(1.5 * state.forces, state.unknown, out=state.forces * 0.0, where=loaded)
+        return correct(
+            self.problem.influence,
+            self.problem.shells,
+            np.sqrt(slopes),  # W
+            state.defect,
+            balanced=self.problem.load is not None,
+            tolerance=left,
+        )
+
+    def gradient(self, state: Pressed) -> Array:
+        """The gap."""
+        return state.gap
+
+    def energy_rounding(self, state: Pressed) -> float:
+        return SAFETY * float(state.forces.sum()) * state.scale
+
+    def noise(self, state: Pressed) -> float:
+        return self.problem.influence.rounding(state.forces).negligible(state.displacement)
+
+    def advice(self, state: Pressed) -> str:
+        """By how crowded the contact is where it stopped."""
+        number = self.problem.convexity_number(state.forces)
+        if number < 1:
+            return (
+                f"the energy is convex there (convexity number {number:.3g}): allow more steps, or "
+                "start from loads of a neighbouring problem"
+            )
+        return (
+            f"contacts are so crowded there that the energy need not be convex (convexity number "
+            f"{number:.3g}, convex below 1): use a smaller approach or load, sharper tips, or "
+            "asperities further apart"
+        )
+
+
+@dataclass(frozen=True)
+class LastStep(Pressing):
+    """The same near loads of which A P is known to many digits: what is left is linear.
+
+    whole : the problem of all candidates;  near : which of these the other one is of
+    base  : the loads nearby
+    """
+
+    whole: NormalProblem
+    near: Indices
+    base: Displaced
+
+    def evaluate(self, unknown: Array) -> Pressed:
+        indentation = np.maximum(on_constraint(self.problem, unknown), 0.0)
+        loads = hertz.load(indentation, self.problem.coefficients)
+        everywhere = among_zeros(loads, self.near, len(self.whole))
+        if self.whole.load is not None:
+            everywhere = scaled_to(self.whole.load, everywhere)
+        return self.at(self.base.moved_to(everywhere))
+
+    def at(self, displaced: Displaced) -> Pressed:
+        """The state of these loads."""
+        loads = displaced.loads[self.near]
+        weights = None if self.whole.load is None else np.cbrt(displaced.loads)
+        fit = sharp_fit(self.whole, displaced, weights)
+        local, moved, gap = (each[self.near] for each in (fit.local, fit.displacement, fit.gap))
+        return self._pressed(local, loads, moved, gap, fit.approach, displaced, fit)
+
+    def before(self, state: Pressed) -> float:
+        """2-norm of a defect whose square would have left this one: so well is it to be solved."""
+        size, enough = float(np.linalg.norm(state.defect)), self.noise(state)
+        return size * float(np.sqrt(size / enough)) if size > enough > 0 else np.inf
+
+    def noise(self, state: Pressed) -> float:
+        """A part of the rounding that is left, which a certificate has to count anyway."""
+        return negligible(state.unknown)
+
+
+def negligible(indentation: Array) -> float:
+    """2-norm of a defect that is small beside the rounding of the local term alone."""
+    return NEGLIGIBLE * float(np.linalg.norm(local_rounding(np.maximum(indentation, 0.0))))
+
+
+def on_constraint(problem: NormalProblem, indentation: Array) -> Array:
+    """Cut to the a priori box (approach control), or shifted to the prescribed total load."""
+    if problem.load is not None:
+        return shifted_to_load(indentation, problem.coefficients, problem.load)
+    return np.minimum(indentation, problem.ceiling + problem.offsets)
