@@ -133,7 +133,9 @@ class Box:
 
         transform(blocks[0])  # says how many kernels there are
         threads.each(transform, blocks[1:], self.workers)
-        whole_sums = np.sum([sums[taken.start] for taken in blocks], axis=0)
+        # A block may be of places that no difference falls on.
+        counted = [sums[taken.start] for taken in blocks if sums[taken.start]]
+        whole_sums = np.sum(counted, axis=0)
         return [
             Kernel(self._spectrum(half, dtype), float(total), float(np.sqrt(square)))
             for half, (total, square) in zip(halves, whole_sums, strict=True)
