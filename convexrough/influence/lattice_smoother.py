@@ -1,17 +1,15 @@
 """An approximate inverse of I + W A W on a lattice, for conjugate gradients.
 
-Long waves make this matrix hard: there A is large. They see W^2 only as an average over blocks of
-m x m sites. So let q_b be W on block b, scaled to length 1, and Q = (q_1, q_2, ...). Beside the
-range of Q the matrix is taken to be 1, and on it
+Long waves make this matrix hard: there A is large. They see W^2 only as an average over some sites.
+So let G^2 be an average with a Gaussian, d the local mean of W^2 by which w = W / d^(1/2) has
+G^2 w^2 = 1 about, and
 
-    Q' (I + W A W) Q  =  I + D A_b D,      D_b^2 = sum of W^2 over the block,
+    M  =  I - w G (1 - (1 + d A)^-1) G w,
 
-with A_b the mean of A over pairs of blocks: a lattice again, where D varies little. Its inverse is
-(1 + d A_b)^-1 by Fourier transforms of the blocks, d the median of D^2, cut to those that touch:
-
-    M  =  I - Q Q' + Q (1 + d A_b)^-1 Q',
-
-symmetric and positive definite. Where W is smooth m is 1, and Q Q' = I on the contact.
+with the median for d and A by Fourier transforms, cut to those that touch: on long waves
+(1 + d A)^-1, on short ones 1, which the matrix is taken to be there; symmetric, and positive
+definite as  w G^2 w  is not above 1. All of it on blocks of m x m sites, small beside the Gaussian,
+with A the mean over pairs of blocks. Where W is smooth, there is no G, and m is 1.
 (docs/theory/newton.md, "Many".) The constants are heuristics: conjugate gradients take more steps
 where they are off, and end at the same answer.
 """
@@ -31,8 +29,14 @@ from convexrough.influence.coupling import Smoother
 
 Single = NDArray[np.float32]
 
-#: Blocks are so large that the sums of W^2 in them scatter by at most about this, squared.
-SCATTER = 0.06
+#: Windows are so large that the means of W^2 in them scatter by at most about this, squared.
+SCATTER = 0.04
+
+#: Width of the Gaussian in parts of such a window, with which both hold as many sites.
+WIDTH = 1.0 / np.sqrt(8.0 * np.pi)
+
+#: Blocks are so many times smaller than windows: what a Gaussian passes, they hold.
+FINE = 3.5
 
 #: How large the blocks are on which the scatter of W^2 is looked at.
 WINDOW = 8
@@ -91,18 +95,25 @@ def block_smoother(
 
     squares = np.zeros(shape[0] * shape[1], dtype=np.float32)
     squares[sources] = root * root
-    blocks = _Blocks.of(shape, sources, _block_size(squares.reshape(shape)))
-    D = np.sqrt(blocks.sums(root * root))
-    touching = D > 0
+    window = _window(squares.reshape(shape))
+    blocks = _Blocks.of(shape, sources, max(1, int(window / FINE)))
+    sums = blocks.sums(root * root)  # D^2
+    touching = sums > 0
     count = 1.0 if blocks.m == 1 else float(blocks.sums(root > 0)[touching].mean())
+    size, spectrum = _block_spectrum(blocks.shape, basis, blocks.m, count, workers)
     w = root.astype(np.float32)
     touched = (w > 0).astype(np.float32)
-    q = np.divide(w, D.ravel()[blocks.which], out=np.zeros_like(w), where=w > 0)
+    mean = sums
+    if window > 1:
+        passed = _low_pass(size, basis * blocks.m, WIDTH * window / blocks.m)
+        mean = _local_mean(sums, touching, size, passed, workers)
+    q = np.divide(w, np.sqrt(mean).ravel()[blocks.which], out=np.zeros_like(w), where=w > 0)
 
-    size, spectrum = _block_spectrum(blocks.shape, basis, blocks.m, count, workers)
-    middle = np.float32(np.median(D[touching]))
+    middle = np.float32(np.sqrt(np.median(mean[touching])))
     displacement = np.float32(scale) * middle * spectrum  # of A_b D
     removed = 1.0 - 1.0 / np.maximum(1.0 + middle * displacement, np.float32(LEAST))
+    if window > 1:
+        removed *= passed
     energies = displacement * displacement
     energies[:, 1 : (size[1] + 1) // 2] *= 2  # each wave stands for its conjugate, too
     energies *= np.float32(blocks.m * blocks.m / (size[0] * size[1]))
@@ -133,8 +144,8 @@ def block_smoother(
     return smooth
 
 
-def _block_size(squares: Single) -> int:
-    """The smallest m for which sums of W^2 over blocks vary little from one to the next."""
+def _window(squares: Single) -> float:
+    """The smallest m for which means of W^2 over m x m sites vary little from one to the next."""
     m = WINDOW
     rows, columns = (max(1, length // m) for length in squares.shape)
     inside = squares[: rows * m, : columns * m]
@@ -143,9 +154,39 @@ def _block_size(squares: Single) -> int:
     mean = windows.mean(axis=(1, 3), dtype=np.float64)
     variance = (windows * windows).mean(axis=(1, 3), dtype=np.float64) - mean * mean
     if not mean.any():
-        return 1
+        return 1.0
     scatter = float(variance.sum() / (mean * mean).sum())
-    return max(1, int(np.ceil(np.sqrt(scatter / SCATTER)))) if scatter > SCATTER else 1
+    return max(1.0, float(np.sqrt(scatter / SCATTER)))
+
+
+def _low_pass(size: tuple[int, int], basis: Array, width: float) -> Single:
+    """What a Gaussian of this width (in shortest steps) passes of each wave, once and back."""
+    dual = 2.0 * np.pi * np.linalg.inv(basis).T
+    i, j = (np.fft.fftfreq(n) for n in size)
+    i, j = i[:, None], np.abs(j[: size[1] // 2 + 1])
+    squares = np.full(np.broadcast(i, j).shape, np.inf)
+    for a in (-1, 0, 1):  # the longest of the waves that look alike on the sites
+        for b in (-1, 0, 1):
+            x, y = ((i + a) * dual[0, k] + (j + b) * dual[1, k] for k in (0, 1))
+            np.minimum(squares, x * x + y * y, out=squares)
+    step = width * float(np.hypot(*basis.T).min())
+    return np.exp(-squares * step**2).astype(np.float32)
+
+
+def _local_mean(
+    sums: Single, touching: NDArray[np.bool_], size: tuple[int, int], passed: Single, workers: int
+) -> Single:
+    """d, with which sums / d have the local mean 1 about wherever there are any."""
+    from scipy import fft
+
+    mean = np.ones_like(sums)
+    for power in (1.0, 0.5, 0.5, 0.5):  # as a symmetric matrix is scaled to row sums of 1
+        parts = np.where(touching, sums / mean, np.float32(0))
+        waves = fft.rfft2(parts, s=size, workers=workers)
+        waves *= passed
+        local = fft.irfft2(waves, s=size, workers=workers)[: sums.shape[0], : sums.shape[1]]
+        mean *= np.maximum(local, np.float32(1e-3) * local.max()) ** np.float32(power)
+    return mean
 
 
 def _block_spectrum(

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.errors import InputError
-from convexrough.influence.coupling import Influence
 from convexrough.normal.problem import NormalProblem
 from convexrough.record import Record
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -56,14 +55,15 @@ class Displaced(Record):
 
     docs/theory/last-step.md, "Loads nearby"
 
-    loads   : (n,);  product : A P
+    loads   : (n,);  product : A P;  offsets : D - D0
     error   : bound on the error of each component, beside the rounding of twofold numbers
     norm    : bound on the 2-norm of these errors
     """
 
-    influence: Influence
+    problem: NormalProblem
     loads: Array
     product: Twofold
+    offsets: Twofold
     error: float
     norm: float
 
@@ -79,38 +79,34 @@ class Displaced(Record):
         error, norm = (
             each * sums.unit * scale.high * (1 + SAFETY) for each in (sums.error, sums.norm)
         )
-        return cls(problem.influence, loads, product, error, norm)
+        return cls(problem, loads, product, problem.twofold_offsets(), error, norm)
 
     def moved_to(self, loads: Array) -> Displaced:
         """With an ordinary product, of what loads nearby differ by: so small is its rounding."""
         change = loads - self.loads
         if not change.any():
             return self
-        product = self.influence.apply(change)
-        off = self.influence.rounding(change)
+        product = self.problem.influence.apply(change)
+        off = self.problem.influence.rounding(change)
         # A |change| is at most off.most; subtracting loads may have lost a roundoff of each.
         relative = (off.relative + ROUNDOFF) * off.most
         error = off.component + relative
         norm = off.norm + relative * math.sqrt(len(loads))
         moved = self.product + whole(product)
         bounds = self.error + error * (1 + SAFETY), self.norm + norm * (1 + SAFETY)
-        return Displaced(self.influence, loads, moved, *bounds)
+        return Displaced(self.problem, loads, moved, self.offsets, *bounds)
 
 
 def displaced(problem: NormalProblem, loads: Array, nearby: Displaced | None) -> Displaced | None:
     """Of these loads: from those nearby, if these are of this problem and near enough."""
-    if nearby is not None and nearby.influence is problem.influence:
+    if nearby is not None and nearby.problem is problem:
         moved = nearby.moved_to(loads)
-        if moved.error - nearby.error <= max(
-            nearby.error, ROUNDOFF * _middle_local(problem, loads)
-        ):
+        local = hertz.indentation(loads, problem.coefficients)
+        touching = float(np.count_nonzero(loads)) or 1.0
+        little = ROUNDOFF * float(local.sum()) / touching  # of the mean of the local terms
+        if moved.error - nearby.error <= max(nearby.error, little):
             return moved
     return Displaced.of(problem, loads)
-
-
-def _middle_local(problem: NormalProblem, loads: Array) -> float:
-    """The mean of k P^(2/3): what its rounding is a part of."""
-    return float(hertz.indentation(loads, problem.coefficients).sum()) / np.count_nonzero(loads)
 
 
 def local_rounding(local: Array) -> Array:
@@ -180,7 +176,7 @@ def sharp_fit(problem: NormalProblem, known: Displaced, weights: Array | None) -
     """The same with A P and D in twofold numbers: what is left is the rounding of k P^(2/3)."""
     loads, displacement = known.loads, known.product
     local = hertz.indentation(loads, problem.coefficients)
-    above = problem.twofold_offsets() + -displacement  # D - D0 - A P
+    above = known.offsets + -displacement  # D - D0 - A P
     if problem.approach is None:
         assert weights is not None
         approach, total = 0.0, float(weights.sum())

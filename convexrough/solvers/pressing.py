@@ -12,15 +12,16 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex.newton_step import correct
+from convexrough.convex.recycled import Recycled
 from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.residual import Displaced, Fit, local_rounding, scaled_to, sharp_fit
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
-#: Part of what is not known of a residual, anyway, that it may be: both in the 2-norm. A heuristic:
-#: bounds are about so much less sharp.
-NEGLIGIBLE = 0.5
+#: A residual may be so many times what is not known of it, anyway, both in the 2-norm. A heuristic:
+#: bounds are less sharp by about as much.
+NEGLIGIBLE = 4.0
 
 
 class Pressed(NamedTuple):
@@ -42,10 +43,12 @@ class Pressing:
     """The law of contact, for `convex.newton`.
 
     farthest : max |d_i| over all candidates, of which these may be some
+    recycled : directions of its linear systems
     """
 
     problem: NormalProblem
     farthest: float
+    recycled: Recycled
 
     solver: ClassVar[str] = "newton"
     unit: ClassVar[str] = "the approach"
@@ -105,6 +108,7 @@ class Pressing:
             state.defect,
             balanced=self.problem.load is not None,
             tolerance=left,
+            recycled=self.recycled,
         )
 
     def gradient(self, state: Pressed) -> Array:
