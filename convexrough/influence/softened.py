@@ -69,14 +69,11 @@ class Softened:
         """Roundoffs of one computed L, relative.
 
         Term k of the series: 2 k + 1 by Horner's rule, one of its coefficient and k of t's own
-        rounding, k on average at most as at r = 0. Distances are squared and divided by a^2 within
-        7, which 1 - t is off by; that counts with (1 - t) / L times the slope of L by t at most.
+        rounding, k on average at most as at r = 0. Distances squared and over a^2 are off by 7 at
+        most, and L by q / 2 of that: (k + 1) c_(k+1) = (k + q/2) c_k.
         """
-        terms = _series(self.order, self.power)
-        mean = self._slope / float(terms.sum())
-        q = self.power
-        steepest = self._slope * (q / (2.0 * self._slope)) ** (2.0 / (q + 2))
-        return float(3.0 * mean + 4.0 + q + 7.0 * steepest)
+        mean = self._slope / float(_series(self.order, self.power).sum())
+        return 3.0 * mean + 4.0 + 4.5 * self.power
 
     @property
     def beyond_roundoffs(self) -> float:
