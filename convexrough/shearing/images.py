@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import SAFETY
 from convexrough.shearing.bounds import Given
 from convexrough.shearing.load_errors import couple_above
 from convexrough.shearing.pressed_fit import PressedFit, softness
@@ -79,9 +79,10 @@ def _kept(given: Given, pressed: PressedFit, row: int) -> Image | None:
     if most == np.inf:
         return None
     width = problem.widths(u)
-    part = b / np.maximum(P * (1.0 - width) ** 2, 2.0 * b + ROUNDOFF * P)  # of P - u, at most
+    left = P * (1.0 - width) ** 2
     some = kept > most
-    by_width = some & (part < 0.5)
+    by_width = some & (left > 2.0 * b)
+    part = np.divide(b, left, out=np.zeros(len(u)), where=by_width)
     shares = np.where(by_width, width, np.where(some, 1.0, 0.0))
     bent = softness(problem) * b / np.cbrt(P) * grown(part / (1.0 - part))
     moved = couple_above(problem, shares * b)
