@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
@@ -50,3 +51,8 @@ def among_zeros(
     where: tuple[Any, ...] = (slice(None),) * (axis % values.ndim)
     full[*where, places] = values
     return full
+
+
+def row_sums(values: Array) -> Array:
+    """(m,) the sums of the rows of (m, n), each rounded once."""
+    return np.array([math.fsum(row) for row in values])

@@ -94,7 +94,7 @@ def lowest_ceiling(problem: NormalProblem, loads: Array, displacement: Array) ->
 def box_of_touching(
     problem: NormalProblem, loads: Array, touching: NDArray[np.bool_], room: Array
 ) -> Box | None:
-    """Local, all others held open: by shells fitted to those that touch, or by `_crowded_margin`.
+    """Local, all others held open: by shells fitted to those that touch, or by `crowded_margin`.
 
     docs/theory/crowded.md
 
@@ -108,13 +108,13 @@ def box_of_touching(
     shelled = replace(problem, shells=_shells(influence, h, which))
     number = shelled.convexity_at(h)
     if not number < 1:
-        number = 1.0 - _crowded_margin(influence, h[which])
+        number = 1.0 - crowded_margin(influence, h[which])
     if not number < 1:
         return None
     return Box("local", shelled, box, h, number, np.where(touching, box, np.inf), ~touching)
 
 
-def _crowded_margin(influence: Influence, stiffness: Array) -> float:
+def crowded_margin(influence: Influence, stiffness: Array) -> float:
     """The largest mu by Cholesky where a matrix is cheap, else by shells that overlap."""
     if not influence.at_hand and len(influence) > FACTORISED:
         return overlapping_margin(influence, influence.scale / stiffness, CROWDED_MARGINS)

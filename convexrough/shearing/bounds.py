@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
+from convexrough.influence.coupling import Sums
+from convexrough.normal.residual import INVERSE_PI, SHARP_OPERATIONS, SUM_ROUNDOFFS
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.load_errors import LoadErrors
 from convexrough.shearing.loss_errors import Nearness, loss_errors
-from convexrough.shearing.normal_map import States
+from convexrough.shearing.normal_map import States, slips
 from convexrough.shearing.problem import TangentialProblem
+from convexrough.twofold import TWOFOLD_ROUNDOFF, Twofold, exact_sum, whole
 
-#: Roundoffs of a share u / P that are counted apart: near full slip each changes the own deflection
-#: by (2/3) (1 - t)^(-1/3), up to 1e5, roundoffs of its own.
+#: Roundoffs of a share u / P that are counted apart: near full slip each changes the loss by up to
+#: 1e5 roundoffs of its own.
 SHARE_ROUNDOFFS = 4
+
+#: Roundoffs of k P^(2/3) phi(t): 22 of the first, as in `normal.residual`, and some 12 of phi.
+OWN_ROUNDOFFS = 40
 
 
 class Bounds(NamedTuple):
@@ -38,20 +46,15 @@ class Bounds(NamedTuple):
 
 
 class Given(NamedTuple):
-    """What the proofs start from: m states, A u of each, and its rounding."""
+    """What the proofs start from: m states, what each leaves to each asperity, and its rounding."""
 
     problem: TangentialProblem
     known: LoadErrors
     states: States
-    displacement: Array  # (m, n) A u
-    magnitude: Array  # (m, n) upper bounds on A |u|
-    rounding: Array  # (m, n) bounds on the error of A u, less a remainder
+    available: Array  # (m, n) Delta - A u: the own deflection of an asperity, and its slip
+    rounding: Array  # (m, n) bounds on the error of that, less a remainder
     remainder: Array  # (m,) bounds on the 2-norm of that
-
-    @property
-    def available(self) -> Array:
-        """(m, n) the displacement left to each asperity, its own deflection and its slip."""
-        return self.states.rises[:, None] - self.displacement
+    each: Array  # (m,) and on each component of it
 
     def take(self, rows: Indices) -> Given:
         """Some of the states."""
@@ -59,23 +62,52 @@ class Given(NamedTuple):
         return Given(self.problem, self.known, self.states.take(rows), *rest)
 
 
+class _Left(NamedTuple):
+    """The rest of `Given`, of one state."""
+
+    available: Array
+    rounding: Array
+    remainder: float
+    each: float
+
+
 def assess(problem: TangentialProblem, states: States) -> Given:
-    u, A = states.increments, problem.influence
-    displacement = problem.couple(u)
-    noise = [A.rounding(each) for each in u]
-    relative = np.array([each.relative for each in noise])[:, None]
-    remainder = np.array([each.norm for each in noise])
-    magnitude = displacement
-    back = np.flatnonzero((u < 0).any(axis=1))  # A |u| is not A u
-    if len(back):
-        magnitude = displacement.copy()
-        magnitude[back] = problem.couple(np.abs(u[back]))
+    rises = states.rises.tolist()
+    found = [_left(problem, u, rise) for u, rise in zip(states.increments, rises, strict=True)]
+    fields = (np.array(field) for field in zip(*found, strict=True))
+    return Given(problem, LoadErrors.of(problem), states, *fields)
+
+
+def _left(problem: TangentialProblem, u: Array, rise: float) -> _Left:
+    """Delta - A u, in twofold numbers where the sums of A u are known to so many digits."""
+    A = problem.influence
+    sums = A.sums(u)
+    if sums is not None:
+        return _sharply_left(problem, sums, rise)
+    displacement, off = A.apply(u), A.rounding(u)
+    above = A.apply(np.abs(u)) if (u < 0).any() else displacement
     # The relative part is of the true product, which the computed one may miss by all of it.
-    magnitude = (np.maximum(magnitude, 0.0) + remainder[:, None]) * (1.0 + 2.0 * relative)
-    known, rounding = LoadErrors.of(problem), relative * magnitude
-    return Given(problem, known, states, displacement, magnitude, rounding, remainder)
+    above = (np.maximum(above, 0.0) + off.component) * (1.0 + 2.0 * off.relative)
+    rounding = off.relative * above + SUM_ROUNDOFFS * ROUNDOFF * (above + rise)
+    return _Left(rise - displacement, rounding, off.norm, off.component)
+
+
+def _sharply_left(problem: TangentialProblem, sums: Sums, rise: float) -> _Left:
+    force, length = Fraction(problem.units.force), Fraction(problem.units.length)
+    modulus = Fraction(problem.scene.material.contact_modulus)
+    scale = Twofold.nearest(INVERSE_PI * force / length / modulus)
+    product = Twofold(*exact_sum(sums.whole, sums.rest))
+    displacement = Twofold(product.high * sums.unit, product.low * sums.unit) * scale
+    left = whole(np.full(len(sums.whole), rise)) + -displacement
+    rounding = 2 * ROUNDOFF * np.abs(left.high)
+    rounding += SHARP_OPERATIONS * TWOFOLD_ROUNDOFF * (np.abs(displacement.high) + rise)
+    unit = sums.unit * scale.high * (1 + SAFETY)
+    return _Left(left.high, rounding, sums.norm * unit, sums.error * unit)
 
 
 def bounds_of(given: Given, near: Nearness, proved: NDArray[np.bool_], increments: Array) -> Bounds:
-    losses = loss_errors(given.problem, given.known, given.states, near)
-    return Bounds(proved, increments, near.errors, near.rises, near.sliding, near.partial, losses)
+    problem, states = given.problem, given.states
+    losses = loss_errors(problem, given.known, states, near)
+    missed = np.abs(states.slips - slips(problem, given.available))
+    errors = near.errors + missed * (1 + SAFETY)
+    return Bounds(proved, increments, errors, near.rises, near.sliding, near.partial, losses)

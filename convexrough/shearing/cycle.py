@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, frozen, row_sums
 from convexrough.contact import Contact
 from convexrough.drawn import Drawn
 from convexrough.errors import InputError
@@ -268,7 +268,7 @@ def _losses(loading: FirstLoading, states: States, bounds: Bounds) -> Iterator[_
     problem, unit = loading.problem, loading.energy_unit
     slip = problem.to_scene(loading.partial_slip(states) * unit)
     slide = problem.to_scene(loading.sliding(states) * unit)
-    energies = slip.sum(axis=1) + slide.sum(axis=1)
+    energies = row_sums(slip) + row_sums(slide)
     others = unit * loading.trapezoid_error(states)
     defects = np.abs(others - energies) / np.where(energies > 0, energies, 1.0)
     errors = loading.energy_errors(bounds.losses)

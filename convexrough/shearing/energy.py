@@ -57,11 +57,15 @@ class TangentialEnergy:
 
     def deflections(self, increments: Array) -> Array:
         """The local deflection of an asperity that does not slide."""
-        share = increments / self.loads
-        eta: Array = self.ceilings * np.copysign(
-            annulus.deflection(annulus.width_under(share)), share
-        )
+        local: Array = annulus.deflection(self.widths(increments))
+        eta: Array = self.ceilings * np.copysign(local, increments)
         return eta
+
+    def widths(self, increments: Array) -> Array:
+        """x of the slip annuli, to the last digits near full slip as well."""
+        size = np.abs(increments)
+        x: Array = annulus.width_between(size / self.loads, (self.loads - size) / self.loads)
+        return x
 
     def slopes(self, deflections: Array) -> Array:
         """c = du/deta, 0 where sliding."""

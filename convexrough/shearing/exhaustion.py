@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF
-from convexrough.shearing.bounds import SHARE_ROUNDOFFS, Bounds, Given, bounds_of
+from convexrough.shearing.bounds import OWN_ROUNDOFFS, SHARE_ROUNDOFFS, Bounds, Given, bounds_of
 from convexrough.shearing.load_errors import couple_above
 from convexrough.shearing.loss_errors import Nearness
 
@@ -32,9 +31,8 @@ def by_exhaustion(given: Given) -> Bounds:
     unused = (P.sum() - states.totals)[:, None]
     most = unused + doubt
     errors = known.errors + np.minimum(most + (P - u), P + np.abs(u))
-    uncertainty = couple_above(problem, errors) + given.rounding + given.remainder[:, None]
-    sums = given.magnitude + ceilings + states.rises[:, None]
-    uncertainty += SUM_ROUNDOFFS * ROUNDOFF * sums
+    uncertainty = couple_above(problem, errors) + given.rounding + given.each[:, None]
+    uncertainty += OWN_ROUNDOFFS * ROUNDOFF * ceilings
     uncertainty += ceilings * known.relative + known.stray_effect
     lacking = 1.5 * most / P
     shortfall = ceilings * np.maximum(lacking, lacking ** (2 / 3))

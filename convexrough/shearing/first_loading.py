@@ -66,7 +66,7 @@ class FirstLoading:
     def partial_slip(self, states: States) -> Array:
         """(m, n) share of w(T) lost in partial slip: (3/5) P ceiling e(u / P)."""
         problem = self.problem
-        shares = annulus.loss(annulus.width_under(states.increments / problem.loads))
+        shares = annulus.loss(problem.widths(states.increments))
         return np.asarray(0.6 * problem.loads * problem.ceilings * shares)
 
     def sliding(self, states: States) -> Array:
@@ -89,7 +89,7 @@ class FirstLoading:
         """
         problem, q = self.problem, self.problem.elastic
         P, ceilings, u = problem.loads, problem.ceilings, states.increments
-        x = annulus.width_under(u / P)
+        x = problem.widths(u)
         total = u.sum(axis=1)
         excess = np.copysign(ceilings * annulus.excess_deflection(x), u) + states.slips
         v = u - total[:, None] * q

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, frozen, row_sums
 from convexrough.contact import Contact
 from convexrough.drawn import Drawn
 from convexrough.progress import Announce
@@ -18,6 +18,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.first_loading import FirstLoading
 from convexrough.shearing.masing import remember
 from convexrough.shearing.normal_map import States
+from convexrough.twofold import Twofold, exact_sum
 
 if TYPE_CHECKING:
     from convexrough.gradients.adjoint import Holding
@@ -150,22 +151,31 @@ class _Spent:
         self.w, self.proved = w, np.isfinite(errors)
         self.errors = np.where(self.proved, errors, 0.0)
         self.counts = np.zeros(len(w))  # sums of quarters, exact
-        self.energy = self.doubt = self.rounding = 0.0
+        self.sum = Twofold(0.0, 0.0)
+        self.doubt = self.rounding = 0.0
         self.unproved = 0.0  # the sum of |counts| of those not proved
 
     def add(self, factor: float, state: int) -> None:
         """Loss of `factor` cycles."""
         before, after = self.counts[state], self.counts[state] + factor
         self.counts[state] = after
-        self.energy += factor * self.w[state]
+        high, off = exact_sum(self.sum.high, factor * float(self.w[state]))
+        self.sum = Twofold(high, self.sum.low + off)
         self.doubt += (abs(after) - abs(before)) * self.errors[state]
         self.unproved += (abs(after) - abs(before)) * (not self.proved[state])
-        self.rounding += 4 * ROUNDOFF * (abs(self.energy) + self.w[state] + self.doubt)
+        self.rounding += 4 * ROUNDOFF * (self.w[state] + abs(self.sum.low) + self.doubt)
+
+    @property
+    def energy(self) -> float:
+        """The sum so far."""
+        return float(self.sum.high + self.sum.low)
 
     @property
     def error(self) -> float:
         """Bound on |energy - solution|."""
-        return np.inf if self.unproved else (self.doubt + self.rounding) * (1 + SAFETY)
+        if self.unproved:
+            return np.inf
+        return (self.doubt + self.rounding + 4 * ROUNDOFF * abs(self.energy)) * (1 + SAFETY)
 
 
 def _judged(
@@ -175,6 +185,6 @@ def _judged(
     bounds, w, w_errors = [], [], []
     for part, proved in loading.judged(states, announce):
         bounds.append(proved.rises)
-        w.append((loading.partial_slip(part) + loading.sliding(part)).sum(axis=1))
+        w.append(row_sums(loading.partial_slip(part) + loading.sliding(part)))
         w_errors.append(proved.losses)
     return np.concatenate(bounds), np.concatenate(w), np.concatenate(w_errors)

@@ -22,9 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.bounds import SHARE_ROUNDOFFS, Bounds, Given, assess, bounds_of
+from convexrough.shearing.bounds import (
+    OWN_ROUNDOFFS,
+    SHARE_ROUNDOFFS,
+    Bounds,
+    Given,
+    assess,
+    bounds_of,
+)
+from convexrough.shearing.by_largest import by_largest
 from convexrough.shearing.energy import TangentialEnergy
 from convexrough.shearing.exhaustion import by_exhaustion
 from convexrough.shearing.load_errors import couple_above
@@ -99,7 +106,7 @@ def state_errors(problem: TangentialProblem, state: States) -> StateErrors | Non
     bounds = _words(given, image, residual, distance)
     if not bounds.proved[0]:
         return None
-    uncertainty = residual.uncertainty[0] + given.remainder[0]
+    uncertainty = residual.uncertainty[0] + given.each[0]
     rise, words = float(bounds.rises[0]), (bounds.sliding[0], bounds.partial[0])
     carried = float(image.carried_norm[0])
     return StateErrors(float(distance[0]), carried, image.shifts[0], uncertainty, rise, *words)
@@ -168,12 +175,9 @@ def _residual(given: Given, image: _Image) -> _Residual:
     """
     problem, known, u = given.problem, given.known, given.states.increments
     size, available, own = np.abs(u), given.available, problem.deflections(u)
-    sums = np.abs(own) + given.magnitude + given.states.rises[:, None]
-    uncertainty = SUM_ROUNDOFFS * ROUNDOFF * sums
+    uncertainty = OWN_ROUNDOFFS * ROUNDOFF * np.abs(own)
     uncertainty += given.rounding + known.stray_effect + known.loose_effect
-    change = own_change(
-        problem, size, np.abs(own), image.shifts + SHARE_ROUNDOFFS * ROUNDOFF * size
-    )
+    change = own_change(problem, size, np.abs(own), image.shifts)
     beyond = available * np.sign(u) - problem.ceilings
     sticks = np.abs(available - own) + uncertainty + change
     values = np.where(size < problem.loads, sticks, np.maximum(uncertainty - beyond, 0.0))
@@ -187,7 +191,7 @@ def own_change(energy: TangentialEnergy, size: Array, own: Array, change: Array)
     P - size. `own` are the lengths of the deflections now.
     """
     farther = np.minimum(size + change, energy.loads)
-    bound: Array = 1.5 * (energy.deflections(farther) - own)
+    bound: Array = 1.5 * (energy.deflections(farther) - own) + OWN_ROUNDOFFS * ROUNDOFF * own
     return bound
 
 
@@ -219,7 +223,7 @@ def _words(given: Given, image: _Image, residual: _Residual, distance: Array) ->
     P, ceilings, size, own = problem.loads, problem.ceilings, np.abs(u), residual.own
     distances = distance[:, None] / np.sqrt(known.stiffness) + image.shifts  # u* from t P*
     uncertainty = residual.uncertainty + (
-        np.abs(own) * known.relative + image.coupled + given.remainder[:, None]
+        np.abs(own) * known.relative + image.coupled + given.each[:, None]
     )
     uncertainty += (distance + image.carried_norm)[:, None] * known.reach * (1 + SAFETY)
     sticks = known.sure & (distances < 0.5 * (P - size))
@@ -234,4 +238,7 @@ def _words(given: Given, image: _Image, residual: _Residual, distance: Array) ->
     shifts = image.shifts + moved - distances
     near = Nearness(distance, shifts, moved, available, slip_errors, rise_errors, sliding, partial)
     proved = image.restored & np.isfinite(rise_errors)
-    return bounds_of(given, near, proved, distances + known.image_distances(P, u))
+    increments = distances + known.image_distances(P, u)
+    if proved.any():
+        near, increments = by_largest(given, near, increments)
+    return bounds_of(given, near, proved, increments)

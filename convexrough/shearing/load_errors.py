@@ -21,7 +21,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence import couple
 from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.influence.shells import fitted_shells
-from convexrough.normal.boxes import FIT_FROM, convex_margin
+from convexrough.normal.boxes import FIT_FROM, convex_margin, crowded_margin
 from convexrough.normal.problem import FITTED
 from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -111,7 +111,10 @@ def _above(product: Array, coupling: Coupling, values: Array) -> Array:
 
 
 def _convexity_number(problem: TangentialProblem, stiffness: Array) -> float:
-    """theta: H + A >= (1 - theta) H, by the better of two kinds of shells, or else by Cholesky."""
+    """theta: H + A >= (1 - theta) H, by the better of two kinds of shells, or else as in boxes.
+
+    Among the sure: of crowded contacts by Cholesky's factor or by shells that overlap.
+    """
     theta = float((problem.shells / stiffness).max())
     if theta > FIT_FROM:
         radii = (np.pi / 2.0) * problem.influence.scale / stiffness
@@ -120,7 +123,11 @@ def _convexity_number(problem: TangentialProblem, stiffness: Array) -> float:
     theta *= 1 + SAFETY
     if theta < 1:
         return theta
-    return min(theta, 1.0 - convex_margin(problem.influence, stiffness, MARGINS))
+    margin = convex_margin(problem.influence, stiffness, MARGINS)
+    if not margin > 0:
+        sure = np.flatnonzero(np.isfinite(stiffness))
+        margin = crowded_margin(problem.influence.among(sure), stiffness[sure])
+    return min(theta, 1.0 - margin)
 
 
 def _strays(problem: TangentialProblem) -> Indices:

@@ -46,7 +46,7 @@ def loss_errors(
 ) -> Array:
     """(m,) bounds on |w - w*|."""
     P, most, slips = problem.loads, problem.loads + known.errors, np.abs(states.slips)
-    e = _loss(states.increments / P)
+    e = annulus.loss(problem.widths(states.increments))
     found = P * (0.6 * problem.ceilings * e + 0.5 * slips)
     left = np.maximum(np.abs(near.available) - problem.ceilings, 0.0)
     slid = most * (near.errors + np.abs(slips - left)) + known.errors * slips
@@ -57,7 +57,7 @@ def loss_errors(
     if known.stray > 0:
         travel = np.abs(states.rises) + near.rises
         bound += 0.5 * (known.stray * travel + most @ known.stray_effect + known.stray_among)
-    bound += (LOSS_ROUNDOFFS + len(P)) * ROUNDOFF * found.sum(axis=1)
+    bound += LOSS_ROUNDOFFS * ROUNDOFF * found.sum(axis=1)
     return np.asarray(bound * (1 + SAFETY) + len(P) * np.finfo(float).tiny)
 
 

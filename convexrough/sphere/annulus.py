@@ -25,8 +25,13 @@ def width_at(deflection: Number) -> Number:
 def width_under(force: Number) -> Number:
     """x under a share t of friction, of either sign."""
     size = np.minimum(np.abs(force), 1.0)
-    s = np.cbrt(1.0 - size)
-    return size / (1.0 + s + s * s)
+    return width_between(size, 1.0 - size)
+
+
+def width_between(force: Number, left: Number) -> Number:
+    """x under a share t >= 0, of which `left` = 1 - t is known to digits of its own."""
+    s = np.cbrt(np.maximum(left, 0.0))
+    return np.minimum(force, 1.0) / (1.0 + s + s * s)
 
 
 def force(x: Number) -> Number:

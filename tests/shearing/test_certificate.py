@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 from scenes import MATERIAL, scattered, solve_exactly, twins
 
 import convexrough as cr
-from convexrough.normal.residual import SUM_ROUNDOFFS
 from convexrough.roundoff import ROUNDOFF
-from convexrough.shearing.judgement import SHARE_ROUNDOFFS, judge_states, own_change
+from convexrough.shearing.judgement import judge_states
 from convexrough.shearing.load_errors import LoadErrors
 from convexrough.shearing.problem import TangentialProblem
-from convexrough.sphere import hertz
+from convexrough.sphere import annulus, hertz
 
 
 @settings(max_examples=100, deadline=None)
@@ -161,27 +160,24 @@ def test_just_before_gross_sliding_the_last_one_sticks() -> None:
     assert state.certificate.holds
 
 
-def test_the_law_near_full_slip_loses_more_than_a_few_roundoffs() -> None:
-    """Read forwards, from a force to its deflection; the bounds count a roundoff of the force."""
+def test_the_law_keeps_its_digits_up_to_full_slip() -> None:
+    """Read forwards, from a force to its deflection, and to the loss: roundoffs of the result."""
     problem = TangentialProblem.of(pressed("rough"))
     rng = np.random.default_rng(2)
-    P, worst = problem.loads, 0.0
+    P = problem.loads
     for _ in range(20):
-        u = P * (1 - 2.0 ** rng.uniform(-53, -5, len(P)))
-        own = problem.deflections(u)
+        u = P * (1 - 2.0 ** rng.uniform(-53, -1, len(P)))
         with ctx.workprec(300):
-            shares = [1 - arb(float(a)) / arb(float(b)) for a, b in zip(u, P, strict=True)]
-            true = [
-                arb(float(c)) * (1 - s.root(3) ** 2)
-                for c, s in zip(problem.ceilings, shares, strict=True)
-            ]
-            off_by = np.array(
-                [abs(float(arb(float(a)) - b)) for a, b in zip(own, true, strict=True)]
-            )
-        few = SUM_ROUNDOFFS * ROUNDOFF * own
-        worst = max(worst, float((off_by / few).max()))
-        assert (off_by <= few + own_change(problem, u, own, SHARE_ROUNDOFFS * ROUNDOFF * u)).all()
-    assert worst > 100
+            for own, loss, ceiling, a, b in zip(
+                problem.deflections(u), annulus.loss(problem.widths(u)), problem.ceilings, u, P,
+                strict=True,
+            ):  # fmt: skip
+                t = arb(float(a)) / arb(float(b))
+                s = (1 - t).root(3)
+                true = arb(float(ceiling)) * (1 - s**2)
+                assert abs(arb(float(own)) - true) <= 12 * ROUNDOFF * true
+                lost = 1 - s**5 - 5 * t / 6 * (1 + s**2)
+                assert abs(arb(float(loss)) - lost) <= 20 * ROUNDOFF * lost
 
 
 def ring_of_six(turns: float = 0.0) -> cr.Scene:
