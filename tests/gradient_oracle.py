@@ -14,6 +14,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 
 import convexrough as cr
+from convexrough.arrays import Array
 
 DIGITS = 130
 STEP = "1e-25"  # of each parameter over its own size
@@ -185,12 +186,22 @@ class Judge:
 
     def slope(self, name: str, direction: Balls) -> float:
         """The derivative along `direction` of one parameter, as a float."""
+        return float(self.difference(name, direction))
+
+    def difference(self, name: str, direction: Balls) -> Balls:
+        """The same to 100 digits."""
         with ctx.workdps(DIGITS):
             h = arb(STEP)
             ends = [
                 self.value(self.setup.moved(name, s * h * direction), self.near) for s in (1, -1)
             ]
-            return float((ends[0][0] - ends[1][0]) / (2 * h))
+            return ((ends[0][0] - ends[1][0]) / (2 * h)).mid()
+
+    def off(self, name: str, direction: Balls, slopes: Array) -> float:
+        """How far slopes times a direction are from that, not rounded in between."""
+        found = self.difference(name, direction)
+        with ctx.workdps(DIGITS):
+            return float(abs((exact(slopes) * direction).sum() - found))
 
 
 def press(contact: cr.Contact, setup: Setup, near: Oracle | None) -> Oracle:
