@@ -113,7 +113,8 @@ def draw(path: str, finer: int = 1) -> None:
         loss = cr.Objective(scene=scene(finer), of="approach", load=LOAD)
         touch = loss.gradient(best[0]).contact.loads > 0
         dots = axes.scatter(*points[touch].T, c=best[0][touch] / FARTHEST, **look)
-        axes.scatter(*points[~touch].T, c="none", **look)  # of any height that does not touch
+        rings = {name: look[name] for name in ("edgecolors", "linewidths", "s")}
+        axes.scatter(*points[~touch].T, facecolors="none", **rings)  # these may have any height
         axes.set(
             title=f"{word}: {best[1]:.2f} of equal heights", aspect="equal", xlabel="x / (R / 1000)"
         )
