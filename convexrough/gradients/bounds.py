@@ -41,6 +41,7 @@ class Known(NamedTuple):
     slopes    : (N,) c+, the most that c0* can be;  stiffness : (N,) h = 1 / c+
     distance  : || P* - P ||_h of those that are sure
     roundoff  : of the numbers that are judged
+    apart     : (N,) on |u* - t P*| one by one, where more is known than the norm says
     """
 
     influence: Influence
@@ -54,6 +55,7 @@ class Known(NamedTuple):
     convexity_number: float
     coupling: float
     roundoff: float = ROUNDOFF
+    apart: Array | None = None
 
     @classmethod
     def of(cls, problem: TangentialProblem) -> Known | None:

@@ -8,36 +8,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.gradients.adjoint import Excess, Friction
-from convexrough.gradients.bounds import FEW, Known, Off, above
+from convexrough.gradients.adjoint import Excess
+from convexrough.gradients.bounds import FEW, Off, above
 from convexrough.gradients.doubts import (
     Doubt,
     GivenDoubt,
     LossDoubt,
     StateDoubt,
     Weights,
-    near_of,
     through_pressing,
 )
-from convexrough.gradients.sharp import SHARP, STEPS, Pressed, balanced, rounded
+from convexrough.gradients.sharp import SHARP, STEPS, Pressed, rounded
+from convexrough.gradients.sharp_state import sheared
 from convexrough.gradients.system import Solution, System
-from convexrough.gradients.widths import Widths
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.judgement import StateErrors
 from convexrough.twofold import Twofold, whole
 
-#: An asperity that sticks with at least this part of its slope bounds the rise.
-DEEP = 1e-3
-
-ONE, TWO, THREE, SIX, HALF = (whole(value) for value in (1.0, 2.0, 3.0, 6.0, 0.5))
+TWO, THREE, SIX, HALF = (whole(value) for value in (2.0, 3.0, 6.0, 0.5))
 
 
 class Solved(NamedTuple):
@@ -81,109 +74,9 @@ def solve(
     return Solved(Y, y, solution, Off(each, 0.0, missed))
 
 
-class Sheared(NamedTuple):
-    """A friction state to twice the digits; state and near : of its first halves."""
-
-    pressed: Pressed
-    signs: Twofold
-    deflections: Twofold
-    widths: Twofold
-    slopes: Twofold
-    state: Friction
-    near: StateErrors
-
-    @classmethod
-    def of(
-        cls, pressed: Pressed, state: Friction, near: StateErrors, force: Fraction
-    ) -> Sheared | None:
-        """None where an asperity is not proved to slide or not to."""
-        problem, slides = pressed.problem, state.slides
-        if not (near.sliding | near.partial).all() or (near.sliding != slides).any():
-            return None
-        total = Twofold.nearest(force / Fraction(problem.friction) / Fraction(problem.units.force))
-        system, sign = System(problem, state.slopes), whole(state.signs)
-        eta, rise = whole(state.deflections), whole(state.rise)
-        for step in range(STEPS):
-            law = _law(pressed, sign * eta, slides)
-            if law is None:
-                return None
-            x, u = law
-            u = sign * u
-            moved, off = pressed.coupling.apply(u)
-            left = eta + moved + -rise
-            missing = rounded(u.total() + -total)
-            if step == STEPS - 1 or (np.abs(left.high) <= off).all():
-                break
-            more = system.solve(-left.high, -missing)
-            eta, rise = eta + whole(more.values), rise + whole(more.shift)
-        sizes = np.abs(eta.high) + np.abs(moved.high) + abs(rise.high)
-        residual = np.abs(left.high) + off + SHARP * sizes
-        slopes = pressed.stiffest * (ONE + -x)
-        found = Friction(float(total.high), eta.high, u.high, float(rise.high), x.high, slopes.high)
-        shift = near.rise + abs(rounded(rise + whole(-state.rise)))
-        known = Known.of(pressed.given)
-        assert known is not None  # there is `pressed`
-        softest = Widths.of(known, state, near).softest
-        closer = _closer(pressed, found, near, softest, residual, abs(missing), shift)
-        return cls(pressed, sign, eta, x, slopes, found, closer)
-
-    @property
-    def system(self) -> System:
-        return System(self.pressed.problem, self.state.slopes)
-
-
-def _law(
-    pressed: Pressed, size: Twofold, slides: NDArray[np.bool_]
-) -> tuple[Twofold, Twofold] | None:
-    """x and |u| of deflections |eta|: x = phi / (1 + (1 - phi)^(1/2)), u = P (1 - (1 - x)^3)."""
-    share = size.over(pressed.ceilings)
-    share = Twofold(*(np.where(slides, 0.0, part) for part in share))
-    left = ONE + -share
-    if not (left.high > 0).all():
-        return None
-    x = share.over(ONE + left.root())
-    x = Twofold(np.where(slides, 1.0, x.high), np.where(slides, 0.0, x.low))
-    s = ONE + -x
-    return x, pressed.loads * x * (ONE + s * (ONE + s))
-
-
-def _closer(
-    pressed: Pressed,
-    found: Friction,
-    near: StateErrors,
-    softest: Array,
-    residual: Array,
-    missing: float,
-    shift: float,
-) -> StateErrors:
-    """How near the state found is: the page's "The friction state"."""
-    known, P = pressed.known, pressed.known.loads
-    x, u = found.widths, np.abs(found.increments)
-    size = float(np.sqrt(np.sum(u**2 / known.slopes)))
-    swayed = float(x.max()) * known.distance + SHARP * size  # || u(eta; P*) - u ||_h
-    missing += SHARP * (found.total + float(u.sum()))
-    missing += swayed * float(np.sqrt(known.slopes.sum()))
-    deep = (1.0 - x > DEEP) & (softest > 0)
-    with np.errstate(divide="ignore"):  # 0.99 for C* in place of C
-        least = np.minimum(0.99 * found.slopes, softest)
-        own = np.where(deep, 1.0 / (least * np.sqrt(known.slopes)), np.inf)
-    felt = known.dual(residual) + known.coupling * swayed
-    each = residual + pressed.reach * swayed
-    distance, rise = balanced(known, felt, each, missing, shift, own + pressed.reach)
-    share = float((u / P).max())
-    distance += (float(x.max()) + share) * known.distance + SHARP * size
-    return near._replace(
-        distance=distance * (1 + SAFETY),
-        carried=share * known.distance,
-        shifts=np.zeros(len(x)),
-        uncertainty=residual,
-        rise=rise,
-    )
-
-
 def of_loss(doubt: LossDoubt, pressed: Pressed) -> tuple[Twofold, Weights] | None:
     """omega, and what it is off by."""
-    found = _sheared(pressed, doubt.state, doubt.force)
+    found = sheared(pressed, doubt.state, doubt.force)
     if found is None or doubt.beyond.solution is None:
         return None
     x, P, C = found.widths, pressed.loads, pressed.ceilings
@@ -203,15 +96,15 @@ def of_loss(doubt: LossDoubt, pressed: Pressed) -> tuple[Twofold, Weights] | Non
     slip = Twofold(*(np.where(found.state.slides, part, 0.0) for part in slip))
     omega = -(C * x * x * x).over(SIX) + HALF * (slip + found.signs * x * solved.values)
     judged = replace(doubt, factor=1.0, state=found.state, beyond=beyond)
-    return omega, judged.judged(pressed.known, pressed.problem, found.near, solved.off)
+    return omega, judged.judged(found.known, pressed.problem, found.near, solved.off)
 
 
 def of_state(doubt: StateDoubt, pressed: Pressed) -> tuple[Twofold, Weights] | None:
     """sigma x zeta - (2 / 3) sigma e C / P, and what that is off by."""
-    found = _sheared(pressed, doubt.state, doubt.force)
+    found = sheared(pressed, doubt.state, doubt.force)
     if found is None:
         return None
-    problem, known = pressed.problem, pressed.known
+    problem, known = pressed.problem, found.known
     e = np.where(found.state.slides, doubt.slips, 0.0)
     felt, off = pressed.coupling.apply(whole(e))
     solved = solve(
@@ -280,8 +173,3 @@ def refined_errors(
     computed = whole(problem.stiffest * pressing.values)
     errors[known.places] = np.abs((computed + -solved.forces).high) * (1 + SAFETY) + left
     return errors
-
-
-def _sheared(pressed: Pressed, state: Friction, force: Fraction) -> Sheared | None:
-    near = near_of(pressed.given, state)
-    return None if near is None else Sheared.of(pressed, state, near, force)

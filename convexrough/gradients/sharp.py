@@ -15,6 +15,7 @@ from convexrough.gradients.origin import pressed
 from convexrough.gradients.system import System
 from convexrough.influence import Influence
 from convexrough.normal.residual import INVERSE_PI
+from convexrough.normal.sup_norm import SupNorm
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.load_errors import LoadErrors
 from convexrough.shearing.problem import TangentialProblem
@@ -34,7 +35,7 @@ FARTHEST = 2.0**9
 STEPS = 4
 
 #: Loads must then be known to this part of themselves.
-CLOSE = 1e-9
+CLOSE = 1e-6
 
 #: How often a bound on a multiplier, and that on the distance, sharpen each other.
 ROUNDS = 8
@@ -135,8 +136,12 @@ class Pressed(NamedTuple):
         most, fewest = known.loads + known.errors, known.loads - known.errors
         reach = LoadErrors.of(problem).reach
         rates = np.cbrt(most / fewest) / np.sqrt(known.slopes) + reach
-        distance, _ = balanced(known, known.dual(residual), residual, missing, shift, rates)
+        distance, shift = balanced(known, known.dual(residual), residual, missing, shift, rates)
         errors, away = distance * np.sqrt(known.slopes), np.abs((P + whole(-problem.loads)).high)
+        sup = SupNorm.of(problem.influence, 1.0 / known.slopes)
+        if sup is not None:
+            apart = residual + shift
+            errors = np.minimum(errors, sup.load_errors(apart, float(apart.max())))
         near = (away <= known.errors + 8 * ROUNDOFF * known.loads).all()
         if not near or not (errors < CLOSE * known.loads).all():
             return None

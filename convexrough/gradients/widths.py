@@ -59,6 +59,7 @@ class Widths(NamedTuple):
         def about(distance: float) -> tuple[Array, Array, Array]:
             """Bounds on |delta|, and on s* from both sides."""
             each = distance * np.sqrt(known.slopes) + shifts
+            each = each if known.apart is None else np.minimum(each, known.apart)
             off = each / fewest + 4 * ROUNDOFF * t
             low = np.cbrt(np.maximum(1.0 - t - off, 0.0)) - 4 * ROUNDOFF
             return each, np.maximum(low, 0.0), np.cbrt(np.minimum(1.0 - t + off, 1.0))
