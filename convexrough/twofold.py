@@ -53,6 +53,31 @@ class Twofold(NamedTuple):
         left = self + -(divisor * Twofold(first, 0.0 * first))
         return Twofold(*_settled(first, (left.high + left.low) / divisor.high))
 
+    def root(self) -> Twofold:
+        """The square root of positive numbers, by one step of Newton's from that of the first."""
+        first = np.sqrt(self.high)
+        left = self + -Twofold(*exact_product(first, first))
+        return Twofold(*_settled(first, (left.high + left.low) / (2.0 * first)))
+
+    def cube_root(self) -> Twofold:
+        """The same of third roots."""
+        first = np.cbrt(self.high)
+        square = Twofold(*exact_product(first, first))
+        left = self + -(square * whole(first))
+        return Twofold(*_settled(first, (left.high + left.low) / (3.0 * square.high)))
+
+    def total(self) -> Twofold:
+        """The sum along the last axis, in pairs of pairs."""
+        high, low = np.asarray(self.high), np.asarray(self.low)
+        while (n := high.shape[-1]) > 1:
+            half = n // 2
+            pairs = Twofold(high[..., :half], low[..., :half]) + Twofold(
+                high[..., half : 2 * half], low[..., half : 2 * half]
+            )
+            high = np.concatenate((pairs.high, high[..., 2 * half :]), axis=-1)
+            low = np.concatenate((pairs.low, low[..., 2 * half :]), axis=-1)
+        return Twofold(high[..., 0], low[..., 0])
+
 
 def exact_sum(a: Number, b: Number) -> tuple[Number, Number]:
     """The rounded sum and what it is off by."""

@@ -45,6 +45,7 @@ def main() -> None:
         print(path)
     example_of_design = run_path(str(EXAMPLES / "design_a_damper.py"))
     example_of_design["draw"](str(FOLDER / "design.png"))
+    example_of_design["draw"](str(FOLDER / "design-fine.png"), 4)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ force, and the loss as eight times the error of the trapezoid rule. Who touches 
 taken from a state in float64 and must not change within a step.
 """
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
@@ -14,6 +15,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 
 import convexrough as cr
+from convexrough.arrays import Array
 
 DIGITS = 130
 STEP = "1e-25"  # of each parameter over its own size
@@ -114,6 +116,14 @@ class Oracle:
         return gaps
 
     @property
+    def smooth_loss(self) -> Balls:
+        """W0 = 9 (2 - nu) f^2 P^2 / (5 G a), G = (1 - nu) E*, a that of the smooth sphere."""
+        s, P = self.setup, self.P.sum()
+        a = (3 * P * s.sphere_radius / (4 * s.contact_modulus)).root(3)
+        nu, f = s.poisson_ratio, s.friction
+        return 9 * (2 - nu) * f * f * P * P / (5 * (1 - nu) * s.contact_modulus * a)
+
+    @property
     def ratio(self) -> Balls:
         nu = self.setup.poisson_ratio
         return (2 - nu) / (2 * (1 - nu))
@@ -175,6 +185,86 @@ class Sheared:
         return 8 * self.oracle.ratio * f * f * (self.T * self.rise / 2 - energy)
 
 
+@dataclass(frozen=True)
+class Past:
+    """A history by Masing's rule, in multiprecision.
+
+    forces : (m,) Q;  etas : deflections at each T that was asked for, to start from
+    """
+
+    oracle: Oracle
+    forces: Balls
+    etas: dict[tuple[int, int], Balls]
+
+    def state(self, i: int, j: int) -> Sheared:
+        """First loading to T = |Q_i - Q_j| / 2 f, or to |Q_i| / f where j is -1."""
+        friction = self.oracle.setup.friction
+        T = abs(self.forces[i]) if j < 0 else abs(self.forces[i] - self.forces[j]) / 2
+        found = self.oracle.friction(T / friction, self.etas[i, j], 4)
+        self.etas[i, j] = found.eta
+        return found
+
+    @property
+    def displacements(self) -> Balls:
+        """By the extremes that are remembered: the farthest, the farthest back since, and on."""
+        found = []
+        for m in range(len(self.forces)):
+            extremes, begin, ahead = [-1], 0, 0
+            while begin <= m:
+                left = range(begin, m + 1)
+                size = [float(self.forces[i]) * (ahead or 1) for i in left]
+                if not ahead:
+                    size = [abs(each) for each in size]
+                farthest = max(left, key=lambda i: (size[i - begin], i))
+                extremes.append(farthest)
+                ahead = -ahead or (-1 if self.forces[farthest] > 0 else 1)
+                begin = farthest + 1
+            X = arb(0)
+            for before, after in itertools.pairwise(extremes):
+                step = self.forces[after] - (self.forces[before] if before >= 0 else 0)
+                if step != 0:
+                    sign = (1 if step > 0 else -1) * (1 if before < 0 else 2)
+                    X += sign * self.state(after, before).displacement
+            found.append(X)
+        return np.array(found)
+
+    @property
+    def energies(self) -> Balls:
+        """A branch costs half of a cycle of its range, first loading a quarter."""
+        found, lost, turns, now = [], arb(0), [], -1
+        for m, force in enumerate(self.forces):
+            here = self.forces[now] if now >= 0 else arb(0)
+            if force != here:
+                up = 1 if force > here else -1
+                if now >= 0 and self._direction(turns, now) != up:
+                    turns.append(now)
+                lost += self._along(turns, now, m, up)
+            found.append(lost)
+            now = m
+        return np.array(found)
+
+    def _direction(self, turns: list[int], now: int) -> int:
+        before = self.forces[turns[-1]] if turns else 0
+        return 1 if self.forces[now] > before else -1
+
+    def _along(self, turns: list[int], now: int, to: int, up: int) -> Balls:
+        """From one force to another, over the branches that close in between."""
+        lost = arb(0)
+        while turns:
+            turn = turns[-1]
+            closing = self.forces[turns[-2]] if len(turns) > 1 else -self.forces[turn]
+            lost -= self._half(now, turn)
+            if up * (self.forces[to] - closing) < 0:
+                return lost + self._half(to, turn)
+            lost += self._half(turns[-2], turn) if len(turns) > 1 else self._half(turn, -1)
+            now = turns[-2] if len(turns) > 1 else turn
+            del turns[-2:]
+        return lost + (self._half(to, -1) - self._half(now, -1)) / 2
+
+    def _half(self, i: int, j: int) -> Balls:
+        return self.state(i, j).loss / 2 if i >= 0 and i != j else arb(0)
+
+
 class Judge:
     """Derivatives of a number by differences of it: value(setup, near) -> (number, state)."""
 
@@ -185,12 +275,22 @@ class Judge:
 
     def slope(self, name: str, direction: Balls) -> float:
         """The derivative along `direction` of one parameter, as a float."""
+        return float(self.difference(name, direction))
+
+    def difference(self, name: str, direction: Balls) -> Balls:
+        """The same to 100 digits."""
         with ctx.workdps(DIGITS):
             h = arb(STEP)
             ends = [
                 self.value(self.setup.moved(name, s * h * direction), self.near) for s in (1, -1)
             ]
-            return float((ends[0][0] - ends[1][0]) / (2 * h))
+            return ((ends[0][0] - ends[1][0]) / (2 * h)).mid()
+
+    def off(self, name: str, direction: Balls, slopes: Array) -> float:
+        """How far slopes times a direction are from that, not rounded in between."""
+        found = self.difference(name, direction)
+        with ctx.workdps(DIGITS):
+            return float(abs((exact(slopes) * direction).sum() - found))
 
 
 def press(contact: cr.Contact, setup: Setup, near: Oracle | None) -> Oracle:
@@ -226,6 +326,33 @@ def sheared(contact: cr.Contact, holding: str, force: float) -> Callable[[Setup,
         return oracle.friction(setup.forces[0] / setup.friction, start, steps)
 
     return solved
+
+
+def remembered(contact: cr.Contact) -> Callable[[Setup, Any], Past]:
+    """From a setup, whose forces are those of a history, and a past near it to its past."""
+
+    def solved(setup: Setup, near: Past | None) -> Past:
+        oracle = press(contact, setup, None if near is None else near.oracle)
+        etas = _Starts(contact, setup.forces)
+        etas.update({} if near is None else near.etas)
+        return Past(oracle, setup.forces, etas)
+
+    return solved
+
+
+class _Starts(dict[tuple[int, int], Balls]):
+    """Deflections to start from, of float64 states."""
+
+    def __init__(self, contact: cr.Contact, forces: Balls) -> None:
+        super().__init__()
+        self.contact, self.forces = contact, [float(force) for force in forces]
+
+    def __missing__(self, pair: tuple[int, int]) -> Balls:
+        (i, j), Q, scene = pair, self.forces, self.contact.scene
+        state = cr.shear(self.contact, force=abs(Q[i]) if j < 0 else abs(Q[i] - Q[j]) / 2)
+        nu = scene.material.poisson_ratio
+        travel = (2 - nu) / (2 * (1 - nu)) * (scene.friction or 1.0)
+        return exact(state.displacements[np.flatnonzero(self.contact.loads)] / travel)
 
 
 def assert_slopes(judge: Judge, gradient: cr.Gradient, tolerance: float, seed: int = 0) -> None:

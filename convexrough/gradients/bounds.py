@@ -40,6 +40,8 @@ class Known(NamedTuple):
     loads     : (N,) P;  errors : (N,) b
     slopes    : (N,) c+, the most that c0* can be;  stiffness : (N,) h = 1 / c+
     distance  : || P* - P ||_h of those that are sure
+    roundoff  : of the numbers that are judged
+    apart     : (N,) on |u* - t P*| one by one, where more is known than the norm says
     """
 
     influence: Influence
@@ -52,6 +54,8 @@ class Known(NamedTuple):
     distance: float
     convexity_number: float
     coupling: float
+    roundoff: float = ROUNDOFF
+    apart: Array | None = None
 
     @classmethod
     def of(cls, problem: TangentialProblem) -> Known | None:
@@ -105,6 +109,25 @@ class Known(NamedTuple):
         scaled = np.where(self.unsure, 0.0, weights * np.sqrt(self.slopes))
         return norm(scaled, each, self.distance)
 
+    def rounding(self, solution: Solution, forces: Array, sizes: Array, total: float | None) -> Off:
+        """That of a system solved in float64: y, and the sizes of what was coupled to find Y."""
+        magnitude, off = above(self.influence, sizes), self.influence.rounding(sizes)
+        each = off.relative * magnitude + FEW * ROUNDOFF * (magnitude + abs(solution.shift))
+        missing = 0.0 if total is None else abs(float(forces.sum()) - total)
+        return Off(each, off.norm, missing + len(forces) * ROUNDOFF * float(sizes.sum()))
+
+
+class Off(NamedTuple):
+    """What rounding leaves of a system.
+
+    each    : (N,) bounds on the error of its defect, less a remainder;  norm : 2-norm of that
+    missing : bound on what the sum of y misses where it is prescribed
+    """
+
+    each: Array
+    norm: float
+    missing: float
+
 
 class Moved(NamedTuple):
     """Bounds on m = db + dc Y, what b and c change at this Y.
@@ -135,10 +158,9 @@ class Rest(NamedTuple):
 def respond(
     known: Known,
     solution: Solution,
+    off: Off,
     moved: Moved,
     *,
-    forces: Array,
-    sizes: Array,
     least: float,
     total: float | None,
     residual: float = 0.0,
@@ -146,17 +168,14 @@ def respond(
 ) -> Rest:
     """The lemma of the page: y* - y = m + e, with Y = beta - A y + r.
 
-    forces   : (N,) y;  sizes : (N,) of what was coupled to find Y
     least    : a lower bound on sum c* of those that are sure
-    total    : sum y where it is prescribed
+    total    : sum y, None where it is not prescribed
     residual : on || r ||_(1/h) beyond the defect and rounding;  residual_unsure : (N,) on |r|
     """
     unsure, theta, reach = known.unsure, known.convexity_number, known.coupling
     kappa = 0.5 * np.sqrt((reach + theta) / (1.0 - theta)) + theta / (1.0 - theta)
     rho = max(reach / (1.0 + reach), theta / (1.0 - theta))
-    magnitude, off = above(known.influence, sizes), known.influence.rounding(sizes)
-    rounding = off.relative * magnitude + FEW * ROUNDOFF * (magnitude + abs(solution.shift))
-    defect = np.abs(known.spread(solution.defect)) + rounding
+    defect = np.abs(known.spread(solution.defect)) + off.each
     largest = float(np.sqrt(known.slopes[known.sure].max(initial=0.0)))
     apart = defect + off.norm + (0.0 if residual_unsure is None else residual_unsure)
     strayed = np.where(unsure, moved.each + known.slopes * apart, 0.0)
@@ -165,7 +184,7 @@ def respond(
     lost, root = 0.0, float(np.sqrt(least)) or np.nan
     if total is not None:  # what the sum of m misses is shared out in proportion to c*
         lost = moved.loose * float(np.sqrt(known.slopes[known.sure].sum())) + float(strayed.sum())
-        lost += abs(float(forces.sum()) - total) + len(forces) * ROUNDOFF * float(sizes.sum())
+        lost += off.missing
     other = moved.loose + (lost / root if lost else 0.0)
     e = rho * moved.firm + kappa * other + r / (1.0 - theta)
     values = kappa * moved.firm + reach * (1.0 + kappa) * other + (1.0 + kappa) * r
@@ -175,7 +194,7 @@ def respond(
         shift = (values + moved.firm + gone / root) / root
     each = moved.each + np.sqrt(known.slopes) * (e + lost / root + moved.firm) + strayed
     if not np.isfinite(values + shift):
-        return Rest(np.inf, np.inf, np.full(len(forces), np.inf), np.full(len(forces), np.inf))
+        return Rest(np.inf, np.inf, np.full(len(each), np.inf), np.full(len(each), np.inf))
     if unsure.any():
         apart = shift + above(known.influence, each) + apart
     return Rest(values, shift, each * (1 + SAFETY), np.where(unsure, apart, 0.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +48,8 @@ def cycle_gradient(
     else:
         beyond = excess(problem, state, System(problem, state.slopes, tolerance))
         pulled = through_loss(problem, state, beyond)
-        doubts = [LossDoubt(loading.energy_unit, state, beyond)]
+        force = (Fraction(cycle.maximum) - Fraction(cycle.minimum)) / 2
+        doubts = [LossDoubt(loading.energy_unit, state, beyond, force)]
     pulled = pulled.scaled(loading.energy_unit)
     adjoint = through_pressing(problem, pulled, holding, tolerance)
     by_force = pulled.total / (2.0 * problem.force_unit)
@@ -105,6 +107,12 @@ def history_gradient(
         lost[i] += each.lost * loading.energy_unit
         rises[i] += each.moved * problem.travel_unit
 
+    apart: list[dict[Fraction, tuple[float, float]]] = [{} for _ in states.totals]
+    for each, i in zip(asked, back, strict=True):  # one T in float64 may be several forces
+        force = each.force(history.applied)
+        lost_so, moved_so = apart[i].get(force, (0.0, 0.0))
+        apart[i][force] = lost_so + each.lost, moved_so + each.moved
+
     zero = np.zeros(len(problem))
     spent = float(on_energy @ history.energy)
     far = float(on_moved @ history.displacements)
@@ -113,17 +121,20 @@ def history_gradient(
     by_lost, by_rise = np.zeros_like(lost), np.zeros_like(rises)  # dw/dT, dDelta/dT
     for i, total in enumerate(states.totals):
         state = Friction.among(problem, states, i)
-        system = System(problem, state.slopes, tolerance)
+        system, rising = System(problem, state.slopes, tolerance), None
         beyond = excess(problem, state, system)
         loss = through_loss(problem, state, beyond)
         pulled, by_lost[i] = pulled.plus(loss.scaled(lost[i])), loss.total
-        doubts.append(LossDoubt(lost[i], state, beyond))
         by_friction += rises[i] * beyond.rise - lost[i] * loss.total * total
         if rises[i]:
             rise = through_rise(problem, state, system)
             pulled, by_rise[i] = pulled.plus(rise.scaled(rises[i])), rise.total
-            assert rise.solution is not None
-            doubts.append(StateDoubt(rises[i], state, rise.solution, zero, -1.0))
+            rising = rise.solution
+        for force, (lost_so, moved_so) in apart[i].items():
+            doubts.append(LossDoubt(lost_so * loading.energy_unit, state, beyond, force))
+            if rising is not None:
+                factor = moved_so * problem.travel_unit
+                doubts.append(StateDoubt(factor, state, rising, zero, zero, -1.0, force))
     by_force = np.zeros(m)
     lost_by, rise_by = by_lost * loading.energy_unit, by_rise * problem.travel_unit
     for each, i in zip(asked, back, strict=True):
@@ -151,6 +162,13 @@ class _LookUp(NamedTuple):
     lost: float
     moved: float
     ends: list[tuple[int, float]]
+
+    def force(self, applied: Array) -> Fraction:
+        """[force] f T, exactly; of T = 0, whose ends do not matter, it is 0."""
+        if self.total == 0.0:
+            return Fraction(0)
+        ends = ((Fraction(float(applied[i])), Fraction(part)) for i, part in self.ends)
+        return sum((force * part for force, part in ends), Fraction(0))
 
 
 def _look_ups(applied: Array, on_energy: Array, on_moved: Array) -> list[_LookUp]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from convexrough import checks
 from convexrough.arrays import Array
-from convexrough.contact import press
+from convexrough.contact import Contact, press
 from convexrough.errors import InputError
 from convexrough.gradients.gradient import Gradient
 from convexrough.influence import Kind
@@ -103,7 +103,7 @@ class Objective(Record):
         )
         force = control["force"]
         if self.of == "loss":
-            return cycle(contact, maximum=force).gradient()
+            return _loss(contact, force)
         if self.of == "displacement":
             return shear(contact, force=force).gradient(displacement=1.0)
         if self.of == "approach":
@@ -162,6 +162,18 @@ class Objective(Record):
         if "friction" in given:
             scene = replace(scene, friction=float(given["friction"]))
         return scene
+
+
+def _loss(contact: Contact, force: float | None) -> Gradient:
+    """That of the cycle between -force and force, which errors call what the user does."""
+    if force is not None:
+        checks.non_negative("force", force)
+    try:
+        return cycle(contact, maximum=force).gradient()
+    except InputError as error:
+        if not error.what.startswith("maximum"):
+            raise
+        raise InputError("force", found=error.found, expected=error.expected) from None
 
 
 def _slope(gradient: Gradient, name: str) -> Any:

@@ -30,6 +30,7 @@ class Origin(Record):
 
     pressing : of the pressed state, with sum lambda = total where the load is held
     doubts   : about the weights on loads that it was solved for; None where nothing is known
+    mixed    : of more than one J, each times a number
     """
 
     contact: Contact
@@ -42,6 +43,7 @@ class Origin(Record):
     pressing: Solution
     total: float | None
     doubts: tuple[Doubt, ...] | None
+    mixed: bool = False
 
     @classmethod
     def of(
@@ -93,6 +95,7 @@ class Origin(Record):
                 np.abs(own * one.defect) + np.abs(factor * two.defect),
             ),
             doubts=doubts,
+            mixed=True,
         )
 
     @cached_property

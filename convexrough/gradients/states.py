@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,15 +53,15 @@ def contact_gradient(
     pulled = Pulled(on_loads[touching] * units.force, np.zeros(len(problem)), [])
     whole = (D - float(on_gaps.sum())) * units.length
     off = np.where(contact.loads > 0, 0.0, np.abs(on_loads)) * units.force
-    doubts: list[Doubt] | None = [GivenDoubt(1.0, off)]
     if len(far):
         away = couple(contact.scene, far, problem.influence.scale, contact.influence)
         onto = away.onto(contact.scene.contact_points[touching])
         pulled = pulled._replace(loads=pulled.loads + onto.apply(on_gaps[far]) * units.length)
         sizes = np.abs(on_gaps[far])
         off[touching] += onto.rounding(sizes).of(onto.apply(sizes)) * units.length
-        if (contact.status == "undecided").any():  # whose gap may not be there
-            doubts = None
+    doubts: list[Doubt] | None = [GivenDoubt(1.0, pulled.loads, off)]
+    if len(far) and (contact.status == "undecided").any():  # whose gap may not be there
+        doubts = None
     adjoint = through_pressing(problem, pulled, holding, tolerance, whole)
     origin = Origin.of(contact, adjoint, holding, doubts=doubts, approach=whole)
     if len(far):
@@ -132,7 +133,8 @@ def state_gradient(
         )
         assert pulled.solution is not None
         total = -rise - float(moved[there.slides].sum())
-        doubts = [StateDoubt(1.0, there, pulled.solution, moved, total)]
+        force = abs(Fraction(state.force))
+        doubts = [StateDoubt(1.0, there, pulled.solution, increments, moved, total, force)]
         beyond, slides = excess(problem, there, system), there.slides
         by_force = pulled.total
         by_friction = rise * beyond.rise + float(increments @ beyond.increments)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.gradients.adjoint import Friction
-from convexrough.gradients.bounds import FEW, Known, Moved, Rest, norm, respond
+from convexrough.gradients.bounds import FEW, Known, Moved, Off, Rest, norm, respond
 from convexrough.gradients.system import Solution
 from convexrough.roundoff import ROUNDOFF
 from convexrough.shearing.judgement import StateErrors
@@ -59,6 +59,7 @@ class Widths(NamedTuple):
         def about(distance: float) -> tuple[Array, Array, Array]:
             """Bounds on |delta|, and on s* from both sides."""
             each = distance * np.sqrt(known.slopes) + shifts
+            each = each if known.apart is None else np.minimum(each, known.apart)
             off = each / fewest + 4 * ROUNDOFF * t
             low = np.cbrt(np.maximum(1.0 - t - off, 0.0)) - 4 * ROUNDOFF
             return each, np.maximum(low, 0.0), np.cbrt(np.minimum(1.0 - t + off, 1.0))
@@ -72,15 +73,19 @@ class Widths(NamedTuple):
         least = float(softest(about(distance)[1])[known.sure].sum())
         if state.total:
             swayed = np.sqrt((1.0 + known.coupling) / (1.0 - known.convexity_number))
-            distance += 8 * ROUNDOFF * state.total * (swayed / np.sqrt(least) if least else np.inf)
+            distance += (
+                8 * known.roundoff * state.total * (swayed / np.sqrt(least) if least else np.inf)
+            )
         each, low, high = about(distance)
         with np.errstate(divide="ignore"):
             per = 1.0 / (fewest * (s * s + s * low + low * low))
         wholly = np.maximum(high - s, s - low) + 4 * ROUNDOFF
         errors = np.where(low > 0, np.minimum(per * each, wholly), wholly)
-        errors += np.where(low > 0, 4 * ROUNDOFF * t * per * fewest, 0.0)
-        rounding = np.abs(known.spread(state.widths) - thin) + 4 * ROUNDOFF * thin
-        rounding += np.where(low > 0, 4 * ROUNDOFF * t * per * fewest, 0.0)
+        rounded = 4 * known.roundoff * np.where(low > 0, t * per * fewest, 0.0)
+        errors += rounded
+        rounding = rounded + 4 * known.roundoff * thin
+        if known.roundoff == ROUNDOFF:
+            rounding += np.abs(known.spread(state.widths) - thin)
         per, errors, rounding = (
             np.where(settled | known.unsure, 0.0, each) for each in (per, errors, rounding)
         )
@@ -94,7 +99,7 @@ class Widths(NamedTuple):
             farthest=np.where(known.unsure, 1.0, np.minimum(x, 1.0)),
             sticks=np.where(settled, 0.0, np.minimum(s + errors + rounding, 1.0)),
             softest=softest(low),
-            ceilings=np.where(known.unsure, 1.5 * most * h, most * h * 1.5),
+            ceilings=1.5 * most * h * np.where(known.unsure, 1.0, np.cbrt(most / fewest) ** 2),
             most=most,
             fewest=fewest,
             slopes=known.slopes,
@@ -122,13 +127,13 @@ class Widths(NamedTuple):
         per_width: Array,
         per_load: Array,
         *,
-        forces: Array,
+        off: Off,
         sizes: Array,
         loose: Array,
         total: float,
     ) -> Rest:
         """`bounds.respond` for m = per_width |dx| + per_load |P* - P|, of the unsure `loose`."""
-        rounding = np.where(self.sure, FEW * ROUNDOFF * sizes, 0.0)
+        rounding = np.where(self.sure, FEW * known.roundoff * sizes, 0.0)
         firmly = self.sure & (self.softest > FIRM * self.slopes)
 
         def moved(which: NDArray[np.bool_], least: Array) -> float:
@@ -140,13 +145,12 @@ class Widths(NamedTuple):
         return respond(
             known,
             solution,
+            off,
             Moved(
                 moved(firmly, self.softest),
                 moved(self.sure & ~firmly, self.slopes),
                 np.where(known.unsure, loose, each),
             ),
-            forces=forces,
-            sizes=sizes,
             least=float(self.softest.sum()),
             total=total,
         )

@@ -10,6 +10,7 @@ from gradient_oracle import Judge, Setup, Sheared, assert_slopes, close, exact, 
 from scenes import NAMED
 
 import convexrough as cr
+from convexrough.sphere import mindlin
 
 #: What float64 leaves, over the largest term; and close to gross sliding, where 1 - Q / (f P) is
 #: itself known to a part in 1e13 only.
@@ -258,3 +259,47 @@ def test_no_derivative_in_gross_sliding() -> None:
     together = cr.press(even, load=1e-8)
     with pytest.raises(cr.InputError, match="several asperities slide last, together"):
         cr.cycle(together, maximum=FRICTION * together.load).gradient()
+
+
+def directly(contact: cr.Contact, fraction: float) -> tuple[Any, Any]:
+    """The direct form: 8 c_t f^2 times -u + T (q(P) + q(P - T)) / 2, q = dP_i / dP.
+
+    With u by two pressed states, and from the increments.
+    """
+    scene, P = contact.scene, contact.load
+    left = cr.press(scene, load=P * (1 - fraction))
+    shares = [-each.gradient(approach=1.0, holding="load").heights for each in (contact, left)]
+    state = cr.shear(contact, force=fraction * FRICTION * P)
+    unit = 8 * mindlin.ratio(scene.material.poisson_ratio) * FRICTION**2
+    ends = fraction * P / 2 * (shares[0] + shares[1])
+    return unit * (ends + left.loads - contact.loads), unit * (ends - state.forces / FRICTION)
+
+
+def test_the_direct_form_cancels() -> None:
+    """It is right, and loses digits as (f P / Q)^3 by two pressed states, ^2 by increments."""
+    contact = pressed("rough", "load")
+    one = np.zeros(len(contact.scene))
+    for fraction in (0.5, 1e-2, 1e-4, 1e-6):
+        force = fraction * FRICTION * contact.load
+        heights = cr.cycle(contact, maximum=force).gradient().heights
+        i = int(np.argmax(np.abs(heights)))
+        one[:] = 0.0
+        one[i] = contact.approach
+        true = judged(contact, "load", force).slope("heights", exact(one)) / contact.approach
+        by_states, by_increments = (abs(each[i] / true - 1) for each in directly(contact, fraction))
+        assert abs(heights[i] / true - 1) < 1e-14
+        if fraction == 0.5:
+            assert by_states < 1e-14
+            assert by_increments < 1e-14
+        else:
+            assert 1.0 < by_states / (2.0**-53 / fraction**3) < 100.0
+            assert 1.0 < by_increments / (2.0**-53 / fraction**2) < 1000.0
+
+
+def test_the_direct_form_is_not_that_of_backward_increments() -> None:
+    contact, fraction = dragged(4.8e-5), 0.1
+    gradient = cr.cycle(contact, maximum=fraction * FRICTION * contact.load).gradient(
+        holding="load"
+    )
+    _, found = directly(contact, fraction)
+    assert np.abs(found - gradient.heights).max() > 1e-4 * np.abs(gradient.heights).max()

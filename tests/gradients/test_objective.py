@@ -164,3 +164,27 @@ def test_a_copy_with_other_numbers() -> None:
     objective = of_loss("heights")
     assert objective.by == ("heights",)
     assert replace(objective, force=1e-8)(objective.start)[0] < objective(objective.start)[0]
+
+
+@pytest.mark.parametrize(
+    ("of", "force", "said"),
+    [
+        ("loss", 9.0, "^force: found 9: gross sliding, .* expected at most f P"),
+        ("loss", -1e-8, "^force: found -1e-08, expected a number that is not negative"),
+        ("displacement", 9.0, "^force: found 9: gross sliding"),
+    ],
+)
+def test_mistakes_go_by_the_name_that_was_written(of: str, force: float, said: str) -> None:
+    objective = of_loss(of=of, force=force)
+    with pytest.raises(cr.InputError, match=said):
+        objective(objective.start)
+
+
+def test_gross_sliding_at_an_approach_goes_by_that_name_too() -> None:
+    scene = of_loss().scene
+    contact = cr.press(scene, approach=5e-5)
+    objective = cr.Objective(
+        scene=scene, of="loss", approach=5e-5, force=(scene.friction or 0.0) * contact.load
+    )
+    with pytest.raises(cr.InputError, match=r"^force: .* with the approach held"):
+        objective(objective.start)
