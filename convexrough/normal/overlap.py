@@ -35,9 +35,6 @@ WIDE = 2.0
 #: Nor at more asperities than this: elimination takes 5 s at 100,000, several times if it succeeds.
 MOST_ELIMINATED = 200_000
 
-#: Of more than this, only each third margin is tried.
-MANY = 20_000
-
 
 class Overlaps(NamedTuple):
     """Pairs of shells that overlap."""
@@ -54,8 +51,6 @@ def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[f
     if len(points) > MOST_ELIMINATED:
         return 0.0
     error = 2.0 * influence.entry_error + 32 * ROUNDOFF
-    if len(points) > MANY:
-        margins = margins[::3]
     near = Nearest.of(points, lengths)
     if not near.closest.max(initial=0.0) < 1:
         return 0.0
