@@ -21,7 +21,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.convex.definite import largest, proved_margin
 from convexrough.influence.coupling import Influence
 from convexrough.influence.shells import fitted_shells
-from convexrough.normal.overlap import overlapping_margin
+from convexrough.normal.overlap import Nearest, overlapping_margin
 from convexrough.normal.problem import FITTED, NormalProblem
 from convexrough.roundoff import ROUNDOFF
 
@@ -130,13 +130,16 @@ def _scaled(influence: Influence, stiffness: Array) -> Array:
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
-    """Asperities that are too near to one that touches, or too near for its size."""
+    """Asperities in a pair that can be no least of the energy, or else in one whose shells meet."""
     which = np.flatnonzero(loads)
     if len(which) < 2:
         return which
     influence = problem.influence.among(which)
-    shells = _shells(influence, problem.stiffness(loads), which)
-    return np.flatnonzero(shells / problem.stiffness(loads) >= 1.0)
+    near = Nearest.of(influence.points, influence.scale / problem.stiffness(loads)[which])
+    for poor in (near.closest >= 1.0 - CROWDED_MARGINS[0], near.meeting):
+        if poor.any():
+            return which[poor]
+    return which
 
 
 def _shells(influence: Influence, stiffness: Array, which: Indices) -> Array:

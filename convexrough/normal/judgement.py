@@ -41,7 +41,7 @@ from convexrough.sphere import hertz
 
 #: Boxes of those that touch that are tried: larger ones where the solution may be outside, and with
 #: asperities let in that are not proved open. Heuristics, as is the room that a box leaves.
-ATTEMPTS, ROOM = 6, 3.0
+ATTEMPTS, ROOM = 6, 2.0
 
 NONE = np.zeros(0, dtype=np.intp)
 

@@ -14,21 +14,26 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Influence
+from convexrough.influence.packing import NEAREST
 from convexrough.roundoff import ROUNDOFF
 
 #: Radii of shells over t that are tried, the cheapest first; wider for a pair that is nearly as
-#: close as can be. Heuristics: any radii prove what they say.
-WIDTHS = (4.0, 8.0)
+#: close as can be, and beside wider ones. Heuristics: any radii prove what they say.
+WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
 #: No more pairs of shells are looked at than so many for each asperity: what memory holds.
 MOST_PAIRS = 200
 
-#: Nor at more asperities than this: elimination would take minutes, where a press takes a second.
-MOST_ELIMINATED = 50_000
+#: Shells wider than this many times the middle one are looked at one by one: for speed only.
+WIDE = 2.0
+
+#: Nor at more asperities than this: elimination takes 5 s at 100,000, several times if it succeeds.
+MOST_ELIMINATED = 200_000
 
 
 class Overlaps(NamedTuple):
@@ -46,41 +51,70 @@ def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[f
     if len(points) > MOST_ELIMINATED:
         return 0.0
     error = 2.0 * influence.entry_error + 32 * ROUNDOFF
-    closest = _closest(points, lengths)
-    if not closest.max(initial=0.0) < 1:
+    near = Nearest.of(points, lengths)
+    if not near.closest.max(initial=0.0) < 1:
         return 0.0
     for width in WIDTHS:
-        widths = np.maximum(width, 1.2 / np.sqrt(1.0 - closest))
-        pairs = overlaps(points, lengths, widths * lengths)
+        radii = near.wide_radii(lengths, width)
+        pairs = overlaps(points, lengths, radii)
         if pairs is None:
             return 0.0
         indices = pairs.first, pairs.second
-        diagonal, errors = 1.0 - 1.0 / widths, error * pairs.sizes
+        diagonal, errors = 1.0 - lengths / radii, error * pairs.sizes
         margin = proved_sparse_margin(diagonal, indices, pairs.values, margins, errors)
         if margin > 0:
             return margin
     return 0.0
 
 
-def _closest(points: Array, lengths: Array) -> Array:
-    """(n,) the largest (t_i t_j)^(1/2) / r_ij with any of the nearest neighbours."""
-    from scipy.spatial import cKDTree
+class Nearest(NamedTuple):
+    """The nearest neighbours of each asperity."""
 
-    if len(points) < 2:
-        return np.zeros(len(points))
-    found = cKDTree(points).query(points, k=min(len(points), 9))
-    distances, which = (np.asarray(each)[:, 1:] for each in found)
-    return np.asarray((np.sqrt(lengths[:, None] * lengths[which]) / distances).max(axis=1))
+    distances: Array  # (n, m)
+    which: Indices  # (n, m)
+    closest: Array  # (n,) the largest (t_i t_j)^(1/2) / r_ij with any of them
+    meeting: NDArray[np.bool_]  # (n,) whether t_i + t_j > r_ij with one
+
+    @classmethod
+    def of(cls, points: Array, lengths: Array) -> Nearest:
+        from scipy.spatial import cKDTree
+
+        if len(points) < 2:
+            none = np.zeros((len(points), 0))
+            alone = np.zeros(len(points))
+            return cls(none, none.astype(np.intp), alone, alone > 0)
+        found = cKDTree(points).query(points, k=min(len(points), NEAREST + 1))
+        distances, which = (np.asarray(each)[:, 1:] for each in found)
+        closest = (np.sqrt(lengths[:, None] * lengths[which]) / distances).max(axis=1)
+        meeting = (lengths[:, None] + lengths[which] > distances).any(axis=1)
+        return cls(distances, which, closest, meeting)
+
+    def wide_radii(self, lengths: Array, width: float) -> Array:
+        """(n,) radii of shells, for `closest` below 1."""
+        radii: Array = np.maximum(width, WIDENED / np.sqrt(1.0 - self.closest)) * lengths
+        beside: Array = (radii[self.which] - LESS * self.distances).max(axis=1, initial=0.0)
+        return np.asarray(np.maximum(radii, beside))
 
 
 def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:
     """All pairs whose shells overlap; None if they are too many."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
-    tree, widest = cKDTree(points), 2.0 * float(radii.max(initial=0.0))
-    if tree.count_neighbors(tree, widest) > MOST_PAIRS * len(points):
+    tree = cKDTree(points)
+    usual = WIDE * float(np.median(radii)) if len(radii) else 0.0
+    wide = np.flatnonzero(radii > usual)  # few: looked at one by one
+    reach = radii[wide] + float(radii.max(initial=0.0))
+    counts = tree.query_ball_point(points[wide], reach, return_length=True)
+    many = tree.count_neighbors(tree, 2.0 * usual) + int(np.sum(counts))
+    if many > MOST_PAIRS * len(points):
         return None
-    i, j = tree.query_pairs(widest, output_type="ndarray").T
+    around = tree.query_ball_point(points[wide], reach)
+    i = np.repeat(wide, counts)
+    j = np.concatenate([np.asarray(each, dtype=np.intp) for each in around] or [wide])
+    once = (radii[j] <= usual) | (i < j)
+    both = tree.query_pairs(2.0 * usual, output_type="ndarray")
+    both = both[(radii[both] <= usual).all(axis=1)]
+    i, j = np.concatenate((i[once], both[:, 0])), np.concatenate((j[once], both[:, 1]))
     r = np.hypot(*(points[i] - points[j]).T)
     near = radii[i] + radii[j] > r
     i, j, r = i[near], j[near], r[near]

@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 from scenes import MATERIAL, OPERATORS, operators, solve_exactly
 
 import convexrough as cr
-from convexrough.bench.scenes import scene as bench
 from convexrough.convex.definite import largest, proved_sparse_margin
 from convexrough.influence import Kind
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
-from convexrough.normal.boxes import CROWDED_MARGINS
+from convexrough.normal.boxes import CROWDED_MARGINS, crowded
 from convexrough.normal.overlap import overlapping_margin, overlaps
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.rivals import Rivals
-from convexrough.solvers import Newton
 
 Array = NDArray[np.float64]
 
@@ -143,38 +140,6 @@ def test_rivals_are_as_the_certificate_says(distance: float) -> None:
     assert judged_any or distance == 4e-4  # crowding just above pi: only both touching is found
 
 
-def test_lattices_have_fewer_rivals() -> None:
-    """Where shells of the secants meet, the lattice may still say that there is one solution."""
-    rng, by_lattice = np.random.default_rng(3), 0
-    for size in np.linspace(3.0, 8.0, 11):
-        array = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02 * size, within=0.0102)
-        problem = NormalProblem.assemble(
-            cr.Scene(1.0, array, MATERIAL), approach=1e-4, influence="lattice"
-        )
-        loads, most = Newton().solve(problem).loads, problem.bounds(problem.ceiling)
-        rivals, A = Rivals.of(problem, loads, problem.ceiling), problem.influence
-        secant = problem.coefficients * (np.cbrt(most) ** 2 - np.cbrt(loads) ** 2) / (most - loads)
-        if A.crowding(A.scale / secant) <= 1:
-            assert not rivals.possible
-            continue
-        if rivals.possible:
-            continue
-        by_lattice += 1
-        for Q in (most, *(most * rng.random((20, len(most))))):
-            secant = problem.coefficients * (np.cbrt(Q) ** 2 - np.cbrt(loads) ** 2) / (Q - loads)
-            assert np.linalg.eigvalsh(np.diag(secant) + A.matrix)[0] > 0
-    assert 2 <= by_lattice < 11
-
-
-def test_eight_thousand_on_a_lattice_have_one_solution() -> None:
-    """Shells that do not overlap show it of a third as many; three times as many are too many."""
-    smaller = cr.press(bench("lattice", 12.0), approach=5e-5)
-    assert smaller.certificate.scope == "global"
-    assert smaller.certificate.meaning == "the only solution"
-    larger = cr.press(bench("lattice", 20.0), approach=5e-5)
-    assert larger.certificate.scope == "local"
-
-
 def scaled(lengths: Array, points: Array) -> Array:
     """I + H^-1/2 A H^-1/2."""
     root = np.sqrt(lengths)
@@ -191,9 +156,14 @@ def test_overlapping_shells(seed: int, count: int, width: float) -> None:
     points = rng.uniform(-1, 1, (count, 2))
     lengths = rng.lognormal(0, 0.5, count) * 0.3 / np.sqrt(count)
     radii = width * lengths * rng.lognormal(0, 0.5, count)
+    radii[: count // 20] *= 10.0
     pairs = overlaps(points, lengths, radii)
     if pairs is None:
         return
+    apart = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
+    meet = np.triu(np.add.outer(radii, radii) > apart, 1)
+    assert len(pairs.first) == len(pairs.second) == meet.sum()
+    assert (meet | meet.T)[pairs.first, pairs.second].all()
     S = np.diag(1 - lengths / radii)
     S[pairs.first, pairs.second] = S[pairs.second, pairs.first] = pairs.values
     hessian = scaled(lengths, points)
@@ -209,6 +179,29 @@ def test_an_isolated_pair_is_proved_up_to_pi() -> None:
     for crowding, proved in ((1.6, True), (3.0, True), (3.13, True), (np.pi, False), (3.2, False)):
         lengths = np.full(2, crowding / np.pi)
         assert (overlapping_margin(A, lengths, CROWDED_MARGINS) > 0) == proved
+
+
+def test_a_third_beside_a_close_pair_costs_little() -> None:
+    """It has shells nearly as wide, or else hardly any margin is left."""
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [-2.0, 0.3]])
+    for closeness in (0.9, 0.97, 0.98):
+        lengths = np.array([closeness, closeness, 1.0])
+        least = float(np.linalg.eigvalsh(scaled(lengths, points))[0])
+        A = DenseInfluence.assemble(points, 1.0)
+        assert 0.6 * least < overlapping_margin(A, lengths, CROWDED_MARGINS) < least
+
+
+def test_who_is_in_the_way() -> None:
+    """The pair that can be no least of the energy; else those whose shells meet."""
+    points = np.array([[0.0, 0.0], [1.6e-4, 0.0], [2e-3, 0.0], [2.36e-3, 0.0], [5e-3, 0.0]])
+    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL)
+    problem = NormalProblem.assemble(scene, approach=5e-5)
+    loads = 4 / 3 * 3e-4**3 / scene.relative_radii / problem.units.force  # of discs of 3e-4
+    assert list(crowded(problem, loads)) == [0, 1]
+    loads[0] = 0.0
+    assert list(crowded(problem, loads)) == [2, 3]
+    loads[2] = 0.0
+    assert list(crowded(problem, loads)) == [1, 3, 4]
 
 
 @settings(max_examples=60, deadline=None)
