@@ -24,6 +24,7 @@ from convexrough.gradients.bounds import (
     above,
     respond,
 )
+from convexrough.gradients.gross import GrossDoubt
 from convexrough.gradients.system import Solution
 from convexrough.gradients.widths import Widths
 from convexrough.roundoff import SAFETY
@@ -187,7 +188,7 @@ class GivenDoubt:
         return Weights(known.dual(off), np.where(known.unsure, off, 0.0))
 
 
-Doubt: TypeAlias = LossDoubt | StateDoubt | GivenDoubt
+Doubt: TypeAlias = LossDoubt | StateDoubt | GivenDoubt | GrossDoubt
 
 
 def height_errors(

@@ -94,9 +94,10 @@ class Gradient(Table, Drawn):
         """(n,) proved bounds on |heights - those of the true state|.
 
         Where all asperities are decided, mostly what these derivatives miss of those computed to
-        twice the digits. Infinite where nothing is proved of the state, and for onsets, where one
-        asperity is at its ceiling and no proof can say whether it slides. They are for the scene
-        whose data are the given float64 numbers, and count all rounding.
+        twice the digits; in gross sliding of the derivatives from below. Infinite where nothing is
+        proved of the state, and for onsets: there one asperity is at its ceiling, no proof can say
+        whether it slides, and the slope of its law has no bound but the root of a doubt. They are
+        for the scene whose data are the given float64 numbers, and count all rounding.
         """
         origin = self.origin
         problem = pressed(self.contact)

@@ -7,6 +7,8 @@ docs/theory/scene-derivatives.md, "Where there is a derivative".
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from convexrough.arrays import Array, among_zeros
@@ -16,6 +18,23 @@ from convexrough.shearing.problem import TangentialProblem
 
 #: Asperities that slide last within so much of the displacement do so together.
 TOGETHER = 1e-12
+
+
+@dataclass(frozen=True)
+class GrossDoubt:
+    """About weights on loads that gross sliding leaves, times a factor; last : who slides last.
+
+    increments, slips, rise : their weights; None of a loss
+    """
+
+    factor: float
+    last: int
+    increments: Array | None = None
+    slips: Array | None = None
+    rise: float = 0.0
+
+    def weights(self, known: object, problem: TangentialProblem) -> None:
+        """None: they are bounded to twice the digits only."""
 
 
 def last_to_slide(problem: TangentialProblem, holding: Holding, what: str, found: object) -> int:

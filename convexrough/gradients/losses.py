@@ -22,7 +22,7 @@ from convexrough.gradients.adjoint import (
 )
 from convexrough.gradients.doubts import Doubt, LossDoubt, StateDoubt
 from convexrough.gradients.gradient import Gradient, to_scene
-from convexrough.gradients.gross import excess_in_gross_sliding, last_to_slide
+from convexrough.gradients.gross import GrossDoubt, excess_in_gross_sliding, last_to_slide
 from convexrough.gradients.origin import Origin, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.shearing.cycle import Cycle
@@ -45,6 +45,7 @@ def cycle_gradient(
     if limit := bool(problem.at_limit(states.totals)[0]):
         last = last_to_slide(problem, holding, "maximum", cycle.maximum)
         pulled = _in_gross_sliding(problem, state, last)
+        doubts = [GrossDoubt(loading.energy_unit, last)]
     else:
         beyond = excess(problem, state, System(problem, state.slopes, tolerance))
         pulled = through_loss(problem, state, beyond)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, among_zeros
 from convexrough.contact import Contact
 from convexrough.gradients.adjoint import Excess
 from convexrough.gradients.bounds import FEW, Off, above
@@ -24,10 +24,12 @@ from convexrough.gradients.doubts import (
     Weights,
     through_pressing,
 )
+from convexrough.gradients.gross import GrossDoubt
 from convexrough.gradients.sharp import SHARP, STEPS, Pressed, rounded
 from convexrough.gradients.sharp_state import sheared
 from convexrough.gradients.system import Solution, System
 from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.shearing.judgement import LOCAL
 from convexrough.twofold import Twofold, whole
 
 TWO, THREE, SIX, HALF = (whole(value) for value in (2.0, 3.0, 6.0, 0.5))
@@ -132,6 +134,60 @@ def of_state(doubt: StateDoubt, pressed: Pressed) -> tuple[Twofold, Weights] | N
     return weights, judged._replace(dual=judged.dual + FEW * ROUNDOFF * known.dual(own.high))
 
 
+def _gross_loss(
+    pressed: Pressed, levels: Twofold, last: int, only: Array, wide: Array, errors: Array
+) -> tuple[Twofold, Array]:
+    """omega = -C / 6 + slip / 2 + Y / 2, and T / 2 c0 more at the last, Y = -A (P - T e)."""
+    P, C, influence = pressed.loads, pressed.ceilings, pressed.known.influence
+    total = P.total()
+    y = P + -(total * whole(only))
+    Y, off = pressed.coupling.apply(-y)
+    slip = Twofold(levels.high[last], levels.low[last]) + -levels
+    more = (total * whole(only)).over(TWO * pressed.stiffest)
+    omega = -C.over(SIX) + HALF * (slip + Y) + more
+    each = wide + wide[last] + off + LOCAL * errors / pressed.known.slopes
+    each += above(influence, errors + float(errors.sum()) * only)
+    relative = float(errors.sum()) / float(total.high) + errors / P.high
+    each += more.high * relative + SHARP * (C.high + np.abs(levels.high) + more.high)
+    each += SHARP * (levels.high[last] + above(influence, np.abs(y.high)))
+    return omega, each
+
+
+def _gross_state(
+    pressed: Pressed, doubt: GrossDoubt, increments: Array, slips: Array, only: Array
+) -> tuple[Twofold, Array]:
+    """u_b - u_b of the last + (2 / 3) C o / P + A o, with o = (r + sum of slips) e - slips."""
+    P, C, last = pressed.loads, pressed.ceilings, doubt.last
+    own = (doubt.rise + float(slips.sum())) * only - slips
+    felt, off = pressed.coupling.apply(whole(own))
+    softer = TWO * (C * whole(own)).over(THREE * P)
+    weights = whole(increments) + whole(np.full(len(own), -increments[last])) + softer + felt
+    # Weights were rounded when they were put into own units.
+    size = (abs(doubt.rise) + float(np.abs(slips).sum())) * only + np.abs(slips)
+    sizes = np.abs(increments) + abs(increments[last]) + size * C.high / P.high
+    sizes += above(pressed.known.influence, size)
+    each = (FEW + len(own)) * ROUNDOFF * sizes + off
+    return weights, each + np.abs(softer.high) * pressed.known.errors / P.high
+
+
+def of_gross_sliding(doubt: GrossDoubt, pressed: Pressed) -> tuple[Twofold, Weights] | None:
+    """As `gross`: all of it is explicit in P. None where it is not sure who slides last."""
+    known, C, errors, last = pressed.known, pressed.ceilings, pressed.known.errors, doubt.last
+    moved, off = pressed.coupling.apply(pressed.loads)
+    levels = C + moved
+    wide = LOCAL * errors / known.slopes + above(known.influence, errors) + off
+    wide += SHARP * (C.high + np.abs(moved.high))
+    behind = (Twofold(levels.high[last], levels.low[last]) + -levels).high
+    if (np.delete(behind - wide - wide[last], last) <= 0).any():
+        return None
+    only = among_zeros(np.ones(1), np.array([last]), len(errors))
+    if doubt.increments is None or doubt.slips is None:
+        weights, each = _gross_loss(pressed, levels, last, only, wide, errors)
+    else:
+        weights, each = _gross_state(pressed, doubt, doubt.increments, doubt.slips, only)
+    return weights, Weights(known.dual(each), np.zeros(len(errors)))
+
+
 def of_loads(doubt: GivenDoubt, pressed: Pressed) -> tuple[Twofold, Weights]:
     """Those that were given."""
     return whole(doubt.loads), doubt.weights(pressed.known, pressed.problem)
@@ -141,7 +197,10 @@ def weights_of(doubt: Doubt, pressed: Pressed) -> tuple[Twofold, Weights] | None
     """Weights on loads, times the factor of a doubt; None where no more digits are to be had."""
     if isinstance(doubt, GivenDoubt):
         return of_loads(doubt, pressed)
-    of = of_loss(doubt, pressed) if isinstance(doubt, LossDoubt) else of_state(doubt, pressed)
+    if isinstance(doubt, GrossDoubt):
+        of = of_gross_sliding(doubt, pressed)
+    else:
+        of = of_loss(doubt, pressed) if isinstance(doubt, LossDoubt) else of_state(doubt, pressed)
     if of is None:
         return None
     weights, doubtful = whole(doubt.factor) * of[0], abs(doubt.factor) * of[1].dual

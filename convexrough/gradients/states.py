@@ -24,7 +24,7 @@ from convexrough.gradients.adjoint import (
 )
 from convexrough.gradients.doubts import Doubt, GivenDoubt, StateDoubt
 from convexrough.gradients.gradient import Gradient, to_scene
-from convexrough.gradients.gross import last_to_slide, through_gross_sliding
+from convexrough.gradients.gross import GrossDoubt, last_to_slide, through_gross_sliding
 from convexrough.gradients.origin import Origin, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.influence.choice import couple
@@ -126,6 +126,7 @@ def state_gradient(
         pulled, by_force, by_friction = through_gross_sliding(
             problem, last, increments=increments, slips=moved, rise=rise
         )
+        doubts = [GrossDoubt(1.0, last, increments, moved, rise)]
     else:
         system = System(problem, there.slopes, tolerance)
         pulled = through_friction(

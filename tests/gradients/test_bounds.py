@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flint import arb
 from friction_scenes import FRICTION, in_doubt, with_friction
-from gradient_oracle import Judge, Setup, exact, press, sheared
+from gradient_oracle import Judge, Setup, Sheared, exact, press, sheared
 from scenes import NAMED
 
 import convexrough as cr
@@ -217,12 +217,37 @@ def test_an_undecided_asperity_costs_the_root_of_its_doubt(side: float) -> None:
         assert (np.abs(other - found.heights) <= errors).all()
 
 
+def test_bounds_in_gross_sliding() -> None:
+    contact = pressed("rough", "load")
+    force, weights = FRICTION * contact.load, np.random.default_rng(3).normal(size=91)
+
+    def gross(number: Any) -> Judge:
+        def value(setup: Setup, near: Any) -> tuple[Any, Any]:
+            oracle = press(contact, setup, near)
+            felt = oracle.inner @ oracle.P
+            rise = max(oracle.ceilings + felt)
+            return number(Sheared(oracle, oracle.P.sum(), rise - felt, oracle.P, rise)), oracle
+
+        return Judge(given(contact, "load"), value)
+
+    on, state = np.flatnonzero(contact.loads), cr.shear(contact, force=force)
+    for judge, gradient in (
+        (gross(lambda there: there.loss), cr.cycle(contact, maximum=force).gradient()),
+        (gross(lambda there: there.displacement), state.gradient(displacement=1.0)),
+        (
+            gross(lambda there: exact(weights[on]) @ (there.forces + there.slips)),
+            state.gradient(forces=weights, slips=weights),
+        ),
+    ):
+        true, bounds = true_errors(judge, gradient)
+        assert (true <= bounds).all()
+        assert (bounds <= 1e-12 * np.abs(gradient.heights).max()).all()
+
+
 def test_nothing_is_bounded_where_nothing_is_proved() -> None:
     contact = pressed("paper", "load")
     unproved = replace(contact, certificate=replace(contact.certificate, scope="none"))
     assert np.isinf(unproved.gradient(approach=1.0).height_errors).all()
-    gross = cr.cycle(contact, maximum=FRICTION * contact.load).gradient()
-    assert np.isinf(gross.height_errors).all()
     assert np.isinf(cr.onset_gradient(contact, 3).height_errors).all()
 
 
