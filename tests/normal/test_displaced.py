@@ -156,3 +156,20 @@ def test_the_last_step_in_eighty_digits(seed: int, control: str) -> None:
     assert contact.certificate.load_error <= 5e-14 * largest
     gaps = np.abs(multiprecision.errors(contact.gaps, exact.gaps))
     assert (gaps <= contact.certificate.gap_errors).all()
+
+
+@pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize("rough", [0.0, 1e-6])
+def test_bounds_of_some_thousand(rough: float, control: str) -> None:
+    """An ordinary last step would leave ten times as much."""
+    asperities = cr.Asperities.hexagonal(
+        spacing=0.0025 / 15, tip_radius=0.02 / 15, within=0.01, height_std=rough, seed=1
+    )
+    pressed = cr.Scene(1.0, asperities, cr.Material(1.0, 0.3))
+    contact = cr.press(pressed, approach=APPROACH)
+    prescribed: Any = {control: getattr(contact, control)}
+    problem = NormalProblem.assemble(pressed, **prescribed)
+    solution = Newton().solve(problem)
+    assert solution.residual <= 1e-15 * solution.approach
+    judged = judge(problem, problem.to_scene(solution.loads) * problem.units.force)
+    assert judged.load_error <= 1e-13 * contact.loads.max()

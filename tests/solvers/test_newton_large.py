@@ -166,11 +166,11 @@ def dense_answer(name: str) -> cr.Contact:
 @pytest.mark.parametrize(
     ("options", "steps", "products"),
     [
-        (dict(), 5, 40),
-        (dict(pattern="square"), 5, 40),
-        (dict(height_std=1e-7, seed=1), 5, 40),
-        (dict(height_std=1e-6, tip_radius_cv=0.1, seed=1), 7, 80),
-        (dict(geometry="closest"), 5, 40),
+        (dict(), 5, 30),
+        (dict(pattern="square"), 5, 30),
+        (dict(height_std=1e-7, seed=1), 5, 36),
+        (dict(height_std=1e-6, tip_radius_cv=0.1, seed=1), 7, 50),
+        (dict(geometry="closest"), 5, 30),
     ],
 )
 def test_few_products(options: Any, steps: int, products: int, control: str) -> None:
