@@ -6,7 +6,8 @@ x = u + lambda p. The theorem of docs/theory/sup-norm.md holds for v = x - u*, b
     f_i = hbar_i v_i + (A v)_i  <=  r_i + beta  where v_i > 0,   >=  where v_i < 0,
 
 with r the residual of x under the rise Delta, and beta what that is off by. Two choices of lambda
-are tried (`images`). Arrays are (n,), of one state. The letters, and the names here:
+are tried (`images`). Where contacts are too crowded for the theorem, a norm is bounded instead.
+Arrays are (n,), of one state. The letters, and the names here:
 
     lambda, r, beta           Image.shares, residual, beta
     hbar                      at least _Near.softest
@@ -24,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.normal.sup_norm import SupNorm
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.shearing.bounds import OWN_ROUNDOFFS, SHARE_ROUNDOFFS, Given
 from convexrough.shearing.images import Image, images
@@ -48,10 +48,20 @@ class _Near(NamedTuple):
 class _Residual(NamedTuple):
     """How far the law is from holding for an image."""
 
-    each: Array  # bounds on |r|, or on what the law lacks where u is P; 0 where v is
+    each: Array  # bounds on |r|, or on what the law lacks where u is P, less a remainder; or 0
+    component: float  # bound on each component of that
+    remainder: float  # and on its 2-norm
     mean: float  # bound on |sum mu r| / sum mu
     uncertainty: Array  # of Delta - A u
     shift: float  # the best rise less Delta, for which this is
+
+
+class _Bound(NamedTuple):
+    """Bounds on beta, |v| and |A v|."""
+
+    rise: float
+    forces: Array
+    moved: Array
 
 
 class _Found(NamedTuple):
@@ -66,8 +76,6 @@ class _Found(NamedTuple):
 def by_largest(given: Given, near: Nearness, increments: Array) -> tuple[Nearness, Array]:
     """The smaller of these bounds and those given, one by one."""
     pressed = PressedFit.of(given.problem)
-    if pressed.sup is None:
-        return near, increments
     near = near._replace(**{name: getattr(near, name).copy() for name in IMPROVED})
     increments, sure = increments.copy(), given.known.sure
     for row in range(len(increments)):
@@ -75,8 +83,7 @@ def by_largest(given: Given, near: Nearness, increments: Array) -> tuple[Nearnes
         if not here.weights.total > 0:
             continue
         for image in images(given, pressed, row):
-            if (found := _found(given, pressed, pressed.sup, here, image)) is None:
-                continue
+            found = _found(given, pressed, here, image)
             for bound, value in (
                 (increments, found.increments),
                 (near.each, found.shares),
@@ -108,37 +115,61 @@ def _near(given: Given, near: Nearness, apart: Array, row: int) -> _Near:
     return _Near(row, softest, slides, Weights.of(problem, softest, stiffest))
 
 
-def _found(
-    given: Given, pressed: PressedFit, sup: SupNorm, here: _Near, image: Image
-) -> _Found | None:
-    """beta by the weights, and with it all else by the theorem; None where the weights are poor."""
-    problem, known, mu = given.problem, given.known, here.weights
+def _found(given: Given, pressed: PressedFit, here: _Near, image: Image) -> _Found:
+    """beta by the weights, and with it all else."""
+    problem, b = given.problem, given.known.errors
     residual = _residual(given, here, image)
-    largest = float(residual.each.max(initial=0.0))
+    missing = image.missing + _missing(given, here.row)
+    bound = _by_theorem(given, pressed, here, residual, missing)
+    if bound is None:
+        bound = _by_norm(given, here, residual, missing)
+    size = np.abs(given.states.increments[here.row])
+    unknown = abs(residual.shift) + bound.rise + bound.moved + residual.uncertainty
+    slips = unknown + image.slips + OWN_ROUNDOFFS * ROUNDOFF * problem.ceilings
+    shares = np.abs(image.shares - size / problem.loads) * b + bound.forces
+    return _Found(
+        increments=(image.shares * b + bound.forces) * (1 + SAFETY),
+        shares=shares * (1 + SAFETY) + SHARE_ROUNDOFFS * ROUNDOFF * size,
+        slips=slips * (1 + SAFETY),
+        rise=(abs(residual.shift) + bound.rise + image.rise) * (1 + SAFETY),
+    )
+
+
+def _by_theorem(
+    given: Given, pressed: PressedFit, here: _Near, residual: _Residual, missing: float
+) -> _Bound | None:
+    """By |v_j| <= (1 + 1 / F) (max |r| + |beta|) / margin_j; None where the theorem is silent."""
+    known, mu, sup = given.known, here.weights, pressed.sup
+    if sup is None:
+        return None
+    each = residual.each + residual.component
+    largest = float(each.max(initial=0.0, where=known.sure & ~here.slides))
     least = np.where(known.sure & ~here.slides, here.softest, np.inf)
     with np.errstate(invalid="ignore"):
         margin = least - sup.packing / sup.size * sup.stiffness
     margin[np.isinf(least)] = np.inf
-    # |v_j| <= (1 + 1 / F) (max |r| + |beta|) / margin_j
     left = (1.0 + 1.0 / sup.firmness) * float(mu.off @ (1.0 / margin)) / mu.total * (1 + SAFETY)
     if not left < 1:
         return None
-    missing = image.missing + _missing(given, here.row)
     beta = (residual.mean + missing / mu.total + left * largest) / (1.0 - left) * (1 + SAFETY)
-
     potential = (largest + beta) / sup.firmness
-    off = (residual.each + beta + potential) / margin
-    moved = pressed.moves * (largest + beta)
-    size, b = np.abs(given.states.increments[here.row]), known.errors
-    unknown = abs(residual.shift) + beta + moved + residual.uncertainty
-    slips = unknown + image.slips + OWN_ROUNDOFFS * ROUNDOFF * problem.ceilings
-    shares = np.abs(image.shares - size / problem.loads) * b + off
-    return _Found(
-        increments=(image.shares * b + off) * (1 + SAFETY),
-        shares=shares * (1 + SAFETY) + SHARE_ROUNDOFFS * ROUNDOFF * size,
-        slips=slips * (1 + SAFETY),
-        rise=(abs(residual.shift) + beta + image.rise) * (1 + SAFETY),
-    )
+    return _Bound(beta, (each + beta + potential) / margin, pressed.moves * (largest + beta))
+
+
+def _by_norm(given: Given, here: _Near, residual: _Residual, missing: float) -> _Bound:
+    """Where the theorem is silent: "In a norm".
+
+    With X = || v ||_H:  (1 - theta) X^2 <= R X + |beta| |sum v|  and  |beta| <= a + c X.
+    """
+    known, mu = given.known, here.weights
+    h = np.where(here.slides, np.inf, known.stiffness)
+    R = float(np.sqrt((residual.each**2 / h).sum())) + residual.remainder / np.sqrt(float(h.min()))
+    a = residual.mean + missing / mu.total
+    c = float(np.sqrt((mu.off**2 / h).sum())) / mu.total
+    theta, slope = known.convexity_number, R + c * missing
+    root = math.sqrt(slope**2 + 4.0 * (1.0 - theta) * a * missing)
+    X = (slope + root) / (2.0 * (1.0 - theta)) * (1 + SAFETY)
+    return _Bound((a + c * X) * (1 + SAFETY), X / np.sqrt(h), X * known.reach)
 
 
 def _residual(given: Given, here: _Near, image: Image) -> _Residual:
@@ -153,12 +184,13 @@ def _residual(given: Given, here: _Near, image: Image) -> _Residual:
     shift = mu.mean(r)
     r = r - shift
     component = given.each[row] + image.component
-    norm = (given.remainder[row] + image.remainder) * mu.norm
+    remainder = given.remainder[row] + image.remainder
     mean = abs(mu.mean(r)) + len(u) * ROUNDOFF * mu.mean(np.abs(r)) + mu.mean(blur)
     each = np.where(np.abs(u) < problem.loads, np.abs(r), np.maximum(np.sign(u) * r, 0.0))
-    each = np.where(known.sure & ~here.slides, each + blur + component, 0.0)
-    mean = (mean + min(component, norm)) * (1 + SAFETY)
-    return _Residual(each, mean, uncertainty + given.each[row], shift)
+    each = np.where(known.sure & ~here.slides, each + blur, 0.0)
+    mean = (mean + min(component, remainder * mu.norm)) * (1 + SAFETY)
+    uncertainty = uncertainty + given.each[row]
+    return _Residual(each, component, remainder, mean, uncertainty, shift)
 
 
 def _missing(given: Given, row: int) -> float:

@@ -22,7 +22,7 @@ FRACTIONS = [1e-9, 1e-6, 1e-3, 0.1, 0.35, 0.37, 0.6, 0.9, 0.999, 1 - 1e-9]
 
 def sharpness(fraction: float) -> float:
     """Of the bound relative to the energy: the same for all small forces, and up to the limit."""
-    return 1e-4 if fraction > 0.999 else 1e-8
+    return 1e-8 if fraction > 0.999 else 5e-11
 
 
 @pytest.mark.parametrize("fraction", FRACTIONS)
