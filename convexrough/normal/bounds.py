@@ -104,28 +104,46 @@ def ball_of(box: Box, found: Fit, loads: Array) -> Ball | None:
 
     None where the solution may lie outside the local box: "Which box", 3.
     """
-    errors = reach(box, found)
+    errors = reach(box, found, loads)
     if (loads + errors >= box.faces).any():
         return None
     near = np.minimum(box.loads, loads + errors)
     # The margin of the whole box holds, in parts of H, on any smaller one, where H is no less.
     h = box.problem.stiffness(near)
     theta = min(box.convexity_number, box.problem.convexity_at(h))
-    return Ball(_norm(found, h, theta), h, near)
+    return Ball(_radius(box, found, loads, h, theta), h, near)
 
 
-def reach(box: Box, found: Fit) -> Array:
+def reach(box: Box, found: Fit, loads: Array) -> Array:
     """(n,) how far (1) lets the loads of the solution be."""
     h = box.stiffness
-    errors: Array = _norm(found, h, box.convexity_number) / np.sqrt(h)
+    errors: Array = _radius(box, found, loads, h, box.convexity_number) / np.sqrt(h)
     return errors
 
 
-def _norm(found: Fit, stiffness: Array, convexity_number: float) -> float:
-    """eps = || e ||_{H^-1} / (1 - theta), the right side of (1)."""
-    squared = float(np.sum(found.residual**2 / stiffness))
-    remainder = found.remainder / np.sqrt(float(stiffness.min(initial=np.inf)))
-    return float(np.sqrt(squared) + remainder) / (1.0 - convexity_number) * (1 + SAFETY)
+def _radius(box: Box, found: Fit, loads: Array, stiffness: Array, convexity_number: float) -> float:
+    """eps = || e ||_{H^-1} / (1 - theta), the right side of (1).
+
+    Under a prescribed load of the loads made smaller by a part s until their total is right, and
+    s || P ||_H more: docs/theory/certificate-rounding.md, "Prescribed load".
+    """
+    residual, scaling = found.residual, 0.0
+    if box.problem.load is not None:
+        part = box.problem.missing(loads) / box.problem.load
+        more = part * (_spread(box.problem.offsets, loads) + found.local + residual)
+        residual = residual + np.where(box.held, 0.0, more)
+        scaling = part * math.sqrt(float(found.local @ loads))
+    squared = float(np.sum(residual**2 / stiffness))
+    remainder = found.remainder / math.sqrt(float(stiffness.min(initial=np.inf)))
+    return ((math.sqrt(squared) + remainder) / (1.0 - convexity_number) + scaling) * (1 + SAFETY)
+
+
+def _spread(offsets: Array, loads: Array) -> Array:
+    """(n,) how far offsets are from the middle of those that touch."""
+    touching = loads > 0
+    low = float(offsets.min(where=touching, initial=np.inf))
+    high = float(offsets.max(where=touching, initial=-np.inf))
+    return np.abs(offsets - (low + high) / 2.0)
 
 
 def _approach_error(

@@ -154,7 +154,7 @@ def _proved_of_touching(
             break
         part = found.of_some(touching)
         if (ball := ball_of(box, part, loads)) is None:
-            needed = reach(box, part)
+            needed = reach(box, part, loads)
             obstacle = Obstacle(POORLY_KNOWN, np.flatnonzero(loads + needed >= box.faces))
             room = np.maximum(room, ROOM * needed)
             continue

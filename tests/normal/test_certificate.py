@@ -29,9 +29,12 @@ from scenes import (
 
 import convexrough as cr
 from convexrough.influence.coupling import Influence, Kind, Rounding
+from convexrough.normal.bounds import ball_of
 from convexrough.normal.boxes import MARGINS, box_of_touching, convex_margin, tried
 from convexrough.normal.certificate import judge
+from convexrough.normal.prescribed_load import riding_weights
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.residual import fit
 
 Array = NDArray[np.float64]
 
@@ -538,3 +541,21 @@ def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
     assert len(open_ones)
     given[open_ones] = 5e-324
     assert_loads_within(cr.certify(scene, given, **prescribed), given, exact)
+
+
+@pytest.mark.parametrize("part", [1e-3, 1e-6, -1e-9])
+def test_what_loads_miss_the_total_by_is_counted(part: float) -> None:
+    """Loads that fit the law perfectly under another total have no residual, and are wrong."""
+    scene, load = paper(), 3.6e-7
+    problem = NormalProblem.assemble(scene, load=load)
+    right, wrong = (
+        cr.press(scene, load=each).loads[problem.candidates] / problem.units.force
+        for each in (load, load * (1 + part))
+    )
+    found = fit(problem, wrong, riding_weights(problem, wrong))
+    assert found.residual.max() < 1e-14 * problem.ceiling
+    box = next(tried(problem, wrong, found.displacement))
+    ball = ball_of(box, found, wrong)
+    assert ball is not None
+    apart = np.sqrt(ball.stiffness) * (wrong - right)
+    assert np.linalg.norm(apart) <= ball.radius < 10 * np.linalg.norm(apart)
