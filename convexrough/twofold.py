@@ -6,16 +6,21 @@ underflow. No fused operations are assumed, nor anything longer than float64.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
+from convexrough import threads
 from convexrough.arrays import Array, Number
 
 #: Relative error of one operation on twofold numbers: above 4 roundoffs squared of sums of one sign
 #: (Joldes, Muller and Popescu, ACM Trans. Math. Softw. 44 (2017) 15).
 TWOFOLD_ROUNDOFF = 2.0**-100
+
+#: Numbers that are worked on together: what a cache holds.
+CHUNK = 2**14
 
 _SPLITTER = 2.0**27 + 1.0
 
@@ -25,6 +30,9 @@ class Twofold(NamedTuple):
 
     high: Number
     low: Number
+
+    def at(self, some: slice) -> Twofold:
+        return Twofold(self.high[some], self.low[some])
 
     @classmethod
     def nearest(cls, value: Fraction) -> Twofold:
@@ -77,6 +85,17 @@ class Twofold(NamedTuple):
             high = np.concatenate((pairs.high, high[..., 2 * half :]), axis=-1)
             low = np.concatenate((pairs.low, low[..., 2 * half :]), axis=-1)
         return Twofold(high[..., 0], low[..., 0])
+
+
+def in_parts(length: int, part: Callable[[slice], Twofold]) -> Twofold:
+    """(length,) numbers of which `part` makes some, on each core: one takes many operations."""
+    found = Twofold(np.empty(length), np.empty(length))
+
+    def make(some: slice) -> None:
+        found.high[some], found.low[some] = part(some)
+
+    threads.each(make, threads.chunks(length, CHUNK), threads.worthwhile(length))
+    return found
 
 
 def exact_sum(a: Number, b: Number) -> tuple[Number, Number]:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks, threads
+from convexrough import checks
 from convexrough.arrays import Array, Indices, among_zeros, evenly, taken
 from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.shells import fitted_shells, shells
@@ -29,7 +29,7 @@ from convexrough.normal.units import Units
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
-from convexrough.twofold import Twofold, exact_sum, square_sum, whole
+from convexrough.twofold import Twofold, exact_sum, in_parts, square_sum, whole
 
 #: The part of the room between neighbours that fitted shells share out by size. A heuristic: any
 #: part gives shells that hold, some of them sharper bounds (docs/theory/certificate.md, "Which
@@ -263,13 +263,7 @@ class NormalProblem:
 
     def twofold_offsets(self) -> Twofold:
         """`offsets` from the scene's numbers, to twice as many digits: z - r^2 / (2 R)."""
-        found = Twofold(np.empty(len(self)), np.empty(len(self)))
-
-        def find(some: slice) -> None:
-            found.high[some], found.low[some] = self._twofold_offsets(self.candidates[some])
-
-        threads.each(find, threads.chunks(len(self), CHUNK), threads.worthwhile(len(self)))
-        return found
+        return in_parts(len(self), lambda some: self._twofold_offsets(self.candidates[some]))
 
     def _twofold_offsets(self, which: Indices) -> Twofold:
         scene, length = self.scene, self.units.length

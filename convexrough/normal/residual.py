@@ -19,7 +19,7 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.record import Record
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.sphere import hertz
-from convexrough.twofold import TWOFOLD_ROUNDOFF, Twofold, exact_sum, whole
+from convexrough.twofold import TWOFOLD_ROUNDOFF, Twofold, exact_sum, in_parts, whole
 
 #: Roundoffs lost in k P^(2/3) and in adding it, A P and D up: "Rounding".
 SUM_ROUNDOFFS = 16
@@ -74,8 +74,12 @@ class Displaced(Record):
         if sums is None:
             return None
         scale = _twofold_scale(problem)
-        total = Twofold(*exact_sum(sums.whole, sums.rest))
-        product = Twofold(total.high * sums.unit, total.low * sums.unit) * scale
+
+        def multiply(some: slice) -> Twofold:
+            total = Twofold(*exact_sum(sums.whole[some], sums.rest[some]))
+            return Twofold(total.high * sums.unit, total.low * sums.unit) * scale
+
+        product = in_parts(len(loads), multiply)
         error, norm = (
             each * sums.unit * scale.high * (1 + SAFETY) for each in (sums.error, sums.norm)
         )
@@ -92,7 +96,7 @@ class Displaced(Record):
         relative = (off.relative + ROUNDOFF) * off.most
         error = off.component + relative
         norm = off.norm + relative * math.sqrt(len(loads))
-        moved = self.product + whole(product)
+        moved = in_parts(len(loads), lambda some: self.product.at(some) + whole(product[some]))
         bounds = self.error + error * (1 + SAFETY), self.norm + norm * (1 + SAFETY)
         return Displaced(self.problem, loads, moved, self.offsets, *bounds)
 
@@ -176,7 +180,8 @@ def sharp_fit(problem: NormalProblem, known: Displaced, weights: Array | None) -
     """The same with A P and D in twofold numbers: what is left is the rounding of k P^(2/3)."""
     loads, displacement = known.loads, known.product
     local = hertz.indentation(loads, problem.coefficients)
-    above = known.offsets + -displacement  # D - D0 - A P
+    # D - D0 - A P
+    above = in_parts(len(loads), lambda some: known.offsets.at(some) + -displacement.at(some))
     if problem.approach is None:
         assert weights is not None
         approach, total = 0.0, float(weights.sum())
@@ -187,7 +192,7 @@ def sharp_fit(problem: NormalProblem, known: Displaced, weights: Array | None) -
     else:
         approach = problem.approach
         level = whole(approach)
-    indentation = above + level
+    indentation = in_parts(len(loads), lambda some: above.at(some) + level)
     gap = (local - indentation.high) - indentation.low
     rounding = local_rounding(local) + 4 * ROUNDOFF * np.abs(gap)
     sizes = np.abs(displacement.high) + np.abs(problem.offsets) + abs(approach)

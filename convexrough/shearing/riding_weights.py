@@ -46,7 +46,7 @@ class Weights(NamedTuple):
 
     def mean(self, values: Array) -> float:
         """sum mu x / sum mu, as computed."""
-        return float(self.values @ values) / self.total
+        return float(self.values @ np.where(self.values > 0, values, 0.0)) / self.total
 
     @property
     def norm(self) -> float:

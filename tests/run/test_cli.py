@@ -229,7 +229,10 @@ def test_verify_couples_as_the_scene_says(
     verified = command("verify", "a.toml", "a-results/asperities.csv", "--json")
     assert [arguments[3] for arguments, _ in kinds] == [influence]
     proofs = [json.loads(each.out)["normal"]["certificate"] for each in (ran, verified)]
-    assert proofs[0] == proofs[1]
+    assert set(proofs[0]) == set(proofs[1])
+    for name, found in proofs[0].items():  # by products of these loads, and of some nearby
+        same = pytest.approx(found, rel=1e-3) if isinstance(found, float) else found
+        assert proofs[1][name] == same
 
 
 def test_verify_blames_the_scene_for_its_influence(command: Any, tmp_path: Path) -> None:
