@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.convex.recycled import Recycled
 from convexrough.errors import SolverError
 from convexrough.influence.coupling import Influence, Smoother
 
@@ -49,14 +48,12 @@ def correct(
     *,
     balanced: bool,
     tolerance: float,
-    recycled: Recycled | None = None,
 ) -> Array:
     """(n,) d, one Newton step: (1) of docs/theory/newton.md.
 
     root      : (n,) W, 0 where open;  defect : (n,) F
     balanced  : keep the sum of the loads
     tolerance : what conjugate gradients may leave of the residual; a factorisation leaves nothing
-    recycled  : directions of former steps, to which those of this one are added
 
     Raises SolverError where even the shells leave the matrix indefinite, that is by rounding.
     """
@@ -68,7 +65,7 @@ def correct(
         try:
             if direct:
                 return _factorise(influence, extra, touching, root, defect, balanced)
-            return _iterate(influence, extra, root, defect, balanced, tolerance, recycled)
+            return _iterate(influence, extra, root, defect, balanced, tolerance)
         except _IndefiniteError:
             continue
     raise SolverError("the shell-shifted matrix is not positive definite", solver="newton")
@@ -115,7 +112,6 @@ def _iterate(
     defect: Array,
     balanced: bool,
     tolerance: float,
-    recycled: Recycled | None,
 ) -> Array:
     """Preconditioned conjugate gradients: docs/theory/newton.md, "Many"."""
     single = influence.prefers_single
@@ -125,10 +121,7 @@ def _iterate(
     enough = max(tolerance, limit) * float(np.linalg.norm(defect)) / size
     w: Values = root.astype(dtype)
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
-    if shells is not None or recycled is None:
-        recycled = Recycled()
-    smooth = recycled.deflated(influence.smoother(root) or _unsmoothed(influence, w), w)
-    smoothed = _Smoothed(smooth, w, balanced)
+    smoothed = _Smoothed(influence.smoother(root) or _unsmoothed(influence, w), w, balanced)
     residual: Values = -w * (defect / size).astype(dtype)
     z, left, first = smoothed(residual)
     p = z.copy()
@@ -136,18 +129,18 @@ def _iterate(
     y_displacement = np.zeros_like(w)  # A W y
     products = 0
     while left > enough and squared > (ENERGY * limit) ** 2 * first and products < MOST_ITERATIONS:
-        change = w * p
-        q = influence.apply(change)
+        q = influence.apply(w * p)
         products += 1
-        bent = diagonal * p + w * q
+        bent = w * q
+        bent += diagonal * p
         curvature = float(p @ bent)
         if curvature <= 0:
             raise _IndefiniteError
-        if not recycled.full:
-            recycled.add(change, q, curvature)
         length = dtype(squared / curvature)
-        y_displacement += length * q
-        residual -= length * bent
+        q *= length
+        y_displacement += q
+        bent *= length
+        residual -= bent
         z, left, _ = smoothed(residual)
         before, squared = squared, float(residual @ z)
         p *= dtype(squared / before)

@@ -20,7 +20,6 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex import newton
-from convexrough.convex.recycled import Recycled
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.residual import Displaced
@@ -101,7 +100,7 @@ class Newton:
     ) -> tuple[Pressed, int]:
         """The solution of some of the candidates: all others carry nothing."""
         part = problem if len(near) == len(problem) else problem.among(near)
-        law = Pressing(part, float(np.abs(problem.offsets).max()), Recycled())
+        law = Pressing(part, float(np.abs(problem.offsets).max()))
 
         def tell(step: int, state: Pressed) -> None:
             if announce is not None:
@@ -121,7 +120,7 @@ class Newton:
             if base is None:
                 state, more = newton.solve(law, state, stopping, tell=tell)
             else:
-                last = LastStep(part, law.farthest, law.recycled, problem, near, base)
+                last = LastStep(part, law.farthest, problem, near, base)
                 state = last.at(base)
                 state, more = newton.solve(
                     last, state, stopping, before=last.before(state), tell=tell
@@ -138,7 +137,7 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
     From an error e it leaves about e^2, and it tells open asperities from lightly loaded ones.
     """
-    law = Pressing(problem, float(np.abs(problem.offsets).max()), Recycled())
+    law = Pressing(problem, float(np.abs(problem.offsets).max()))
     before = law.evaluate(_start(problem, loads))
     state = newton.descend(law, before, law.direction(before, 0.0))
     residual = problem.residual(state.forces, state.approach, state.displacement)

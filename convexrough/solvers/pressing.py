@@ -12,7 +12,6 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex.newton_step import correct
-from convexrough.convex.recycled import Recycled
 from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.residual import Displaced, Fit, local_rounding, scaled_to, sharp_fit
@@ -43,12 +42,10 @@ class Pressing:
     """The law of contact, for `convex.newton`.
 
     farthest : max |d_i| over all candidates, of which these may be some
-    recycled : directions of its linear systems
     """
 
     problem: NormalProblem
     farthest: float
-    recycled: Recycled
 
     solver: ClassVar[str] = "newton"
     unit: ClassVar[str] = "the approach"
@@ -108,7 +105,6 @@ class Pressing:
             state.defect,
             balanced=self.problem.load is not None,
             tolerance=left,
-            recycled=self.recycled,
         )
 
     def gradient(self, state: Pressed) -> Array:

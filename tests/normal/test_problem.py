@@ -23,7 +23,6 @@ from scenes import (
 
 import convexrough as cr
 from convexrough.convex.newton import descend
-from convexrough.convex.recycled import Recycled
 from convexrough.influence import Kind
 from convexrough.influence.coupling import inverse_distances
 from convexrough.normal.load_control import highest_approach, shifted_to_load
@@ -288,7 +287,7 @@ def test_every_newton_step_lowers_the_energy(make: Any, kind: Kind) -> None:
         problem = assembled(scene, approach=approach, influence=kind)
         rng = np.random.default_rng(seed)
         start = problem.bounds(problem.ceiling) * rng.random(len(problem)) ** 3
-        law = Pressing(problem, float(np.abs(problem.offsets).max()), Recycled())
+        law = Pressing(problem, float(np.abs(problem.offsets).max()))
         state = law.evaluate(hertz.indentation(start, problem.coefficients))
         for _ in range(12):
             following = descend(law, state, law.direction(state, 0.0))

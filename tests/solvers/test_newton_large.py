@@ -168,7 +168,7 @@ def dense_answer(name: str) -> cr.Contact:
     [
         (dict(), 5, 30),
         (dict(pattern="square"), 5, 30),
-        (dict(height_std=1e-7, seed=1), 5, 36),
+        (dict(height_std=1e-7, seed=1), 5, 38),
         (dict(height_std=1e-6, tip_radius_cv=0.1, seed=1), 7, 50),
         (dict(geometry="closest"), 5, 30),
     ],
