@@ -87,7 +87,7 @@ class NormalProblem:
             else `highest_approach` finds one
         """
         checks.exactly_one("approach", approach, "load", load)
-        errors = scene.offset_errors
+        offsets, errors = scene.offsets, scene.offset_errors
         modulus = scene.material.contact_modulus
         coefficients = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
         if approach is not None:
@@ -98,7 +98,7 @@ class NormalProblem:
             ceiling = highest_approach(scene, load, influence) if highest is None else highest
 
         # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
-        prescribed = ceiling + scene.offsets + errors + 6 * ROUNDOFF * abs(ceiling)
+        prescribed = ceiling + offsets + errors + 6 * ROUNDOFF * abs(ceiling)
         candidates = scene.asperities.layout.sorted(prescribed > 0)
         top = float(prescribed.max(initial=0.0)) or 1.0
         units = Units.of(top, _middle(coefficients))
@@ -110,7 +110,7 @@ class NormalProblem:
             units=units,
             candidates=candidates,
             coefficients=evenly(lambda k: k * units.local, taken(coefficients, candidates)),
-            offsets=scene.offsets[candidates] / units.length,
+            offsets=offsets[candidates] / units.length,
             offset_errors=errors[candidates] / units.length,
             influence=coupling,
             shells=shells(coupling),

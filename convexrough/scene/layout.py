@@ -75,7 +75,7 @@ class Layout(Keeper):
             return wanted.nonzero()[0]
         return self.order[wanted[self.order]]
 
-    @cached_property
+    @property
     def distances(self) -> Array:
         """(n,) [length] distance of each point from the axis."""
         x, y = self.points.T

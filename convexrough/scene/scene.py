@@ -105,7 +105,7 @@ class Scene(Record):
         further = self.asperities.tip_radii if self.geometry == "closest" else 0.0
         return frozen((x * x + y * y) / (2.0 * (self.sphere_radius + further)))
 
-    @cached_property
+    @property
     def offsets(self) -> Array:
         """(n,) [length]  d_i = z_i - drop_i: prescribed approach of each asperity, less D0."""
         return frozen(self.asperities.heights - self.drops)

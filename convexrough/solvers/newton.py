@@ -153,7 +153,7 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
 
 def _everywhere(problem: NormalProblem, near: Indices, state: Pressed) -> tuple[Array, Array]:
     """Loads and gaps of all candidates where those that are not near carry nothing."""
-    if state.displaced is not None and state.fit is not None:
-        return state.displaced.loads, state.fit.gap
+    if state.displaced is not None and state.gaps is not None:
+        return state.displaced.loads, state.gaps
     loads = among_zeros(state.forces, near, len(problem))
     return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)

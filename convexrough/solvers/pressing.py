@@ -14,7 +14,7 @@ from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex.newton_step import correct
 from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.residual import Displaced, Fit, local_rounding, scaled_to, sharp_fit
+from convexrough.normal.residual import Displaced, local_rounding, scaled_to, sharp_fit
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
@@ -34,7 +34,7 @@ class Pressed(NamedTuple):
     residual: float  # max |F|
     scale: float  # |D0| + max |d_i|
     displaced: Displaced | None = None  # the loads of all candidates, and A P, where known so well
-    fit: Fit | None = None  # and their gaps
+    gaps: Array | None = None  # of all candidates
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Pressing:
         gap: Array,
         approach: float,
         displaced: Displaced | None = None,
-        fit: Fit | None = None,
+        gaps: Array | None = None,
     ) -> Pressed:
         energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
         if self.problem.load is not None:  # Phi has the gap less D0
@@ -92,7 +92,7 @@ class Pressing:
             residual=float(np.abs(defect).max()),
             scale=abs(approach) + self.farthest,
             displaced=displaced,
-            fit=fit,
+            gaps=gaps,
         )
 
     def direction(self, state: Pressed, left: float) -> Array:
@@ -158,7 +158,7 @@ class LastStep(Pressing):
         weights = None if self.whole.load is None else np.cbrt(displaced.loads)
         fit = sharp_fit(self.whole, displaced, weights)
         local, moved, gap = (each[self.near] for each in (fit.local, fit.displacement, fit.gap))
-        return self._pressed(local, loads, moved, gap, fit.approach, displaced, fit)
+        return self._pressed(local, loads, moved, gap, fit.approach, displaced, fit.gap)
 
     def before(self, state: Pressed) -> float:
         """2-norm of a defect whose square would have left this one: so well is it to be solved."""
