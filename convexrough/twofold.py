@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough import threads
-from convexrough.arrays import Array, Number
+from convexrough.arrays import Array, Number, frozen
 
 #: Relative error of one operation on twofold numbers: above 4 roundoffs squared of sums of one sign
 #: (Joldes, Muller and Popescu, ACM Trans. Math. Softw. 44 (2017) 15).
@@ -88,14 +88,14 @@ class Twofold(NamedTuple):
 
 
 def in_parts(length: int, part: Callable[[slice], Twofold]) -> Twofold:
-    """(length,) numbers of which `part` makes some, on each core: one takes many operations."""
+    """(length,) numbers of which `part` makes some, on each core; read-only."""
     found = Twofold(np.empty(length), np.empty(length))
 
     def make(some: slice) -> None:
         found.high[some], found.low[some] = part(some)
 
     threads.each(make, threads.chunks(length, CHUNK), threads.worthwhile(length))
-    return found
+    return Twofold(frozen(found.high), frozen(found.low))
 
 
 def exact_sum(a: Number, b: Number) -> tuple[Number, Number]:

@@ -104,6 +104,9 @@ class Box:
             found = found or [np.zeros(squares.shape) for _ in each]
             for whole, part in zip(found, each, strict=True):
                 np.copyto(whole[within, places], part, where=nearer)
+        if not found:  # no difference falls on these rows
+            nowhere = np.zeros(0, dtype=np.intp)
+            found = [np.zeros(squares.shape) for _ in values(nowhere, nowhere)]
         for whole in found:
             whole[squares > self.extent**2] = 0.0
         return found
@@ -133,9 +136,7 @@ class Box:
 
         transform(blocks[0])  # says how many kernels there are
         threads.each(transform, blocks[1:], self.workers)
-        # A block may be of places that no difference falls on.
-        counted = [sums[taken.start] for taken in blocks if sums[taken.start]]
-        whole_sums = np.sum(counted, axis=0)
+        whole_sums = np.sum([sums[taken.start] for taken in blocks], axis=0)
         return [
             Kernel(self._spectrum(half, dtype), float(total), float(np.sqrt(square)))
             for half, (total, square) in zip(halves, whole_sums, strict=True)

@@ -59,7 +59,7 @@ def off_sites(
     threads.each(look, threads.chunks(len(members), CHUNK), threads.worthwhile(len(members)))
     steps_most = float(np.abs(places).max(initial=0))
     reach = float(np.abs(lattice.origin).max() + steps_most * np.abs(lattice.basis).sum())
-    return away[0], away[1], 64 * ROUNDOFF**2 * reach
+    return away[0], away[1], 96 * ROUNDOFF**2 * reach
 
 
 def first_order(

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, frozen
 from convexrough.errors import InputError
 from convexrough.normal.problem import NormalProblem
 from convexrough.record import Record
@@ -53,7 +53,8 @@ class Fit(NamedTuple):
 class Displaced(Record):
     """Loads, and A times them to many more digits than a product has: from nothing but both.
 
-    docs/theory/last-step.md, "Loads nearby"
+    docs/theory/last-step.md, "Loads nearby". What `of` and `moved_to` make is read-only, as proofs
+    rest on it: one made by hand would be no proof.
 
     loads   : (n,);  product : A P;  offsets : D - D0
     error   : bound on the error of each component, beside the rounding of twofold numbers
@@ -83,7 +84,7 @@ class Displaced(Record):
         error, norm = (
             each * sums.unit * scale.high * (1 + SAFETY) for each in (sums.error, sums.norm)
         )
-        return cls(problem, loads, product, problem.twofold_offsets(), error, norm)
+        return cls(problem, _kept(loads), product, problem.twofold_offsets(), error, norm)
 
     def moved_to(self, loads: Array) -> Displaced:
         """With an ordinary product, of what loads nearby differ by: so small is its rounding."""
@@ -98,7 +99,12 @@ class Displaced(Record):
         norm = off.norm + relative * math.sqrt(len(loads))
         moved = in_parts(len(loads), lambda some: self.product.at(some) + whole(product[some]))
         bounds = self.error + error * (1 + SAFETY), self.norm + norm * (1 + SAFETY)
-        return Displaced(self.problem, loads, moved, self.offsets, *bounds)
+        return Displaced(self.problem, _kept(loads), moved, self.offsets, *bounds)
+
+
+def _kept(loads: Array) -> Array:
+    """What nobody changes any more."""
+    return frozen(loads.copy()) if loads.flags.writeable else loads
 
 
 def displaced(problem: NormalProblem, loads: Array, nearby: Displaced | None) -> Displaced | None:

@@ -123,13 +123,16 @@ def _found(given: Given, pressed: PressedFit, here: _Near, image: Image) -> _Fou
     bound = _by_theorem(given, pressed, here, residual, missing)
     if bound is None:
         bound = _by_norm(given, here, residual, missing)
-    size = np.abs(given.states.increments[here.row])
+    u = given.states.increments[here.row]
     unknown = abs(residual.shift) + bound.rise + bound.moved + residual.uncertainty
     slips = unknown + image.slips + OWN_ROUNDOFFS * ROUNDOFF * problem.ceilings
-    shares = np.abs(image.shares - size / problem.loads) * b + bound.forces
+    if image.turned is not None:
+        forwards = given.available[here.row] > image.turned + slips
+        slips = np.where(forwards, slips, 3.0 * slips + 2.0 * image.turned)
+    shares = np.abs(image.shares - u / problem.loads) * b + bound.forces
     return _Found(
-        increments=(image.shares * b + bound.forces) * (1 + SAFETY),
-        shares=shares * (1 + SAFETY) + SHARE_ROUNDOFFS * ROUNDOFF * size,
+        increments=(np.abs(image.shares) * b + bound.forces) * (1 + SAFETY),
+        shares=shares * (1 + SAFETY) + SHARE_ROUNDOFFS * ROUNDOFF * np.abs(u),
         slips=slips * (1 + SAFETY),
         rise=(abs(residual.shift) + bound.rise + image.rise) * (1 + SAFETY),
     )

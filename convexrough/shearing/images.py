@@ -24,34 +24,40 @@ MOST_KEPT = 0.99
 class Image(NamedTuple):
     """A choice of lambda, and bounds on what it adds."""
 
-    shares: Array  # lambda
+    shares: Array  # lambda, of the sign of u where that matters
     residual: Array  # what it adds to the residual
     blur: Array  # bounds on the error of that, less a remainder
     remainder: float  # bound on the 2-norm of that
     component: float  # and on each component of it
     missing: float  # of the total
     slips: Array  # to what is not known of a slip
+    turned: (
+        Array | None
+    )  # and how far ceilings change, if slips are those of points pulled forwards
     rise: float  # and of the rise
 
 
 def images(given: Given, pressed: PressedFit, row: int) -> Iterator[Image]:
-    """Both, the second where it can be of use."""
-    yield _carried(given, pressed, row)
-    if (image := _kept(given, pressed, row)) is not None:
-        yield image
+    """Both, each where it can be of use."""
+    for image in (_carried(given, pressed, row), _kept(given, pressed, row)):
+        if image is not None:
+            yield image
 
 
-def _carried(given: Given, pressed: PressedFit, row: int) -> Image:
+def _carried(given: Given, pressed: PressedFit, row: int) -> Image | None:
     """lambda = 1: the loads that are left, P - u, stay what they are.
 
     Forwards their own deflections do, too, and the gap of P is all that is added. Backwards, where
-    x < 0, own deflections turn the other way.
+    x < 0, own deflections turn the other way. None where one is so near to sliding backwards that
+    x might exceed its load.
     """
     known, P, u = given.known, given.problem.loads, given.states.increments[row]
     b = np.where(known.sure, known.errors, 0.0)
     elsewhere = known.stray_effect + known.loose_effect
     back = (b > 0) & (u < b)
     farther = _over(np.where(back, 3.0 * b - u, 0.0), P + u - 2.0 * b)
+    if np.isinf(farther).any():
+        return None
     backwards = 2.0 * softness(given.problem) * b / np.cbrt(P + b) * grown(farther)
     return Image(
         shares=np.ones(len(u)),
@@ -61,6 +67,7 @@ def _carried(given: Given, pressed: PressedFit, row: int) -> Image:
         component=pressed.component,
         missing=pressed.total,
         slips=np.abs(pressed.gap) + pressed.rounding + pressed.component + elsewhere,
+        turned=pressed.local,
         rise=pressed.approach,
     )
 
@@ -83,17 +90,18 @@ def _kept(given: Given, pressed: PressedFit, row: int) -> Image | None:
     some = kept > most
     by_width = some & (left > 2.0 * b)
     part = np.divide(b, left, out=np.zeros(len(u)), where=by_width)
-    shares = np.where(by_width, width, np.where(some, 1.0, 0.0))
+    sizes = np.where(by_width, width, np.where(some, 1.0, 0.0))
     bent = softness(problem) * b / np.cbrt(P) * grown(part / (1.0 - part))
-    moved = couple_above(problem, shares * b)
+    moved = couple_above(problem, sizes * b)
     return Image(
-        shares=shares,
+        shares=np.copysign(sizes, u),
         residual=np.zeros(len(u)),
         blur=np.where(by_width, bent, np.where(some, pressed.local, kept)) + moved,
         remainder=0.0,
         component=0.0,
-        missing=float(shares @ b) * (1 + SAFETY),
+        missing=float(sizes @ b) * (1 + SAFETY),
         slips=moved + pressed.local,
+        turned=None,
         rise=0.0,
     )
 

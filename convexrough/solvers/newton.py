@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from convexrough.arrays import Array, Indices, among_zeros
+from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
@@ -116,7 +116,7 @@ class Newton:
             state, steps = newton.solve(law, state, linear, tell=tell)
             if state.residual <= self.tolerance * state.scale:
                 return state, steps
-            base = Displaced.of(problem, among_zeros(state.forces, near, len(problem)))
+            base = Displaced.of(problem, frozen(among_zeros(state.forces, near, len(problem))))
             if base is None:
                 state, more = newton.solve(law, state, stopping, tell=tell)
             else:

@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from convexrough.arrays import Array, Indices, among_zeros
+from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.convex.newton_step import correct
 from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
@@ -150,7 +150,7 @@ class LastStep(Pressing):
         everywhere = among_zeros(loads, self.near, len(self.whole))
         if self.whole.load is not None:
             everywhere = scaled_to(self.whole.load, everywhere)
-        return self.at(self.base.moved_to(everywhere))
+        return self.at(self.base.moved_to(frozen(everywhere)))
 
     def at(self, displaced: Displaced) -> Pressed:
         """The state of these loads."""

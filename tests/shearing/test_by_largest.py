@@ -59,7 +59,9 @@ def found(first: First, image: str, in_norm: bool = False, **changes: Any) -> An
     if in_norm:
         pressed_fit = pressed_fit._replace(sup=None)
     here = by_largest._near(given, first.near, first.increments[0], 0)
-    every = dict(zip(IMAGES, images(given, pressed_fit, 0), strict=False))
+    every = {
+        "kept" if each.turned is None else "carried": each for each in images(given, pressed_fit, 0)
+    }
     if image not in every or not here.weights.total > 0:
         return None
     chosen = every[image]._replace(**{k: v for k, v in changes.items() if k in Image._fields})
@@ -131,6 +133,56 @@ def attacks() -> list[Attack]:
                     )
                 )
     return made
+
+
+def low_in_a_ring(low: float, approach: float) -> cr.Scene:
+    """One below six that are crowded about it, and many around: it is dragged backwards."""
+    angles, k = np.pi / 3 * np.arange(6), np.arange(400)
+    ring = 0.0025 * np.stack((np.cos(angles), np.sin(angles)), axis=1)
+    r, turns = np.sqrt(0.02**2 + (0.05**2 - 0.02**2) * (k + 0.5) / 400), (k + 0.5) * 2.399963
+    points = np.vstack(([[0, 0]], ring, np.stack((r * np.cos(turns), r * np.sin(turns)), axis=1)))
+    heights = np.concatenate(([-low], 4e-7 * np.arange(6), r * r / 2 - approach + 2e-4))
+    return cr.Scene(1.0, cr.Asperities(points, 0.02, heights), MATERIAL, FRICTION)
+
+
+@pytest.mark.parametrize("approach", [5e-4, 5.5e-4])
+def test_a_load_that_slides_backwards_may_be_wrong(approach: float) -> None:
+    """Then the ring is sheared as if it slid with less than its load, and the rise is off."""
+    open_by = cr.press(low_in_a_ring(1.0, approach), approach=approach).gaps[0]
+    contact = cr.press(low_in_a_ring(1.0 - open_by - 2e-7, approach), approach=approach)
+    true = TangentialProblem.of(contact)
+    total = np.array([0.2 * contact.load / true.units.force])
+    good = true.solve(total)
+    assert good.increments[0, 0] == -true.loads[0]
+    problem = TangentialProblem.of(with_first(contact, 1 / 1.001))
+    p = true.loads[0] - problem.loads[0]
+    lighter = TangentialProblem.of(with_first(contact, (problem.loads[0] - p) / true.loads[0]))
+    states = lighter.solve(total + p)
+    u, deflections = states.increments.copy(), states.deflections.copy()
+    u[0, 0] = -problem.loads[0]
+    deflections[0, 0] = states.rises[0] - problem.couple(u)[0, 0]
+    wrong = problem.solve(total)._replace(
+        increments=u,
+        rises=states.rises,
+        deflections=deflections,
+        slips=deflections - np.clip(deflections, -problem.ceilings, problem.ceilings),
+    )
+    bounds = judge_states(problem, wrong)
+    assert abs(wrong.rises[0] - good.rises[0]) <= 0.9 * bounds.rises[0] < np.inf
+    assert (np.abs(u - good.increments) <= bounds.increments).all()
+
+
+def with_first(contact: cr.Contact, factor: float) -> cr.Contact:
+    """The first load is off by this factor, and known no better."""
+    loads = contact.loads * np.where(np.arange(len(contact.loads)) == 0, factor, 1.0)
+    errors = np.abs(loads - contact.loads) * (1 + 1e-9) + 1e-15 * contact.loads
+    return replace(
+        contact,
+        loads=loads,
+        load=float(loads.sum()),
+        contact_radii=hertz.contact_radius(loads, 1.0, contact.scene.relative_radii),
+        certificate=replace(contact.certificate, load_errors=errors, approach_error=0.0),
+    )
 
 
 def wrongly_pressed(contact: cr.Contact, kind: str) -> cr.Contact:
