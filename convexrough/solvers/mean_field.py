@@ -19,7 +19,7 @@ from convexrough.sphere import hertz
 RINGS, LEAST = 128, 150
 
 #: Of more asperities than about this, only every so many-eth is looked at.
-SAMPLE = 100_000
+SAMPLE = 50_000
 
 #: What an asperity misses of the even load around it, which it does not cause itself: the
 #: potential of a disc of its share of the area, times this. By Ewald's sums 1.1002 for square and
