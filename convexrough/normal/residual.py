@@ -182,33 +182,47 @@ def _residual(loads: Array, gap: Array, rounding: Array) -> Array:
     return residual
 
 
+class Gaps(NamedTuple):
+    """Of the contact law, to twice as many digits but for the local term."""
+
+    local: Array  # k P^(2/3)
+    indentation: Array  # D - A P, its first digits
+    gap: Array  # k P^(2/3) + A P - D
+    approach: float  # D0
+
+    @classmethod
+    def of(cls, problem: NormalProblem, known: Displaced, weights: Array | None) -> Gaps:
+        """`weights` as for `fit`."""
+        loads, offsets, product = known.loads, known.offsets, known.product
+        local = hertz.indentation(loads, problem.coefficients)
+        # D - D0 - A P
+        above = in_parts(len(loads), lambda some: offsets.at(some) + -product.at(some))
+        if problem.approach is None:
+            assert weights is not None
+            total = float(weights.sum())
+            shift = float(weights @ (local - above.high) / total)
+            rest = float(weights @ ((local - above.high - shift) - above.low) / total)
+            level = Twofold(*exact_sum(shift, rest))
+        else:
+            level = whole(problem.approach)
+        indentation = in_parts(len(loads), lambda some: above.at(some) + level)
+        gap = (local - indentation.high) - indentation.low
+        return cls(local, indentation.high, gap, level.high)
+
+
 def sharp_fit(problem: NormalProblem, known: Displaced, weights: Array | None) -> Fit:
     """The same with A P and D in twofold numbers: what is left is the rounding of k P^(2/3)."""
-    loads, displacement = known.loads, known.product
-    local = hertz.indentation(loads, problem.coefficients)
-    # D - D0 - A P
-    above = in_parts(len(loads), lambda some: known.offsets.at(some) + -displacement.at(some))
-    if problem.approach is None:
-        assert weights is not None
-        approach, total = 0.0, float(weights.sum())
-        shift = float(weights @ (local - above.high) / total)
-        rest = float(weights @ ((local - above.high - shift) - above.low) / total)
-        level = Twofold(*exact_sum(shift, rest))
-        approach = level.high
-    else:
-        approach = problem.approach
-        level = whole(approach)
-    indentation = in_parts(len(loads), lambda some: above.at(some) + level)
-    gap = (local - indentation.high) - indentation.low
+    displacement = known.product.high
+    local, indentation, gap, approach = Gaps.of(problem, known, weights)
     rounding = local_rounding(local) + 4 * ROUNDOFF * np.abs(gap)
-    sizes = np.abs(displacement.high) + np.abs(problem.offsets) + abs(approach)
+    sizes = np.abs(displacement) + np.abs(problem.offsets) + abs(approach)
     rounding += SHARP_OPERATIONS * TWOFOLD_ROUNDOFF * (sizes + problem.offset_errors / ROUNDOFF)
     # The rounded values are given, and their own rounding with them.
-    residual = _residual(loads, gap, rounding)
-    rounding = rounding + 2 * ROUNDOFF * np.abs(indentation.high)
+    residual = _residual(known.loads, gap, rounding)
+    rounding = rounding + 2 * ROUNDOFF * np.abs(indentation)
     return Fit(
-        displacement.high,
-        indentation.high,
+        displacement,
+        indentation,
         gap,
         local,
         rounding,

@@ -14,7 +14,7 @@ from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.convex.newton_step import correct
 from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.residual import Displaced, local_rounding, scaled_to, sharp_fit
+from convexrough.normal.residual import Displaced, Gaps, local_rounding, scaled_to
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
@@ -156,9 +156,9 @@ class LastStep(Pressing):
         """The state of these loads."""
         loads = displaced.loads[self.near]
         weights = None if self.whole.load is None else np.cbrt(displaced.loads)
-        fit = sharp_fit(self.whole, displaced, weights)
-        local, moved, gap = (each[self.near] for each in (fit.local, fit.displacement, fit.gap))
-        return self._pressed(local, loads, moved, gap, fit.approach, displaced, fit.gap)
+        local, _, gaps, approach = Gaps.of(self.whole, displaced, weights)
+        moved, gap = displaced.product.high[self.near], gaps[self.near]
+        return self._pressed(local[self.near], loads, moved, gap, approach, displaced, gaps)
 
     def before(self, state: Pressed) -> float:
         """2-norm of a defect whose square would have left this one: so well is it to be solved."""
