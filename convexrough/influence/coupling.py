@@ -217,6 +217,6 @@ def inverse_distances(points: Array, others: Array) -> Array:
 def cubed(squares: Array) -> Array:
     """1 / r^3 of squared distances, and 0 where two points are one."""
     with np.errstate(divide="ignore"):
-        inverse: Array = squares**-1.5
+        inverse: Array = 1.0 / (squares * np.sqrt(squares))
     inverse[squares == 0] = 0.0
     return inverse

@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 from convexrough import threads
 from convexrough.arrays import Array, Indices
 from convexrough.influence.convolution import Box, in_blocks
+from convexrough.influence.coupling import cubed
 from convexrough.influence.sliced import each_loss
+from convexrough.influence.slopes import pulls
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.twofold import exact_product, exact_sum
@@ -86,13 +88,6 @@ def _odd_spectra(box: Box) -> tuple[Spectra, float]:
     """The imaginary parts of the transforms of d / |d|^3, and the 2-norm of both together."""
     from scipy import fft
 
-    def values(i: Indices, j: Indices) -> tuple[Array, Array]:
-        x, y = (np.add.outer(i * box.basis[0, k], j * box.basis[1, k]) for k in (0, 1))
-        squares = x * x + y * y
-        squares[squares == 0] = np.inf
-        over = 1.0 / (squares * np.sqrt(squares))
-        return x * over, y * over
-
     rows, columns = box.padded
     halves = [np.zeros((rows, columns // 2 + 1), dtype=np.complex64) for _ in range(2)]
     block, total = max(1, LAID_OUT // columns), 0.0
@@ -100,7 +95,7 @@ def _odd_spectra(box: Box) -> tuple[Spectra, float]:
         taken = slice(start, min(start + block, rows // 2 + 1))
         i = np.arange(taken.start, taken.stop)
         weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # i and -i
-        for half, part in zip(halves, box.laid_out(values, taken), strict=True):
+        for half, part in zip(halves, box.laid_out(pulls(box, cubed), taken), strict=True):
             total += float(weights @ np.einsum("ij,ij->i", part, part))
             half[taken] = fft.rfft(part.astype(np.float32), axis=1, workers=box.workers)
     return [_imaginary(box, half) for half in halves], math.sqrt(total)

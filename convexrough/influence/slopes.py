@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence.convolution import Box
+from convexrough.influence.convolution import Box, Values
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.softened import Softened
 
@@ -36,13 +36,19 @@ def odd_spectra(box: Box, over_cube: Callable[[Array], Array]) -> Spectra:
     """
     from scipy import fft
 
+    x, y = box.laid_out(pulls(box, over_cube), slice(0, box.padded[0]))
+    return fft.rfft2(x, workers=box.workers), fft.rfft2(y, workers=box.workers)
+
+
+def pulls(box: Box, over_cube: Callable[[Array], Array]) -> Values:
+    """x and y over r^3 at differences of two sites; `over_cube` as for `odd_spectra`."""
+
     def values(i: Indices, j: Indices) -> tuple[Array, Array]:
         x, y = (np.add.outer(i * box.basis[0, k], j * box.basis[1, k]) for k in (0, 1))
         weights = over_cube(x * x + y * y)
         return weights * x, weights * y
 
-    x, y = box.laid_out(values, slice(0, box.padded[0]))
-    return fft.rfft2(x, workers=box.workers), fft.rfft2(y, workers=box.workers)
+    return values
 
 
 def by_mesh(product: Product, spectra: Spectra | None, values: Array) -> Array:
