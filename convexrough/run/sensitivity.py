@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple
 
@@ -18,8 +19,9 @@ from convexrough.shearing.state import shear
 #: What a scene file may ask the gradient of, and its letter.
 NUMBERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
 
-#: What it may ask it by, asperity by asperity.
-BY = ("heights", "tip_radii", "positions")
+#: What it may ask it by, asperity by asperity, and the word for one of them.
+EACH = {"heights": "height", "tip_radii": "tip_radius", "positions": "position"}
+BY = tuple(EACH)
 
 
 class Sensitivity(NamedTuple):
@@ -76,6 +78,12 @@ def gradient_summary(found: Differentiated) -> dict[str, Any]:
     shared = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load", "approach")
     names = (*shared, "maximum", "minimum", "force")
     by = {name: it for name in names if (it := getattr(gradient, name)) is not None}
+    largest = {}
+    for name in asked.by:
+        slopes = getattr(gradient, name)
+        sizes = np.linalg.norm(slopes, axis=1) if slopes.ndim == 2 else np.abs(slopes)
+        at = int(np.argmax(sizes))
+        largest[name] = {"slope": slopes[at].tolist(), "asperity": at}
     return {
         "of": asked.of,
         "holding": gradient.holding,
@@ -83,6 +91,7 @@ def gradient_summary(found: Differentiated) -> dict[str, Any]:
         "by": by,
         "largest_by_height": float(gradient.heights[most]),
         "largest_at": most,
+        "largest": largest,
         "height_error": float(gradient.height_errors.max()),
         "balance_defect": gradient.balance_defect,
     } | ({"fraction": asked.fraction} if asked.of in ("loss", "displacement") else {})
@@ -90,9 +99,23 @@ def gradient_summary(found: Differentiated) -> dict[str, Any]:
 
 def gradient_lines(summary: dict[str, Any]) -> list[str]:
     """What people are told."""
-    under = f" at Q/(fP) = {summary['fraction']:g}" if "fraction" in summary else ""
-    lines = ["", f"gradient of the {summary['of']}{under}, {summary['holding']} held"]
-    lines += [f"{'  value':<18}{summary['value']:.10g}"]
-    lines += [f"{'  by ' + name:<18}{slope:.8g}" for name, slope in summary["by"].items()]
-    largest = f"{summary['largest_by_height']:.8g}  (asperity {summary['largest_at']})"
-    return [*lines, f"{'  by height':<18}up to {largest}"]
+    held, under = f"{summary['holding']} held", ""
+    if "fraction" in summary:
+        under, held = f" at Q/(fP) = {summary['fraction']:g}", f"{held}, and so is the force"
+    rows = [("value", f"{summary['value'] + 0.0:.10g}")]  # no -0
+    rows += [(f"by {name}", f"{slope + 0.0:.8g}") for name, slope in summary["by"].items()]
+    for name, word in EACH.items():
+        if (most := summary["largest"].get(name)) is None:
+            continue
+        known = f", {_known(summary['height_error'])}" if name == "heights" else ""
+        slopes = np.ravel(most["slope"]) + 0.0
+        text = ", ".join(f"{slope:.8g}" for slope in slopes)
+        text = f"({text})" if len(slopes) > 1 else text
+        rows.append((f"by {word}", f"up to {text}  (asperity {most['asperity']}{known})"))
+    lines = [f"  {name:<18}{text}" for name, text in rows]
+    return ["", f"gradient of the {summary['of']}{under}, {held}", *lines]
+
+
+def _known(error: float) -> str:
+    """Two digits of a proved bound, never below it."""
+    return f"all known to {1.05 * error:.2g}" if math.isfinite(error) else "no bound"

@@ -74,6 +74,37 @@ def test_other_numbers_and_fewer_columns(command: Any, of: str) -> None:
     assert table["by_height"].sum() == pytest.approx(0.0 if of == "approach" else moved, rel=1e-9)
 
 
+def printed(out: str) -> dict[str, str]:
+    """The lines of the gradient, by their first words."""
+    lines = out.split("gradient of the ")[1].split("\n\n")[0].splitlines()[1:]
+    return {line[:20].strip(): line[20:] for line in lines}
+
+
+def test_what_is_printed(command: Any) -> None:
+    """Names apart from numbers, what is held, how far heights are known, and what was asked by."""
+    write('[gradient]\nof = "loss"\nfraction = 0.5\nby = ["heights", "positions"]\n')
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
+    summary = json.loads(Path("out/summary.json").read_text())["gradient"]
+    assert "load held, and so is the force" in outcome.out
+    lines = printed(outcome.out)
+    for name, slope in summary["by"].items():
+        assert lines[f"by {name}"] == f"{slope + 0.0:.8g}"
+    known = float(lines["by height"].split("known to ")[1].rstrip(")"))
+    assert summary["height_error"] <= known <= 1.2 * summary["height_error"]
+    table = read("gradient")
+    far = np.hypot(table["by_x"], table["by_y"])
+    at = int(lines["by position"].split("asperity ")[1].rstrip(")"))
+    assert far[at] == far.max()
+    assert lines["by position"].startswith(f"up to ({table['by_x'][at]:.8g}, ")
+    assert "by tip_radius" not in lines
+    write('[gradient]\nof = "approach"\nby = ["tip_radii"]\n')
+    outcome = command("run", "scene.toml", "--out", "other", "--no-figures")
+    lines = printed(outcome.out)
+    assert "by height" not in lines
+    assert lines["by friction"] == "0"
+    assert lines["by tip_radius"].startswith("up to ")
+
+
 @pytest.mark.parametrize(
     ("table", "said"),
     [
@@ -82,6 +113,7 @@ def test_other_numbers_and_fewer_columns(command: Any, of: str) -> None:
         ('of = "load"\nfraction = 0.1', "fraction: found 0.1, expected none with the load"),
         ('of = "loss"\nfraction = 2.0', "expected a number from 0 to 1"),
         ('of = "load"\nby = ["height"]', "expected a list of some of: heights, tip_radii"),
+        ('of = "load"\nby = []', "by: found [], expected a list of some of: heights, tip_radii"),
         ('of = "load"\nholding = "gap"', 'expected "load" or "approach"'),
     ],
 )
