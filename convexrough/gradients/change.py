@@ -17,7 +17,7 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.gradients.adjoint import Friction
-from convexrough.gradients.origin import far_radii, held, pressed
+from convexrough.gradients.origin import far_radii, felt, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.influence import Influence
 from convexrough.influence.choice import couple
@@ -164,6 +164,7 @@ def shear_change(
     first = contact_change(contact, direction, tolerance=tolerance)
     problem, bent = pressed(contact), _Bent.of(contact, direction)
     there = Friction.of_state(problem, state)
+    felt(problem, "force", np.array([there.total]))
     sign = -1.0 if state.force < 0 else 1.0
     if problem.at_limit(np.array([there.total]))[0]:
         expected = "a force below f P, where the derivative is finite"

@@ -20,6 +20,9 @@ from convexrough.influence.choice import couple
 from convexrough.record import Record
 from convexrough.shearing.problem import TangentialProblem
 
+#: Least force but 0 over f P: squares of its third power, and of their rounding, are in float64.
+SLIGHTEST = 1e-40
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Origin(Record):
@@ -140,6 +143,17 @@ def pressed(contact: Contact) -> TangentialProblem:
         expected = "a contact that carries some load: without, nothing has a derivative"
         raise InputError("contact", found="no load", expected=expected)
     return TangentialProblem.pressed(contact)
+
+
+def felt(problem: TangentialProblem, what: str, totals: Array) -> None:
+    """InputError for forces, as T in own units, that are so small that bounds would vanish."""
+    parts = totals[totals > 0] / problem.limit
+    if (parts < SLIGHTEST).any():
+        found, expected = (
+            f"{parts.min():.3g} f P",
+            f"0, or at least {SLIGHTEST:g} f P, in gradients",
+        )
+        raise InputError(what, found=found, expected=expected)
 
 
 def far_radii(contact: Contact, places: Indices) -> Array:

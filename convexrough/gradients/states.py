@@ -25,7 +25,7 @@ from convexrough.gradients.adjoint import (
 from convexrough.gradients.doubts import Doubt, GivenDoubt, StateDoubt
 from convexrough.gradients.gradient import Gradient, to_scene
 from convexrough.gradients.gross import GrossDoubt, last_to_slide, through_gross_sliding
-from convexrough.gradients.origin import Origin, held, pressed
+from convexrough.gradients.origin import Origin, felt, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.influence.choice import couple
 from convexrough.shearing.state import ShearState, indices, onset_of_sliding
@@ -120,6 +120,7 @@ def state_gradient(
     moved, rise = sign * travel * on_slips[touching], sign * travel * X
 
     there = Friction.of_state(problem, state)
+    felt(problem, "force", np.array([there.total]))
     doubts: list[Doubt] | None = None
     if limit := bool(problem.at_limit(np.array([there.total]))[0]):
         last = last_to_slide(problem, holding, "force", state.force)

@@ -285,3 +285,29 @@ def test_histories_have_bounds_too() -> None:
     assert gradient.height_errors.max() < 1e-13 * np.abs(gradient.heights).max()
     cycle = cr.cycle(contact, maximum=0.2 * contact.load).gradient()
     assert cycle.normalised.height_errors.max() < 1e-7 * np.abs(cycle.normalised.heights).max()
+
+
+def test_the_smallest_forces() -> None:
+    """Losses go with the third power of the force there: so do derivatives, and what bounds them.
+
+    Below, squares vanish and bounds with them: that is refused.
+    """
+    contact = cr.press(with_friction(NAMED["rough"][0]), load=3.6e-7)
+    limit, power = FRICTION * contact.load, 2.0**-60
+    cycle = cr.cycle(contact, maximum=1e-20 * limit)
+    first, small = cycle.gradient(), cr.cycle(contact, maximum=1e-20 * power * limit).gradient()
+    np.testing.assert_allclose(small.heights, power**3 * first.heights, rtol=1e-13)
+    bounds = first.height_errors
+    np.testing.assert_allclose(small.height_errors / power**3, bounds, atol=0.1 * bounds.max())
+    slight = 1e-51 * limit
+    history = cr.history(contact, forces=[0.1 * limit, 0.0, slight])
+    state = cr.shear(contact, force=slight)
+    for ask in (
+        cr.cycle(contact, maximum=slight).gradient,
+        lambda: state.gradient(displacement=1.0),
+        lambda: state.change(cr.Direction(heights=1e-9)),
+        lambda: history.gradient(displacements=1.0),
+    ):
+        with pytest.raises(cr.InputError, match=r"e-5\d f P, expected 0, or at least 1e-40 f P"):
+            ask()
+    assert cr.cycle(contact, maximum=0.0).gradient().heights.max() == 0.0
