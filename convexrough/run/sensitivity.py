@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.contact import Contact
+from convexrough.errors import InputError, SolverError
 from convexrough.gradients.adjoint import Holding
 from convexrough.gradients.gradient import Gradient
 from convexrough.shearing.cycle import cycle
@@ -37,18 +38,32 @@ class Sensitivity(NamedTuple):
     by: tuple[str, ...]
     holding: Literal["load", "approach"] | None
 
-    def compute(self, contact: Contact) -> Differentiated:
-        """The gradient, of a contact that carries a load."""
+    def compute(self, contact: Contact) -> Differentiated | Missing:
+        """The gradient, or why there is none."""
+        try:
+            return Differentiated(self, self._gradient(contact))
+        except InputError as error:
+            return Missing(self, str(self._in_the_file(error)))
+        except SolverError as error:
+            return Missing(self, str(error))
+
+    def _gradient(self, contact: Contact) -> Gradient:
         holding: Holding | None = self.holding
         if self.of == "approach":
-            return Differentiated(self, contact.gradient(approach=1.0, holding=holding))
+            return contact.gradient(approach=1.0, holding=holding)
         if self.of == "load":
-            return Differentiated(self, contact.gradient(load=1.0, holding=holding))
+            return contact.gradient(load=1.0, holding=holding)
         force = self.fraction * checks.friction(contact.scene.friction) * contact.load
         if self.of == "displacement":
-            state = shear(contact, force=force)
-            return Differentiated(self, state.gradient(displacement=1.0, holding=holding))
-        return Differentiated(self, cycle(contact, maximum=force).gradient(holding=holding))
+            return shear(contact, force=force).gradient(displacement=1.0, holding=holding)
+        return cycle(contact, maximum=force).gradient(holding=holding)
+
+    def _in_the_file(self, error: InputError) -> InputError:
+        """About a force: by the key of the file that it comes from."""
+        if error.what not in ("force", "maximum"):
+            return error
+        found = f"{self.fraction:g}, a force of {error.found}"
+        return InputError("[gradient] fraction", found=found, expected=error.expected)
 
 
 class Differentiated(NamedTuple):
@@ -56,6 +71,13 @@ class Differentiated(NamedTuple):
 
     asked: Sensitivity
     gradient: Gradient
+
+
+class Missing(NamedTuple):
+    """What was asked for, and why it has no derivative."""
+
+    asked: Sensitivity
+    because: str
 
 
 def gradient_columns(found: Differentiated) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -71,8 +93,10 @@ def gradient_columns(found: Differentiated) -> Iterator[tuple[str, NDArray[Any]]
         yield from zip(("by_x", "by_y"), gradient.positions.T, strict=True)
 
 
-def gradient_summary(found: Differentiated) -> dict[str, Any]:
-    """Numbers of the whole, and which asperity matters most."""
+def gradient_summary(found: Differentiated | Missing) -> dict[str, Any]:
+    """Numbers of the whole, and which asperity matters most; or why there are none."""
+    if isinstance(found, Missing):
+        return {"of": found.asked.of, "none_because": found.because}
     asked, gradient = found
     most = int(np.argmax(np.abs(gradient.heights)))
     shared = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load", "approach")
@@ -99,6 +123,8 @@ def gradient_summary(found: Differentiated) -> dict[str, Any]:
 
 def gradient_lines(summary: dict[str, Any]) -> list[str]:
     """What people are told."""
+    if "none_because" in summary:
+        return ["", f"gradient of the {summary['of']}: none, {summary['none_because']}"]
     held, under = f"{summary['holding']} held", ""
     if "fraction" in summary:
         under, held = f" at Q/(fP) = {summary['fraction']:g}", f"{held}, and so is the force"

@@ -131,8 +131,33 @@ def test_a_loss_needs_friction(command: Any) -> None:
     assert "[friction]: missing table, needed with the loss of [gradient]" in outcome.err
 
 
-def test_where_there_is_none(command: Any) -> None:
-    write('[gradient]\nof = "loss"\nfraction = 1.0\nholding = "approach"\n')
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        (
+            'of = "loss"\nfraction = 1.0\nholding = "approach"',
+            "[gradient] fraction: found 1, a force of 1.804266945e-07: gross sliding, "
+            "expected a force below f P: with the approach held f P may fall below the force",
+        ),
+        ('of = "displacement"\nfraction = 1e-51', "[gradient] fraction: found 1e-51, a force of "),
+    ],
+)
+def test_where_there_is_none(command: Any, keys: str, said: str) -> None:
+    """All else is computed and written; what is missing is said, and the status says so."""
+    write(f"[gradient]\n{keys}\n[cycle]\nmaximum = [0.5]\n")
     outcome = command("run", "scene.toml", "--out", "out")
-    assert outcome.status == 2
-    assert "with the approach held f P may fall below the force" in outcome.err
+    assert outcome.status == 3
+    summary = json.loads(Path("out/summary.json").read_text())
+    assert said in summary["gradient"]["none_because"]
+    assert f"none, {said}" in outcome.out
+    assert "warning: no gradient of the" in outcome.err
+    assert summary["cycle"][0]["energy"] > 0
+    assert Path("out/cycle.csv").exists()
+    assert not Path("out/gradient.csv").exists()
+
+
+def test_nothing_touches(command: Any) -> None:
+    write('[gradient]\nof = "load"\n', SCENE.replace("load = 3.60853389e-7", "approach = -1e-6"))
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert outcome.status == 3
+    assert "gradient of the load: none, contact: found no load, expected" in outcome.out
