@@ -34,6 +34,7 @@ class Origin(Record):
     pressing : of the pressed state, with sum lambda = total where the load is held
     doubts   : about the weights on loads that it was solved for; None where nothing is known
     mixed    : of more than one J, each times a number
+    rounding : (n,) bounds on what those numbers being off does to dJ/dd
     """
 
     contact: Contact
@@ -47,6 +48,7 @@ class Origin(Record):
     total: float | None
     doubts: tuple[Doubt, ...] | None
     mixed: bool = False
+    rounding: Array | float = 0.0
 
     @classmethod
     def of(
@@ -78,13 +80,20 @@ class Origin(Record):
             doubts=None if doubts is None else tuple(doubts),
         )
 
-    def combined(self, own: float, factor: float = 0.0, other: Origin | None = None) -> Origin:
-        """Of J times a number, and another J, whose weights are exact, times another."""
+    def combined(
+        self, own: float, doubt: float, factor: float = 0.0, other: Origin | None = None
+    ) -> Origin:
+        """Of J times a number, and another J, whose weights are exact, times another.
+
+        doubt : bound on what either number is off, over that number
+        """
         one, two = self.pressing, self.pressing if other is None else other.pressing
         doubts = self.doubts
         if doubts is not None:
             doubts = tuple(replace(each, factor=own * each.factor) for each in doubts)
         far = self if other is None else other  # with a factor of 0
+        sizes = np.abs(own * self.offsets) + np.abs(factor * far.offsets)
+        off = np.multiply(doubt, sizes, where=sizes > 0, out=np.zeros(len(sizes)))
         return replace(
             self,
             offsets=frozen(own * self.offsets + factor * far.offsets),
@@ -98,7 +107,8 @@ class Origin(Record):
                 np.abs(own * one.defect) + np.abs(factor * two.defect),
             ),
             doubts=doubts,
-            mixed=True,
+            mixed=self.mixed or other is not None,
+            rounding=frozen(abs(own) * self.rounding + off),
         )
 
     @cached_property

@@ -50,6 +50,16 @@ def displacement(contact: cr.Contact, holding: str, force: float) -> Judge:
     return Judge(given(contact, holding, [force]), value)
 
 
+def normalised(contact: cr.Contact, holding: str, force: float) -> Judge:
+    solved = sheared(contact, holding, force)
+
+    def value(setup: Setup, near: Any) -> tuple[Any, Any]:
+        state = solved(setup, near)
+        return state.loss / state.oracle.smooth_loss, state
+
+    return Judge(given(contact, holding, [force]), value)
+
+
 def approach(contact: cr.Contact, holding: str) -> Judge:
     def value(setup: Setup, near: Any) -> tuple[Any, Any]:
         oracle = press(contact, setup, near)
@@ -105,6 +115,25 @@ def test_bounds_of_losses_are_near_the_truth(name: str, fraction: float) -> None
     true, bounds = true_errors(loss(contact, "load", force), gradient, every=9)
     assert (true <= bounds).all()
     assert bounds.max() <= 100 * true.max()
+
+
+@pytest.mark.parametrize("name", ["paper", "rough, closest"])
+@pytest.mark.parametrize("fraction", [1e-3, 0.5, 0.99])
+def test_bounds_of_normalised_losses(name: str, fraction: float) -> None:
+    """Where the load is held they are as near as those of the loss itself: W0 is a factor."""
+    contact = pressed(name, "load")
+    force = fraction * FRICTION * contact.load
+    gradient = cr.cycle(contact, maximum=force).gradient()
+    found = gradient.normalised
+    true, bounds = true_errors(normalised(contact, "load", force), found, every=9)
+    assert (true <= bounds).all()
+    ratio = found.value / gradient.value
+    assert found.height_errors.max() <= 10 * ratio * gradient.height_errors.max()
+    assert (found.height_errors > ratio * gradient.height_errors).any()  # W0 is rounded
+    contact = pressed(name, "approach")
+    found = cr.cycle(contact, maximum=force).gradient().normalised
+    true, bounds = true_errors(normalised(contact, "approach", force), found, every=9)
+    assert (true <= bounds).all()
 
 
 def test_slips_backward_sliding_and_uneven_cycles_too() -> None:
