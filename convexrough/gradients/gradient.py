@@ -43,7 +43,9 @@ class Gradient(Table, Drawn):
     Units are those of the number over those of the parameter. Arrays are (n,), in the scene's
     order; screened asperities, and open ones unless their gap is asked for, have 0 everywhere. Each
     derivative is at fixed values of the other parameters named here: shear forces are held, not
-    their fractions of f P.
+    their fractions of f P, nor a displacement by which a state or cycle was prescribed. At a held
+    displacement X a loss W changes by dW|X = dW|Q - (W_Q / X_Q) dX|Q, with X_Q the derivative by
+    the force of the state at the amplitude of the cycle, and W_Q that by `maximum`, twice.
 
     value           : the number itself
     holding         : "load" or "approach": which of the two is held
