@@ -94,9 +94,9 @@ def history_gradient(
     if energy is None and displacements is None:
         expected = "at least one: weights on what is to be differentiated"
         raise InputError("energy, displacements", found="none", expected=expected)
-    on_energy = checks.array("energy", 0.0 if energy is None else energy, length=m)
+    on_energy = checks.array("energy", 0.0 if energy is None else energy, length=m, one="force")
     far = 0.0 if displacements is None else displacements
-    on_moved = checks.array("displacements", far, length=m)
+    on_moved = checks.array("displacements", far, length=m, one="force")
 
     asked = _look_ups(history.applied / problem.force_unit, on_energy, on_moved)
     loading = FirstLoading(contact)

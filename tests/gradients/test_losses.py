@@ -259,6 +259,8 @@ def test_no_derivative_in_gross_sliding() -> None:
     together = cr.press(even, load=1e-8)
     with pytest.raises(cr.InputError, match="several asperities slide last, together"):
         cr.cycle(together, maximum=FRICTION * together.load).gradient()
+    with pytest.raises(cr.InputError, match="asperity: found 1, which slides last, together with"):
+        cr.onset_gradient(together, 1)
 
 
 def directly(contact: cr.Contact, fraction: float) -> tuple[Any, Any]:

@@ -74,6 +74,16 @@ def test_other_numbers_and_fewer_columns(command: Any, of: str) -> None:
     assert table["by_height"].sum() == pytest.approx(0.0 if of == "approach" else moved, rel=1e-9)
 
 
+def test_an_approach_needs_none(command: Any) -> None:
+    scene = SCENE.split("[friction]")[0]
+    write('[gradient]\nof = "approach"\nfraction = 0.5\n', scene)
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert "fraction: found 0.5, expected none with the approach" in outcome.err
+    assert "friction" not in outcome.err
+    write('[gradient]\nof = "approach"\n', scene)
+    assert command("run", "scene.toml", "--out", "out", "--no-figures").status == 0
+
+
 def printed(out: str) -> dict[str, str]:
     """The lines of the gradient, by their first words."""
     lines = out.split("gradient of the ")[1].split("\n\n")[0].splitlines()[1:]
