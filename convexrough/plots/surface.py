@@ -63,14 +63,14 @@ def surface_figures(
 
     "map"         : heights, summits, and those that touch where they are pressed
     "histograms"  : of the summits, and where the spectral moments expect them
-    "provability" : contacts, crowding and model error by pruning, where there is a curve
+    "provability" : contacts, crowding and model error by pruning, where any touch
 
     maxima  : all summits of this surface;  summits : those left by pruning
     contact : of the summits that are left
     """
     figures = Figures({"map": _map(surface, summits, contact)})
     figures["histograms"] = _histograms(surface, maxima, summits)
-    if curve is not None:
+    if curve is not None and curve.contacts.any():
         figures["provability"] = provability_figure(curve, summits.origin.prune, surface.unit)
     return figures
 

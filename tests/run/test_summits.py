@@ -273,3 +273,13 @@ def test_a_sphere_is_taken_away_and_said(command: Any) -> None:
     assert outcome.status == 0
     radius = float(outcome.out.partition("sphere of radius ")[2].split(",")[0])
     assert radius == pytest.approx(2e3, rel=0.02)
+
+
+@pytest.mark.usefixtures("surface")
+@pytest.mark.parametrize("approach", ["-100", "-1"])
+def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any, approach: str) -> None:
+    outcome = command("summits", "scan.npz", "--radius", "1e4", "--approach", approach)
+    assert "warning: nothing touches" in outcome.err
+    assert "to be trusted     nothing, as nothing touches" in outcome.out
+    outcome = command("summits", "scan.npz", "--radius", "1e4", "--approach", "1", "--force")
+    assert "nothing touches" not in outcome.out + outcome.err
