@@ -63,14 +63,14 @@ def surface_figures(
 
     "map"         : heights, summits, and those that touch where they are pressed
     "histograms"  : of the summits, and where the spectral moments expect them
-    "provability" : contacts, crowding and model error by pruning, where any touch
+    "provability" : contacts, crowding and model error by pruning, where there is a curve
 
     maxima  : all summits of this surface;  summits : those left by pruning
     contact : of the summits that are left
     """
     figures = Figures({"map": _map(surface, summits, contact)})
     figures["histograms"] = _histograms(surface, maxima, summits)
-    if curve is not None and curve.contacts.any():
+    if curve is not None:
         figures["provability"] = provability_figure(curve, summits.origin.prune, surface.unit)
     return figures
 
@@ -96,7 +96,8 @@ def draw_summits(axes: Axes, positions: Array) -> None:
 def draw_provability(axes: Axes, curve: Provability) -> None:
     """How many summits touch, marked by what is proved of them."""
     axes.plot(_place(curve.prune), curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
-    _draw_by_scope(axes, curve, curve.contacts.astype(np.float64), "contacts")
+    # 0 has no place on an axis of logarithms.
+    _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")
     axes.set_yscale("log")
     _name_prunings(axes, curve)
     label(axes, "pruning  [% of $Sz$]", "number")

@@ -231,8 +231,11 @@ def doubts_of_surface(scanned: Scanned) -> Iterator[str]:
     if not first <= chosen:
         more = "no pruning is strong enough" if np.isnan(first) else f"--prune {first:g} is"
         yield f"at a pruning of {chosen:g} the asperity model is not to be trusted; {more}"
-    if not scanned.curve.contacts.any():
-        yield "nothing touches: trust is that of a contact, so press deeper, or with a load"
+    if contact is not None and not contact.loads.any():
+        yield (
+            f"at a pruning of {chosen:g} nothing touches: trust is that of a contact, so press "
+            "deeper, or with a load"
+        )
     if contact is None:
         yield f"at a pruning of {chosen:g} no solution was found"
     elif contact.loads.any():
