@@ -136,8 +136,12 @@ def read(path: str) -> Any:
             raise Unreadable(f"more than {MOST_BYTES} bytes")
         hooks: Any = dict.fromkeys(("parse_int", "parse_float", "parse_constant"), refuse)
         return json.loads(contents.decode(), object_pairs_hook=once, **hooks)
-    except (OSError, ValueError, RecursionError) as error:
-        raise Unreadable(f"{type(error).__name__}: {error}") from error
+    except OSError as error:
+        raise Unreadable(error.strerror or "no file") from error
+    except ValueError as error:
+        raise Unreadable(f"no JSON: {error}") from error
+    except RecursionError as error:
+        raise Unreadable("nested too deeply") from error
 
 
 def table(value: Any, *keys: str) -> list[Any]:

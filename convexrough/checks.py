@@ -49,10 +49,12 @@ def array(
     length: int | None = None,
     sign: str = "",
     smallest: float = 0.0,
+    one: str = "asperity",
 ) -> Array:
     """A read-only copy of a vector; `sign` is "", "positive" or "not negative".
 
     A number stands for a vector of `length` equal values. smallest : least size, or 0
+    one : what there is one value for, in messages
     """
     try:
         if np.iscomplexobj(values) or np.asarray(values).dtype.kind in "USV":
@@ -63,7 +65,7 @@ def array(
     if vector.ndim == 0 and length is not None:
         vector = even(float(vector), length)
     if vector.ndim != 1 or (length is not None and vector.size != length):
-        count = "a list of numbers" if length is None else f"{length} values, one per asperity"
+        count = "a list of numbers" if length is None else f"{length} values, one per {one}"
         raise InputError(what, found=f"shape {np.shape(values)}", expected=count)
     each = vector[:1] if vector.strides == (0,) else vector
     good = np.abs(each) <= LARGEST  # nan is not

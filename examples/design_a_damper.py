@@ -116,7 +116,7 @@ def draw(path: str, finer: int = 1) -> None:
         rings = {name: look[name] for name in ("edgecolors", "linewidths", "s")}
         axes.scatter(*points[~touch].T, facecolors="none", **rings)  # these may have any height
         axes.set(
-            title=f"{word}: {best[1]:.2f} of equal heights", aspect="equal", xlabel="x / (R / 1000)"
+            title=f"{word}: {best[1]:.3f} of equal heights", aspect="equal", xlabel="x / (R / 1000)"
         )
     panels[0].set_ylabel("y / (R / 1000)")
     figure.colorbar(dots, ax=panels, label="height / largest height allowed", shrink=0.85)

@@ -17,7 +17,7 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.gradients.adjoint import Friction
-from convexrough.gradients.origin import far_radii, held, pressed
+from convexrough.gradients.origin import far_radii, felt, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.influence import Influence
 from convexrough.influence.choice import couple
@@ -26,6 +26,12 @@ from convexrough.scene.scene import Scene
 from convexrough.shearing.problem import TangentialProblem
 from convexrough.shearing.state import ShearState
 
+#: What a direction has one number of.
+WHOLE = (
+    *("sphere_radius", "contact_modulus", "poisson_ratio", "friction"),
+    *("load", "approach", "force"),
+)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Direction(Record):
@@ -33,7 +39,7 @@ class Direction(Record):
 
     heights, tip_radii : (n,) or one number for all [length];  positions : (n, 2) [length]
     load or approach   : of what is held; where neither is given what was prescribed is held as is
-    force              : of the shear force of a friction state [force]
+    force              : of the shear force [force]; it and friction are of friction states alone
 
     >>> contact.change(cr.Direction(heights=1e-9)).load > 0
     True
@@ -49,6 +55,11 @@ class Direction(Record):
     load: float | None = None
     approach: float | None = None
     force: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in WHOLE:
+            if (given := getattr(self, name)) is not None or name not in ("load", "approach"):
+                object.__setattr__(self, name, checks.finite(name, given))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,11 +106,20 @@ class ShearChange(Table):
 def contact_change(
     contact: Contact, direction: Direction, *, tolerance: float = TOLERANCE
 ) -> ContactChange:
-    """As `Contact.change`.
+    """As `Contact.change`: what friction and a shear force do is asked of a friction state."""
+    checks.instance("direction", direction, Direction)
+    for name in ("friction", "force"):
+        if (given := getattr(direction, name)) != 0.0:
+            expected = "0: a contact depends on neither friction nor force; states change by both"
+            raise InputError(name, found=given, expected=expected)
+    return _pressed_change(contact, direction, tolerance)
+
+
+def _pressed_change(contact: Contact, direction: Direction, tolerance: float) -> ContactChange:
+    """Of the contact alone.
 
     zeta + A (c0 zeta) = dd - P^(2/3) dk - dA P + dD0,  dP = c0 zeta;  sum dP = dP under load.
     """
-    checks.instance("direction", direction, Direction)
     if direction.load is not None and direction.approach is not None:
         found, expected = "both", "at most one of the two, as only one is held"
         raise InputError("load, approach", found=found, expected=expected)
@@ -161,9 +181,11 @@ def shear_change(
     du = m + c Y,  dDelta = beta,  d|slip| = sigma Y - C (dlog k + 2 dP / (3 P)) where sliding.
     """
     contact = state.contact
-    first = contact_change(contact, direction, tolerance=tolerance)
+    checks.instance("direction", direction, Direction)
+    first = _pressed_change(contact, direction, tolerance)
     problem, bent = pressed(contact), _Bent.of(contact, direction)
     there = Friction.of_state(problem, state)
+    felt(problem, "force", np.array([there.total]))
     sign = -1.0 if state.force < 0 else 1.0
     if problem.at_limit(np.array([there.total]))[0]:
         expected = "a force below f P, where the derivative is finite"
@@ -215,14 +237,9 @@ class _Bent:
         n, asperities, R = len(scene), scene.asperities, scene.sphere_radius
         heights = checks.array("heights", direction.heights, length=n)
         tips = checks.array("tip_radii", direction.tip_radii, length=n)
-        moved = np.asarray(direction.positions, dtype=np.float64)
-        if moved.shape not in ((), (n, 2)) or not np.isfinite(moved).all():
-            expected = f"({n}, 2) finite numbers: x and y of each asperity"
-            raise InputError("positions", found=f"shape {moved.shape}", expected=expected)
-        moved = np.broadcast_to(moved, (n, 2))
-        sphere = checks.finite("sphere_radius", direction.sphere_radius)
-        modulus = checks.finite("contact_modulus", direction.contact_modulus)
-        modulus /= scene.material.contact_modulus
+        moved = _moved(direction.positions, n)
+        sphere = direction.sphere_radius
+        modulus = direction.contact_modulus / scene.material.contact_modulus
         points, rho = asperities.positions, asperities.tip_radii
         far = far_radii(contact, np.arange(n))
         closest = scene.geometry == "closest"
@@ -244,3 +261,19 @@ class _Bent:
             for k in (0, 1):
                 change -= influence.slopes(points[:, k] * loads)[:, k]
         return np.asarray(change)
+
+
+def _moved(positions: ArrayLike, n: int) -> Array:
+    """(n, 2) checked; one number stands for all."""
+    expected = f"({n}, 2) finite numbers: x and y of each asperity"
+    try:
+        if np.asarray(positions).dtype.kind not in "biuf":
+            raise TypeError("no real numbers")
+        moved = np.asarray(positions, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError("positions", found=repr(positions)[:60], expected=expected) from error
+    if moved.shape not in ((), (n, 2)):
+        raise InputError("positions", found=f"shape {moved.shape}", expected=expected)
+    if not (np.abs(moved) <= checks.LARGEST).all():  # nan is not
+        raise InputError("positions", found="numbers that are not finite", expected=expected)
+    return np.broadcast_to(moved, (n, 2))

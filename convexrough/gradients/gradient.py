@@ -19,11 +19,14 @@ from convexrough.contact import Contact
 from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.gradients.adjoint import Holding, Pulled, through_pressing
-from convexrough.gradients.doubts import height_errors
+from convexrough.gradients.bounds import FEW
+from convexrough.gradients.doubts import LossDoubt, height_errors
 from convexrough.gradients.origin import Origin, far_radii, pressed
 from convexrough.gradients.refined import refined_errors
 from convexrough.gradients.system import TOLERANCE
 from convexrough.record import Along, Table
+from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.shearing.cycle import cycle
 from convexrough.sphere.smooth import smooth
 
 #: What a derivative may be by, one number or one for each asperity, but for positions.
@@ -40,7 +43,9 @@ class Gradient(Table, Drawn):
     Units are those of the number over those of the parameter. Arrays are (n,), in the scene's
     order; screened asperities, and open ones unless their gap is asked for, have 0 everywhere. Each
     derivative is at fixed values of the other parameters named here: shear forces are held, not
-    their fractions of f P.
+    their fractions of f P, nor a displacement by which a state or cycle was prescribed. At a held
+    displacement X a loss W changes by dW|X = dW|Q - (W_Q / X_Q) dX|Q, with X_Q the derivative by
+    the force of the state at the amplitude of the cycle, and W_Q that by `maximum`, twice.
 
     value           : the number itself
     holding         : "load" or "approach": which of the two is held
@@ -105,7 +110,10 @@ class Gradient(Table, Drawn):
         if origin.doubts is not None and not origin.mixed:
             finer = refined_errors(self.contact, origin.doubts, origin.pressing, origin.total)
             errors = np.minimum(errors, finer)
-        return frozen(errors / problem.units.length)
+        off = among_zeros(
+            origin.rounding + np.zeros(len(origin.places)), origin.places, len(errors)
+        )
+        return frozen(errors / problem.units.length + off)
 
     @cached_property
     def normalised(self) -> Gradient:
@@ -129,16 +137,30 @@ class Gradient(Table, Drawn):
             "friction": -2.0 * value / scene.friction,
             "load": by_load,
         }
-        found: dict[str, Any] = {"value": value, "origin": self.origin.combined(1.0 / W0)}
         following = total_load(contact) if self.holding == "approach" else None
-        if following is not None:
-            found["origin"] = self.origin.combined(1.0 / W0, by_load, following.origin)
+        factor, other = (0.0, None) if following is None else (by_load, following.origin)
+        doubt = self._doubt_about_smooth(lossy=following is not None)
+        found: dict[str, Any] = {"value": value}
+        found["origin"] = self.origin.combined(1.0 / W0, doubt, factor, other)
         for name in PARAMETERS:
             if (slope := getattr(self, name)) is not None:
                 found[name] = slope / W0 + explicit.get(name, 0.0)
                 if following is not None and (follows := getattr(following, name)) is not None:
                     found[name] = found[name] + by_load * follows
         return replace(self, **found)
+
+    def _doubt_about_smooth(self, *, lossy: bool) -> float:
+        """Bound on what 1 / W0, or W / (W0 P), is off, over it: W0 goes with P^(5/3)."""
+        contact, rounding = self.contact, FEW * ROUNDOFF
+        if contact.prescribed_load is None:
+            off = float(contact.certificate.load_errors.sum())
+        else:
+            off = abs(contact.load - contact.prescribed_load)
+        carried = (8.0 if lossy else 5.0) / 3.0 * off / contact.load
+        if lossy and self.value and self.origin.doubts:
+            half = [each.force for each in self.origin.doubts if isinstance(each, LossDoubt)]
+            carried += cycle(contact, maximum=float(half[0])).energy_error / self.value
+        return (1 + SAFETY) * (carried + rounding)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         """But for what it was made from, and for parameters that it has not."""

@@ -37,15 +37,22 @@ class GrossDoubt:
         """None: they are bounded to twice the digits only."""
 
 
-def last_to_slide(problem: TangentialProblem, holding: Holding, what: str, found: object) -> int:
-    """Its index among the loaded asperities; InputError where nothing has a derivative."""
+def slides_last(problem: TangentialProblem) -> tuple[int, bool]:
+    """Its index among the loaded asperities, and whether it slides last alone."""
     levels = problem.ceilings + problem.couple(problem.loads)
     last = int(np.argmax(levels))
+    return last, np.count_nonzero(levels >= levels[last] * (1.0 - TOGETHER)) == 1
+
+
+def last_to_slide(problem: TangentialProblem, holding: Holding, what: str, found: object) -> int:
+    """Its index among the loaded asperities; InputError where nothing has a derivative."""
+    last, alone = slides_last(problem)
     if holding == "approach":
         expected = "a force below f P: with the approach held f P may fall below the force"
         raise InputError(what, found=f"{found}: gross sliding", expected=expected)
-    if np.count_nonzero(levels >= levels[last] * (1.0 - TOGETHER)) > 1:
-        expected = "a force below f P: several asperities slide last, together"
+    if not alone:
+        expected = "a force below f P: there several asperities slide last, together, and which "
+        expected += "of them does depends on the direction of a change"
         raise InputError(what, found=f"{found}: gross sliding", expected=expected)
     return last
 

@@ -23,7 +23,7 @@ from convexrough.gradients.adjoint import (
 from convexrough.gradients.doubts import Doubt, LossDoubt, StateDoubt
 from convexrough.gradients.gradient import Gradient, to_scene
 from convexrough.gradients.gross import GrossDoubt, excess_in_gross_sliding, last_to_slide
-from convexrough.gradients.origin import Origin, held, pressed
+from convexrough.gradients.origin import Origin, felt, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.shearing.cycle import Cycle
 from convexrough.shearing.first_loading import FirstLoading
@@ -40,6 +40,7 @@ def cycle_gradient(
     holding, problem = held(contact, holding), pressed(contact)
     loading = FirstLoading(contact)
     states, _ = loading.states(np.array([cycle.force_amplitude / problem.force_unit]))
+    felt(problem, "maximum", states.totals)
     state = Friction.among(problem, states, 0)
     doubts: list[Doubt] | None = None
     if limit := bool(problem.at_limit(states.totals)[0]):
@@ -93,9 +94,9 @@ def history_gradient(
     if energy is None and displacements is None:
         expected = "at least one: weights on what is to be differentiated"
         raise InputError("energy, displacements", found="none", expected=expected)
-    on_energy = checks.array("energy", 0.0 if energy is None else energy, length=m)
+    on_energy = checks.array("energy", 0.0 if energy is None else energy, length=m, one="force")
     far = 0.0 if displacements is None else displacements
-    on_moved = checks.array("displacements", far, length=m)
+    on_moved = checks.array("displacements", far, length=m, one="force")
 
     asked = _look_ups(history.applied / problem.force_unit, on_energy, on_moved)
     loading = FirstLoading(contact)
@@ -103,6 +104,7 @@ def history_gradient(
     if problem.at_limit(states.totals).any():
         expected = "forces below f P: where all slide, a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
+    felt(problem, "forces", states.totals)
     lost, rises = (np.zeros(len(states.totals)) for _ in range(2))
     for each, i in zip(asked, back, strict=True):
         lost[i] += each.lost * loading.energy_unit

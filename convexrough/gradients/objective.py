@@ -43,7 +43,8 @@ class Objective(Record):
     load or approach : what is prescribed, and held;  force : [force] half the range of the cycle
     influence : how to couple, as in `press`
 
-    `objective(x)` is (value, gradient): what `scipy.optimize.minimize(..., jac=True)` calls.
+    `objective(x)` is (value, gradient): what `scipy.optimize.minimize(..., jac=True)` calls. Divide
+    by the number you start from: the tolerances of scipy are absolute, and a loss may be 1e-13.
     `to_jax`, `to_torch` and `to_autograd` give functions of those packages.
 
     >>> loss = cr.Objective(scene=scene, of="loss", by=["heights"], load=3.6e-7, force=9e-8)
@@ -69,13 +70,37 @@ class Objective(Record):
         needed = NUMBERS[self.of]
         if getattr(self, needed) is None:
             raise InputError(needed, found="none", expected=f"a number, for the {self.of}")
-        known = (*EACH, *WHOLE, *ELASTIC, *PRESCRIBED)
-        by = (self.by,) if isinstance(self.by, str) else tuple(self.by)
+        for name in PRESCRIBED:
+            if (given := getattr(self, name)) is not None:
+                object.__setattr__(self, name, checks.finite(name, given))
+        by = (self.by,) if isinstance(self.by, str) else self._listed()
         object.__setattr__(self, "by", by)
+        able = self._able()
         for name in by:
-            if name not in known or (name in PRESCRIBED and getattr(self, name) is None):
-                able = [each for each in known if getattr(self, each, 0.0) is not None]
-                raise InputError("by", found=repr(name), expected=f"some of: {', '.join(able)}")
+            if name not in able:
+                expected = f"some of: {', '.join(able)}"
+                raise InputError("by", found=repr(name), expected=expected)
+
+    def _able(self) -> list[str]:
+        """What the number depends on; of friction only with a force, as contacts know none."""
+        known = [*EACH, *WHOLE, *ELASTIC, *PRESCRIBED]
+        if NUMBERS[self.of] != "force":
+            known.remove("force")
+            if self.scene.friction is None:
+                known.remove("friction")
+        return [name for name in known if getattr(self, name, 0.0) is not None]
+
+    def _listed(self) -> tuple[str, ...]:
+        """What it is by, each once."""
+        try:
+            by = tuple(self.by)
+            once = 0 < len(by) == len(set(by))
+        except TypeError:
+            once = False
+        if not once:
+            expected = "a list of names of parameters, each once"
+            raise InputError("by", found=repr(self.by)[:60], expected=expected)
+        return by
 
     @property
     def start(self) -> Array:

@@ -20,6 +20,9 @@ from convexrough.influence.choice import couple
 from convexrough.record import Record
 from convexrough.shearing.problem import TangentialProblem
 
+#: Least force but 0 over f P: squares of its third power, and of their rounding, are in float64.
+SLIGHTEST = 1e-40
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Origin(Record):
@@ -31,6 +34,7 @@ class Origin(Record):
     pressing : of the pressed state, with sum lambda = total where the load is held
     doubts   : about the weights on loads that it was solved for; None where nothing is known
     mixed    : of more than one J, each times a number
+    rounding : (n,) bounds on what those numbers being off does to dJ/dd
     """
 
     contact: Contact
@@ -44,6 +48,7 @@ class Origin(Record):
     total: float | None
     doubts: tuple[Doubt, ...] | None
     mixed: bool = False
+    rounding: Array | float = 0.0
 
     @classmethod
     def of(
@@ -75,13 +80,20 @@ class Origin(Record):
             doubts=None if doubts is None else tuple(doubts),
         )
 
-    def combined(self, own: float, factor: float = 0.0, other: Origin | None = None) -> Origin:
-        """Of J times a number, and another J, whose weights are exact, times another."""
+    def combined(
+        self, own: float, doubt: float, factor: float = 0.0, other: Origin | None = None
+    ) -> Origin:
+        """Of J times a number, and another J, whose weights are exact, times another.
+
+        doubt : bound on what either number is off, over that number
+        """
         one, two = self.pressing, self.pressing if other is None else other.pressing
         doubts = self.doubts
         if doubts is not None:
             doubts = tuple(replace(each, factor=own * each.factor) for each in doubts)
         far = self if other is None else other  # with a factor of 0
+        sizes = np.abs(own * self.offsets) + np.abs(factor * far.offsets)
+        off = np.multiply(doubt, sizes, where=sizes > 0, out=np.zeros(len(sizes)))
         return replace(
             self,
             offsets=frozen(own * self.offsets + factor * far.offsets),
@@ -95,7 +107,8 @@ class Origin(Record):
                 np.abs(own * one.defect) + np.abs(factor * two.defect),
             ),
             doubts=doubts,
-            mixed=True,
+            mixed=self.mixed or other is not None,
+            rounding=frozen(abs(own) * self.rounding + off),
         )
 
     @cached_property
@@ -140,6 +153,17 @@ def pressed(contact: Contact) -> TangentialProblem:
         expected = "a contact that carries some load: without, nothing has a derivative"
         raise InputError("contact", found="no load", expected=expected)
     return TangentialProblem.pressed(contact)
+
+
+def felt(problem: TangentialProblem, what: str, totals: Array) -> None:
+    """InputError for forces, as T in own units, that are so small that bounds would vanish."""
+    parts = totals[totals > 0] / problem.limit
+    if (parts < SLIGHTEST).any():
+        found, expected = (
+            f"{parts.min():.3g} f P",
+            f"0, or at least {SLIGHTEST:g} f P, in gradients",
+        )
+        raise InputError(what, found=found, expected=expected)
 
 
 def far_radii(contact: Contact, places: Indices) -> Array:

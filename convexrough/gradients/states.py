@@ -24,8 +24,13 @@ from convexrough.gradients.adjoint import (
 )
 from convexrough.gradients.doubts import Doubt, GivenDoubt, StateDoubt
 from convexrough.gradients.gradient import Gradient, to_scene
-from convexrough.gradients.gross import GrossDoubt, last_to_slide, through_gross_sliding
-from convexrough.gradients.origin import Origin, held, pressed
+from convexrough.gradients.gross import (
+    GrossDoubt,
+    last_to_slide,
+    slides_last,
+    through_gross_sliding,
+)
+from convexrough.gradients.origin import Origin, felt, held, pressed
 from convexrough.gradients.system import TOLERANCE, System
 from convexrough.influence.choice import couple
 from convexrough.shearing.state import ShearState, indices, onset_of_sliding
@@ -120,6 +125,7 @@ def state_gradient(
     moved, rise = sign * travel * on_slips[touching], sign * travel * X
 
     there = Friction.of_state(problem, state)
+    felt(problem, "force", np.array([there.total]))
     doubts: list[Doubt] | None = None
     if limit := bool(problem.at_limit(np.array([there.total]))[0]):
         last = last_to_slide(problem, holding, "force", state.force)
@@ -188,7 +194,10 @@ def onset_gradient(
     total = problem.limited(np.array([onset / problem.force_unit]))
     only = among_zeros(np.ones(1), np.array([place]), len(problem))
     if problem.at_limit(total)[0]:  # all slide at f P, the last one whatever the heights are
-        last_to_slide(problem, "load", "asperity", asperity)
+        if not slides_last(problem)[1]:
+            expected = "one that slides before others do, or last and alone"
+            found = f"{asperity}, which slides last, together with others"
+            raise InputError("asperity", found=found, expected=expected)
         pulled = Pulled(np.full(len(problem), problem.force_unit), 0.0 * only, [])
     else:
         state = Friction.among(problem, problem.solve(total), 0)

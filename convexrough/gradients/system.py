@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import FACTORISED, correct
 from convexrough.errors import SolverError
@@ -22,6 +23,9 @@ from convexrough.shearing.energy import TangentialEnergy
 #: What is left of the defect of a system, in the norm of c, unless less is asked for. Matrices
 #: leave rounding only.
 TOLERANCE = 1e-9
+
+#: What may be asked for: more is rounding, and less is no answer.
+LEAST, MOST = 1e-16, 1e-2
 
 #: What one call of conjugate gradients is asked for at most: single precision leaves 2e-6.
 EACH = 1e-5
@@ -50,7 +54,8 @@ class System:
     def __init__(
         self, energy: TangentialEnergy, slopes: Array, tolerance: float = TOLERANCE
     ) -> None:
-        self.energy, self.slopes, self.tolerance = energy, slopes, tolerance
+        self.energy, self.slopes = energy, slopes
+        self.tolerance = checks.between("tolerance", tolerance, LEAST, MOST)
 
     def solve(self, right: Array, total: float | None = None) -> Solution:
         """By refinement against the true defect, until it is small or rounding.

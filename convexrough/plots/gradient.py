@@ -11,6 +11,7 @@ from convexrough.gradients.gradient import Gradient
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     CROWDED,
+    LABEL,
     SINGLE,
     SMOOTH,
     TICK,
@@ -68,4 +69,4 @@ def draw_gradient(axes: Axes, gradient: Gradient, scale: Scale, of: str = "J") -
     axes.set_title(f"{gradient.holding} held", fontsize=TICK, loc="left")
     bar = axes.figure.colorbar(colours, ax=axes, aspect=28, pad=0.02)
     bar.ax.tick_params(labelsize=TICK)
-    bar.ax.set_title(f"$D_0\\,\\partial {of}/\\partial z{per}$", fontsize=TICK)
+    bar.set_label(f"$D_0\\,\\partial {of}/\\partial z{per}$", fontsize=LABEL)

@@ -96,7 +96,8 @@ def draw_summits(axes: Axes, positions: Array) -> None:
 def draw_provability(axes: Axes, curve: Provability) -> None:
     """How many summits touch, marked by what is proved of them."""
     axes.plot(_place(curve.prune), curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
-    _draw_by_scope(axes, curve, curve.contacts.astype(np.float64), "contacts")
+    # 0 has no place on an axis of logarithms.
+    _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")
     axes.set_yscale("log")
     _name_prunings(axes, curve)
     label(axes, "pruning  [% of $Sz$]", "number")

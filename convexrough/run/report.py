@@ -186,6 +186,8 @@ def warnings(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
             found.append(f"not proved: the order of indentations, on which [{stage}] rests")
     if not summary.get("shakedown", {}).get("proved", True):
         found.append("not proved: any bounds on the limit of [shakedown]")
+    if "none_because" in (slopes := summary.get("gradient", {})):
+        found.append(f"no gradient of the {slopes['of']}: there is none for this scene")
     for stage in ("shear", "cycle"):
         doubtful = sum(1 for row in summary.get(stage, ()) if row["undecided"])
         if doubtful:

@@ -18,7 +18,7 @@ from convexrough.errors import FileError
 from convexrough.progress import Announce
 from convexrough.run.page import slider_page
 from convexrough.run.scene_file import SceneFile, UnitNames, digest
-from convexrough.run.sensitivity import NUMBERS
+from convexrough.run.sensitivity import NUMBERS, Differentiated
 from convexrough.run.stage_tables import stage_tables
 from convexrough.run.stages import Findings
 from convexrough.run.summary import Summary, to_json
@@ -185,7 +185,7 @@ def _draw(found: Findings, units: UnitNames) -> dict[str, Figure]:
         )
     if found.history is not None:
         figures |= plots.history_figures(found.history.history, **names)
-    if found.gradient is not None:
+    if isinstance(found.gradient, Differentiated):
         asked, gradient = found.gradient
         figures |= plots.gradient_figures(gradient, of=NUMBERS[asked.of], **names)
     varied = found.varying

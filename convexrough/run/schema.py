@@ -114,11 +114,15 @@ class Gradient(Table):
     by: By = Field(list(BY))
     holding: Control | None = None
 
+    @property
+    def sheared(self) -> bool:
+        """Whether it is asked of a shear force."""
+        return self.of in ("loss", "displacement")
+
     def mistakes_within(self) -> Iterator[str]:
-        sheared = self.of in ("loss", "displacement")
-        if sheared and self.fraction is None:
+        if self.sheared and self.fraction is None:
             yield f"fraction: missing, needed with the {self.of}"
-        if not sheared and self.fraction is not None:
+        if not self.sheared and self.fraction is not None:
             yield f"fraction: found {self.fraction}, expected none with the {self.of}"
 
 
@@ -196,7 +200,7 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
         mistakes.append(f"[friction]: missing table, needed with [{given[0]}]")
     mistakes += _unbounded(tables)
     asked = tables.get("gradient")
-    if "friction" not in contents and asked is not None and asked.fraction is not None:
+    if "friction" not in contents and asked is not None and asked.sheared:
         mistakes.append(f"[friction]: missing table, needed with the {asked.of} of [gradient]")
     return (None if mistakes else Document(**tables)), mistakes
 

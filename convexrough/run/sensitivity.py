@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.contact import Contact
+from convexrough.errors import InputError, SolverError
 from convexrough.gradients.adjoint import Holding
 from convexrough.gradients.gradient import Gradient
 from convexrough.shearing.cycle import cycle
@@ -18,8 +20,9 @@ from convexrough.shearing.state import shear
 #: What a scene file may ask the gradient of, and its letter.
 NUMBERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
 
-#: What it may ask it by, asperity by asperity.
-BY = ("heights", "tip_radii", "positions")
+#: What it may ask it by, asperity by asperity, and the word for one of them.
+EACH = {"heights": "height", "tip_radii": "tip_radius", "positions": "position"}
+BY = tuple(EACH)
 
 
 class Sensitivity(NamedTuple):
@@ -35,18 +38,32 @@ class Sensitivity(NamedTuple):
     by: tuple[str, ...]
     holding: Literal["load", "approach"] | None
 
-    def compute(self, contact: Contact) -> Differentiated:
-        """The gradient, of a contact that carries a load."""
+    def compute(self, contact: Contact) -> Differentiated | Missing:
+        """The gradient, or why there is none."""
+        try:
+            return Differentiated(self, self._gradient(contact))
+        except InputError as error:
+            return Missing(self, str(self._in_the_file(error)))
+        except SolverError as error:
+            return Missing(self, str(error))
+
+    def _gradient(self, contact: Contact) -> Gradient:
         holding: Holding | None = self.holding
         if self.of == "approach":
-            return Differentiated(self, contact.gradient(approach=1.0, holding=holding))
+            return contact.gradient(approach=1.0, holding=holding)
         if self.of == "load":
-            return Differentiated(self, contact.gradient(load=1.0, holding=holding))
+            return contact.gradient(load=1.0, holding=holding)
         force = self.fraction * checks.friction(contact.scene.friction) * contact.load
         if self.of == "displacement":
-            state = shear(contact, force=force)
-            return Differentiated(self, state.gradient(displacement=1.0, holding=holding))
-        return Differentiated(self, cycle(contact, maximum=force).gradient(holding=holding))
+            return shear(contact, force=force).gradient(displacement=1.0, holding=holding)
+        return cycle(contact, maximum=force).gradient(holding=holding)
+
+    def _in_the_file(self, error: InputError) -> InputError:
+        """About a force: by the key of the file that it comes from."""
+        if error.what not in ("force", "maximum"):
+            return error
+        found = f"{self.fraction:g}, a force of {error.found}"
+        return InputError("[gradient] fraction", found=found, expected=error.expected)
 
 
 class Differentiated(NamedTuple):
@@ -54,6 +71,13 @@ class Differentiated(NamedTuple):
 
     asked: Sensitivity
     gradient: Gradient
+
+
+class Missing(NamedTuple):
+    """What was asked for, and why it has no derivative."""
+
+    asked: Sensitivity
+    because: str
 
 
 def gradient_columns(found: Differentiated) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -69,13 +93,21 @@ def gradient_columns(found: Differentiated) -> Iterator[tuple[str, NDArray[Any]]
         yield from zip(("by_x", "by_y"), gradient.positions.T, strict=True)
 
 
-def gradient_summary(found: Differentiated) -> dict[str, Any]:
-    """Numbers of the whole, and which asperity matters most."""
+def gradient_summary(found: Differentiated | Missing) -> dict[str, Any]:
+    """Numbers of the whole, and which asperity matters most; or why there are none."""
+    if isinstance(found, Missing):
+        return {"of": found.asked.of, "none_because": found.because}
     asked, gradient = found
     most = int(np.argmax(np.abs(gradient.heights)))
     shared = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load", "approach")
     names = (*shared, "maximum", "minimum", "force")
     by = {name: it for name in names if (it := getattr(gradient, name)) is not None}
+    largest = {}
+    for name in asked.by:
+        slopes = getattr(gradient, name)
+        sizes = np.linalg.norm(slopes, axis=1) if slopes.ndim == 2 else np.abs(slopes)
+        at = int(np.argmax(sizes))
+        largest[name] = {"slope": slopes[at].tolist(), "asperity": at}
     return {
         "of": asked.of,
         "holding": gradient.holding,
@@ -83,6 +115,7 @@ def gradient_summary(found: Differentiated) -> dict[str, Any]:
         "by": by,
         "largest_by_height": float(gradient.heights[most]),
         "largest_at": most,
+        "largest": largest,
         "height_error": float(gradient.height_errors.max()),
         "balance_defect": gradient.balance_defect,
     } | ({"fraction": asked.fraction} if asked.of in ("loss", "displacement") else {})
@@ -90,9 +123,25 @@ def gradient_summary(found: Differentiated) -> dict[str, Any]:
 
 def gradient_lines(summary: dict[str, Any]) -> list[str]:
     """What people are told."""
-    under = f" at Q/(fP) = {summary['fraction']:g}" if "fraction" in summary else ""
-    lines = ["", f"gradient of the {summary['of']}{under}, {summary['holding']} held"]
-    lines += [f"{'  value':<18}{summary['value']:.10g}"]
-    lines += [f"{'  by ' + name:<18}{slope:.8g}" for name, slope in summary["by"].items()]
-    largest = f"{summary['largest_by_height']:.8g}  (asperity {summary['largest_at']})"
-    return [*lines, f"{'  by height':<18}up to {largest}"]
+    if "none_because" in summary:
+        return ["", f"gradient of the {summary['of']}: none, {summary['none_because']}"]
+    held, under = f"{summary['holding']} held", ""
+    if "fraction" in summary:
+        under, held = f" at Q/(fP) = {summary['fraction']:g}", f"{held}, and so is the force"
+    rows = [("value", f"{summary['value'] + 0.0:.10g}")]  # no -0
+    rows += [(f"by {name}", f"{slope + 0.0:.8g}") for name, slope in summary["by"].items()]
+    for name, word in EACH.items():
+        if (most := summary["largest"].get(name)) is None:
+            continue
+        known = f", {_known(summary['height_error'])}" if name == "heights" else ""
+        slopes = np.ravel(most["slope"]) + 0.0
+        text = ", ".join(f"{slope:.8g}" for slope in slopes)
+        text = f"({text})" if len(slopes) > 1 else text
+        rows.append((f"by {word}", f"up to {text}  (asperity {most['asperity']}{known})"))
+    lines = [f"  {name:<18}{text}" for name, text in rows]
+    return ["", f"gradient of the {summary['of']}{under}, {held}", *lines]
+
+
+def _known(error: float) -> str:
+    """Two digits of a proved bound, never below it."""
+    return f"all known to {1.05 * error:.2g}" if math.isfinite(error) else "no bound"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.contact import Contact
-from convexrough.run.sensitivity import gradient_columns
+from convexrough.run.sensitivity import Differentiated, gradient_columns
 from convexrough.run.stages import Cycled, Findings, Followed, Sheared
 from convexrough.run.summary import SHEAR, counts
 from convexrough.run.tables import ASPERITY_COLUMNS
@@ -29,7 +29,7 @@ def stage_tables(found: Findings) -> Iterator[tuple[str, Columns]]:
     if found.history is not None:
         yield "history", _history_columns(found.history)
     yield from varied_tables(found.varying, found.contact)
-    if found.gradient is not None:
+    if isinstance(found.gradient, Differentiated):
         yield "gradient", dict(gradient_columns(found.gradient))
 
 

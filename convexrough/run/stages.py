@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.progress import Announce
-from convexrough.run.sensitivity import Differentiated, Sensitivity
+from convexrough.run.sensitivity import Differentiated, Missing, Sensitivity
 from convexrough.run.varying import Varied, Varying
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.shearing.cycle import Cycle, cycles, loops
@@ -84,7 +84,7 @@ class Findings:
     cycles: tuple[Cycled, ...] = ()
     history: Followed | None = None
     varying: Varied = field(default_factory=Varied)
-    gradient: Differentiated | None = None
+    gradient: Differentiated | Missing | None = None
 
 
 def compute(contact: Contact, stages: Stages, announce: Announce | None = None) -> Findings:

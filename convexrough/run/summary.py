@@ -94,7 +94,10 @@ def comparison_summary(comparison: Comparison) -> Summary:
 
 
 def proved(summary: Summary) -> bool:
-    """Every asperity has a proved word, in every stage, and so is the order that words rest on."""
+    """Every asperity has a proved word, in every stage, and so is the order that words rest on.
+
+    A gradient that was asked for is there.
+    """
     stages = [summary["normal"], *summary.get("shear", ()), *summary.get("cycle", ())]
     stages += [summary[name] for name in ("path", "steady") if name in summary]
     scope = summary["normal"]["certificate"]["scope"]
@@ -104,6 +107,8 @@ def proved(summary: Summary) -> bool:
         rests.append(limit["order"] or "proved")
         if not limit["proved"]:
             return False
+    if "none_because" in summary.get("gradient", {}):
+        return False
     if not all(order.startswith("proved") for order in rests):
         return False
     return scope != "none" and not any(stage["undecided"] for stage in stages)

@@ -176,10 +176,12 @@ def _describe_curve(curve: Provability, unit: str) -> list[str]:
             f"{100 * row['prune']:.3g} %", f"{row['height']:.4g}", f"{row['summits']:,}",
             f"{row['contacts']:,}", f"{row['undecided']:,}", row["scope"],
             f"{row['crowding']:.3g}", f"{row['model_error']:.2g}",
-            "yes" if row["trusted"] else "no",
+            ("yes" if row["trusted"] else "no") if row["contacts"] else "-",
         ])  # fmt: skip
     first = curve.trusted_from
     said = "at no pruning" if np.isnan(first) else f"from a pruning of {100 * first:.3g} % on"
+    if not curve.contacts.any():
+        said = "nothing, as nothing touches"
     return [*aligned(table), "", f"{'to be trusted':<18}{said}"]
 
 
@@ -229,6 +231,11 @@ def doubts_of_surface(scanned: Scanned) -> Iterator[str]:
     if not first <= chosen:
         more = "no pruning is strong enough" if np.isnan(first) else f"--prune {first:g} is"
         yield f"at a pruning of {chosen:g} the asperity model is not to be trusted; {more}"
+    if contact is not None and not contact.loads.any():
+        yield (
+            f"at a pruning of {chosen:g} nothing touches: trust is that of a contact, so press "
+            "deeper, or with a load"
+        )
     if contact is None:
         yield f"at a pruning of {chosen:g} no solution was found"
     elif contact.loads.any():

@@ -78,7 +78,8 @@ Force = Annotated[
 ]
 Number = Annotated[str, expected(f"one of: {', '.join(NUMBERS)}", NUMBERS.__contains__)]
 By = Annotated[
-    list[str], expected(f"a list of some of: {', '.join(BY)}", lambda it: set(it) <= {*BY})
+    list[str],
+    expected(f"a list of some of: {', '.join(BY)}", lambda it: bool(it) and {*it} <= {*BY}),
 ]
 Control = Annotated[Literal["load", "approach"], expected('"load" or "approach"')]
 

@@ -121,7 +121,7 @@ def _of_scenes(
     by_load = load is not None
     name, given = ("load", load) if by_load else ("approach", approach)
     assert given is not None  # exactly_one
-    controls = checks.array(name, given, length=len(scenes))
+    controls = checks.array(name, given, length=len(scenes), one="scene")
     names = tuple(measure or ())
     tables = {"cycle": stages.cycle, "shear": stages.shear, "friction": True}
     asked = {key for key, value in tables.items() if value}

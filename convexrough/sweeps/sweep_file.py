@@ -18,6 +18,9 @@ from convexrough.sweeps.measures import MEASURES, Stages, columns
 from convexrough.sweeps.sources import Source, Tables
 from convexrough.version import __version__
 
+#: Tables of a scene file that no measure of a sweep is from.
+LEFT_OUT = ("history", "path", "steady", "shakedown", "gradient")
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -74,7 +77,11 @@ def plan_of(
         draws=tuple(Draw(key, *law) for key, law in keys.laws()),
         seeds=keys.all_seeds(),
     )
-    mistakes = [*_mistakes_of_values(grid), *_mistakes_of_seeds(grid)]
+    mistakes = [
+        *_mistakes_of_tables(tables),
+        *_mistakes_of_values(grid),
+        *_mistakes_of_seeds(grid),
+    ]
     if mistakes:
         raise SceneFileError(str(path), mistakes)
     stages = _stages(tables)
@@ -94,6 +101,13 @@ def identified(**contents: Any) -> str:
     """The SHA-256 of all that the numbers of a sweep depend on; this package is part of it."""
     text = json.dumps({"version": __version__, **contents}, sort_keys=True, default=repr)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _mistakes_of_tables(tables: Mapping[str, Any]) -> Iterator[str]:
+    """Nothing that a file asks for is left out in silence."""
+    for name in LEFT_OUT:
+        if name in tables:
+            yield f"[{name}]: not computed in a sweep; `convexrough run` computes it of one scene"
 
 
 def _mistakes_of_values(grid: Grid) -> Iterator[str]:

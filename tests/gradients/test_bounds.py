@@ -50,6 +50,16 @@ def displacement(contact: cr.Contact, holding: str, force: float) -> Judge:
     return Judge(given(contact, holding, [force]), value)
 
 
+def normalised(contact: cr.Contact, holding: str, force: float) -> Judge:
+    solved = sheared(contact, holding, force)
+
+    def value(setup: Setup, near: Any) -> tuple[Any, Any]:
+        state = solved(setup, near)
+        return state.loss / state.oracle.smooth_loss, state
+
+    return Judge(given(contact, holding, [force]), value)
+
+
 def approach(contact: cr.Contact, holding: str) -> Judge:
     def value(setup: Setup, near: Any) -> tuple[Any, Any]:
         oracle = press(contact, setup, near)
@@ -105,6 +115,25 @@ def test_bounds_of_losses_are_near_the_truth(name: str, fraction: float) -> None
     true, bounds = true_errors(loss(contact, "load", force), gradient, every=9)
     assert (true <= bounds).all()
     assert bounds.max() <= 100 * true.max()
+
+
+@pytest.mark.parametrize("name", ["paper", "rough, closest"])
+@pytest.mark.parametrize("fraction", [1e-3, 0.5, 0.99])
+def test_bounds_of_normalised_losses(name: str, fraction: float) -> None:
+    """Where the load is held they are as near as those of the loss itself: W0 is a factor."""
+    contact = pressed(name, "load")
+    force = fraction * FRICTION * contact.load
+    gradient = cr.cycle(contact, maximum=force).gradient()
+    found = gradient.normalised
+    true, bounds = true_errors(normalised(contact, "load", force), found, every=9)
+    assert (true <= bounds).all()
+    ratio = found.value / gradient.value
+    assert found.height_errors.max() <= 10 * ratio * gradient.height_errors.max()
+    assert (found.height_errors > ratio * gradient.height_errors).any()  # W0 is rounded
+    contact = pressed(name, "approach")
+    found = cr.cycle(contact, maximum=force).gradient().normalised
+    true, bounds = true_errors(normalised(contact, "approach", force), found, every=9)
+    assert (true <= bounds).all()
 
 
 def test_slips_backward_sliding_and_uneven_cycles_too() -> None:
@@ -285,3 +314,29 @@ def test_histories_have_bounds_too() -> None:
     assert gradient.height_errors.max() < 1e-13 * np.abs(gradient.heights).max()
     cycle = cr.cycle(contact, maximum=0.2 * contact.load).gradient()
     assert cycle.normalised.height_errors.max() < 1e-7 * np.abs(cycle.normalised.heights).max()
+
+
+def test_the_smallest_forces() -> None:
+    """Losses go with the third power of the force there: so do derivatives, and what bounds them.
+
+    Below, squares vanish and bounds with them: that is refused.
+    """
+    contact = cr.press(with_friction(NAMED["rough"][0]), load=3.6e-7)
+    limit, power = FRICTION * contact.load, 2.0**-60
+    cycle = cr.cycle(contact, maximum=1e-20 * limit)
+    first, small = cycle.gradient(), cr.cycle(contact, maximum=1e-20 * power * limit).gradient()
+    np.testing.assert_allclose(small.heights, power**3 * first.heights, rtol=1e-13)
+    bounds = first.height_errors
+    np.testing.assert_allclose(small.height_errors / power**3, bounds, atol=0.1 * bounds.max())
+    slight = 1e-51 * limit
+    history = cr.history(contact, forces=[0.1 * limit, 0.0, slight])
+    state = cr.shear(contact, force=slight)
+    for ask in (
+        cr.cycle(contact, maximum=slight).gradient,
+        lambda: state.gradient(displacement=1.0),
+        lambda: state.change(cr.Direction(heights=1e-9)),
+        lambda: history.gradient(displacements=1.0),
+    ):
+        with pytest.raises(cr.InputError, match=r"e-5\d f P, expected 0, or at least 1e-40 f P"):
+            ask()
+    assert cr.cycle(contact, maximum=0.0).gradient().heights.max() == 0.0

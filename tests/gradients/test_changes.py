@@ -159,3 +159,30 @@ def test_the_oracle_is_at_the_state() -> None:
     with ctx.workdps(DIGITS):
         oracle = press(contact, Setup.of(contact, "load"), None)
         assert abs(float(oracle.approach) / contact.approach - 1) < 1e-14
+
+
+@pytest.mark.parametrize("name", ["sphere_radius", "friction", "load", "approach", "force"])
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "1e-9", None])
+def test_a_direction_is_of_numbers(name: str, value: Any) -> None:
+    if value is None and name in ("load", "approach"):
+        assert getattr(cr.Direction(), name) is None
+        return
+    with pytest.raises(cr.InputError, match=f"^{name}: found .*, expected a finite number"):
+        cr.Direction(**{name: value})
+
+
+def test_positions_are_finite_pairs() -> None:
+    contact = pressed("paper", "load")
+    n = len(contact.scene)
+    for positions in ("here", [["x", "y"]] * n, np.full((n, 2), np.nan), [[1.0], [1.0, 2.0]]):
+        with pytest.raises(cr.InputError, match=r"positions: found .*\(61, 2\) finite numbers"):
+            contact.change(cr.Direction(positions=positions))
+
+
+@pytest.mark.parametrize("name", ["friction", "force"])
+def test_a_contact_depends_on_no_friction(name: str) -> None:
+    contact = pressed("paper", "load")
+    along = cr.Direction(**{name: 1e-9})
+    with pytest.raises(cr.InputError, match=f"{name}: found 1e-09, expected 0: a contact depends"):
+        contact.change(along)
+    assert cr.shear(contact, force=1e-8).change(along).displacement != 0.0

@@ -259,6 +259,8 @@ def test_no_derivative_in_gross_sliding() -> None:
     together = cr.press(even, load=1e-8)
     with pytest.raises(cr.InputError, match="several asperities slide last, together"):
         cr.cycle(together, maximum=FRICTION * together.load).gradient()
+    with pytest.raises(cr.InputError, match="asperity: found 1, which slides last, together with"):
+        cr.onset_gradient(together, 1)
 
 
 def directly(contact: cr.Contact, fraction: float) -> tuple[Any, Any]:
@@ -303,3 +305,29 @@ def test_the_direct_form_is_not_that_of_backward_increments() -> None:
     )
     _, found = directly(contact, fraction)
     assert np.abs(found - gradient.heights).max() > 1e-4 * np.abs(gradient.heights).max()
+
+
+@pytest.mark.parametrize("holding", ["load", "approach"])
+def test_at_a_held_displacement(holding: Any) -> None:
+    """dW|X = dW|Q - (W_Q / X_Q) dX|Q, against cycles of that displacement amplitude."""
+    contact, moved = pressed("rough", holding), 6e-6
+    cycle = cr.cycle(contact, displacement=moved)
+    loss = cycle.gradient()
+    far = cr.shear(contact, force=cycle.force_amplitude).gradient(displacement=1.0)
+    assert loss.maximum is not None
+    assert far.force is not None
+    slopes = loss.heights - 2.0 * loss.maximum / far.force * far.heights
+    scene, v = contact.scene, np.random.default_rng(5).normal(size=len(contact.scene))
+
+    def lost(step: float) -> float:
+        heights = scene.asperities.heights + step * v
+        asperities = replace(scene.asperities, heights=heights)
+        there = replace(scene, asperities=asperities)
+        again = cr.press(there, load=contact.prescribed_load,
+                         approach=None if holding == "load" else contact.approach)  # fmt: skip
+        return cr.cycle(again, displacement=moved).energy
+
+    h = 3e-10
+    found = (lost(-2 * h) - 8 * lost(-h) + 8 * lost(h) - lost(2 * h)) / (12 * h)
+    assert found == pytest.approx(slopes @ v, rel=1e-7)
+    assert found != pytest.approx(loss.heights @ v, rel=1e-2)

@@ -151,6 +151,17 @@ def test_without_an_extra(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
         ({"by": ["height"]}, "by: found 'height', expected some of: heights"),
         ({"by": ["approach"]}, "by: found 'approach'"),
         ({"approach": 1e-5}, "found both, expected exactly one"),
+        (
+            {"by": ["heights", "heights"]},
+            "by: .* expected a list of names of parameters, each once",
+        ),
+        ({"by": []}, r"by: found \[\], expected a list"),
+        ({"by": None}, "by: found None, expected a list"),
+        ({"by": [["heights"]]}, "by: .* expected a list"),
+        ({"of": "approach", "by": ["force"]}, "by: found 'force', expected some of: heights"),
+        ({"load": "3.6e-7"}, "load: found '3.6e-7', expected a finite number"),
+        ({"force": "9e-8"}, "force: found '9e-8', expected a finite number"),
+        ({"load": None, "approach": float("nan")}, "approach: found nan, expected a finite"),
     ],
 )
 def test_mistakes(changes: dict[str, Any], said: str) -> None:
@@ -158,6 +169,12 @@ def test_mistakes(changes: dict[str, Any], said: str) -> None:
         of_loss(**changes)
     with pytest.raises(cr.InputError, match="found 1 numbers, expected 91: heights"):
         of_loss()([0.0])
+
+
+def test_a_contact_without_friction_knows_none() -> None:
+    scene = NAMED["rough"][0]
+    with pytest.raises(cr.InputError, match="by: found 'friction', expected some of: heights"):
+        cr.Objective(scene=scene, of="approach", by=["friction"], load=3.6e-7)
 
 
 def test_a_copy_with_other_numbers() -> None:

@@ -277,6 +277,13 @@ def test_what_has_no_derivative() -> None:
         cr.history(contact, forces=[FRICTION * contact.load]).gradient(energy=[1.0])
     with pytest.raises(cr.InputError, match="61 values, one per asperity"):
         contact.gradient(loads=[1.0, 2.0])
+    past = cr.history(contact, forces=[1e-8, -1e-8, 0.0])
+    with pytest.raises(cr.InputError, match=r"energy: .* 3 values, one per force"):
+        past.gradient(energy=[1.0, 2.0])
+    tolerances: list[Any] = [float("nan"), -1.0, 0.0, "x", None, 1.0]
+    for tolerance in tolerances:
+        with pytest.raises(cr.InputError, match=r"tolerance: found .*, expected a number"):
+            contact.gradient(load=1.0, tolerance=tolerance)
 
 
 def test_an_unstable_contact_has_no_derivative() -> None:

@@ -74,15 +74,18 @@ def test_it_runs_alone(document: Any, tmp_path: Path) -> None:
     said = alone(path)
     assert (said.returncode, said.stdout) == (2, "")
     assert said.stderr.startswith("unreadable: ")
-    assert alone(tmp_path / "none.json").returncode == 2
+    none = tmp_path / "none.json"
+    said = alone(none)
+    assert said.returncode == 2
+    assert said.stderr == f"unreadable: {none}: No such file or directory\n"
 
 
 @pytest.mark.parametrize(
     ("contents", "reason"),
     [
-        (b"", "JSONDecodeError"),
-        (b"\xff\xfe", "UnicodeDecodeError"),
-        (b"[" * 100_000, "RecursionError"),
+        (b"", "no JSON: Expecting value"),
+        (b"\xff\xfe", "no JSON: 'utf-8' codec"),
+        (b"[" * 100_000, "nested too deeply"),
         (b"[]", "expected a table"),
         (b'{"format": 1}', "the number 1: numbers are strings"),
         (b'{"format": NaN}', "the number NaN"),

@@ -74,6 +74,47 @@ def test_other_numbers_and_fewer_columns(command: Any, of: str) -> None:
     assert table["by_height"].sum() == pytest.approx(0.0 if of == "approach" else moved, rel=1e-9)
 
 
+def test_an_approach_needs_none(command: Any) -> None:
+    scene = SCENE.split("[friction]")[0]
+    write('[gradient]\nof = "approach"\nfraction = 0.5\n', scene)
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert "fraction: found 0.5, expected none with the approach" in outcome.err
+    assert "friction" not in outcome.err
+    write('[gradient]\nof = "approach"\n', scene)
+    assert command("run", "scene.toml", "--out", "out", "--no-figures").status == 0
+
+
+def printed(out: str) -> dict[str, str]:
+    """The lines of the gradient, by their first words."""
+    lines = out.split("gradient of the ")[1].split("\n\n")[0].splitlines()[1:]
+    return {line[:20].strip(): line[20:] for line in lines}
+
+
+def test_what_is_printed(command: Any) -> None:
+    """Names apart from numbers, what is held, how far heights are known, and what was asked by."""
+    write('[gradient]\nof = "loss"\nfraction = 0.5\nby = ["heights", "positions"]\n')
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
+    summary = json.loads(Path("out/summary.json").read_text())["gradient"]
+    assert "load held, and so is the force" in outcome.out
+    lines = printed(outcome.out)
+    for name, slope in summary["by"].items():
+        assert lines[f"by {name}"] == f"{slope + 0.0:.8g}"
+    known = float(lines["by height"].split("known to ")[1].rstrip(")"))
+    assert summary["height_error"] <= known <= 1.2 * summary["height_error"]
+    table = read("gradient")
+    far = np.hypot(table["by_x"], table["by_y"])
+    at = int(lines["by position"].split("asperity ")[1].rstrip(")"))
+    assert far[at] == far.max()
+    assert lines["by position"].startswith(f"up to ({table['by_x'][at]:.8g}, ")
+    assert "by tip_radius" not in lines
+    write('[gradient]\nof = "approach"\nby = ["tip_radii"]\n')
+    outcome = command("run", "scene.toml", "--out", "other", "--no-figures")
+    lines = printed(outcome.out)
+    assert "by height" not in lines
+    assert lines["by friction"] == "0"
+    assert lines["by tip_radius"].startswith("up to ")
+
+
 @pytest.mark.parametrize(
     ("table", "said"),
     [
@@ -82,6 +123,7 @@ def test_other_numbers_and_fewer_columns(command: Any, of: str) -> None:
         ('of = "load"\nfraction = 0.1', "fraction: found 0.1, expected none with the load"),
         ('of = "loss"\nfraction = 2.0', "expected a number from 0 to 1"),
         ('of = "load"\nby = ["height"]', "expected a list of some of: heights, tip_radii"),
+        ('of = "load"\nby = []', "by: found [], expected a list of some of: heights, tip_radii"),
         ('of = "load"\nholding = "gap"', 'expected "load" or "approach"'),
     ],
 )
@@ -99,8 +141,33 @@ def test_a_loss_needs_friction(command: Any) -> None:
     assert "[friction]: missing table, needed with the loss of [gradient]" in outcome.err
 
 
-def test_where_there_is_none(command: Any) -> None:
-    write('[gradient]\nof = "loss"\nfraction = 1.0\nholding = "approach"\n')
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        (
+            'of = "loss"\nfraction = 1.0\nholding = "approach"',
+            "[gradient] fraction: found 1, a force of 1.804266945e-07: gross sliding, "
+            "expected a force below f P: with the approach held f P may fall below the force",
+        ),
+        ('of = "displacement"\nfraction = 1e-51', "[gradient] fraction: found 1e-51, a force of "),
+    ],
+)
+def test_where_there_is_none(command: Any, keys: str, said: str) -> None:
+    """All else is computed and written; what is missing is said, and the status says so."""
+    write(f"[gradient]\n{keys}\n[cycle]\nmaximum = [0.5]\n")
     outcome = command("run", "scene.toml", "--out", "out")
-    assert outcome.status == 2
-    assert "with the approach held f P may fall below the force" in outcome.err
+    assert outcome.status == 3
+    summary = json.loads(Path("out/summary.json").read_text())
+    assert said in summary["gradient"]["none_because"]
+    assert f"none, {said}" in outcome.out
+    assert "warning: no gradient of the" in outcome.err
+    assert summary["cycle"][0]["energy"] > 0
+    assert Path("out/cycle.csv").exists()
+    assert not Path("out/gradient.csv").exists()
+
+
+def test_nothing_touches(command: Any) -> None:
+    write('[gradient]\nof = "load"\n', SCENE.replace("load = 3.60853389e-7", "approach = -1e-6"))
+    outcome = command("run", "scene.toml", "--out", "out")
+    assert outcome.status == 3
+    assert "gradient of the load: none, contact: found no load, expected" in outcome.out

@@ -273,3 +273,19 @@ def test_a_sphere_is_taken_away_and_said(command: Any) -> None:
     assert outcome.status == 0
     radius = float(outcome.out.partition("sphere of radius ")[2].split(",")[0])
     assert radius == pytest.approx(2e3, rel=0.02)
+
+
+@pytest.mark.usefixtures("surface")
+def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any) -> None:
+    outcome = command("summits", "scan.npz", "--radius", "1e4", "--approach", "-100")
+    assert "warning: at a pruning of 0.05 nothing touches: trust is that of a" in outcome.err
+    assert "to be trusted     nothing, as nothing touches" in outcome.out
+
+
+@pytest.mark.usefixtures("surface")
+def test_one_contact_at_some_prunings_and_none_at_others(command: Any) -> None:
+    """No figure is spoilt by 0 contacts, either: a warning of matplotlib would be an error here."""
+    outcome = command("summits", "scan.npz", "--radius", "1e4", "--approach", "-1")
+    assert "nothing touches" not in outcome.out + outcome.err
+    last = [line.split() for line in outcome.out.splitlines() if line.startswith("   50 %")]
+    assert (last[0][4], last[0][-1]) == ("0", "-")

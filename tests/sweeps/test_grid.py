@@ -113,6 +113,11 @@ def test_the_contents_of_a_file_of_asperities_are_in_the_hash(tmp_path: Path) ->
 
 WRONG = {
     "no table": ({k: v for k, v in SMALL.items() if k != "sweep"}, "[sweep]: missing table"),
+    "a gradient": (
+        SMALL | {"gradient": {"of": "load"}},
+        "[gradient]: not computed in a sweep; `convexrough run` computes it",
+    ),
+    "a history": (SMALL | {"history": {"fractions": [0.5]}}, "[history]: not computed in a sweep"),
     "a number": ({**SMALL, "sweep": 3}, "[sweep]: found 3, expected a table"),
     "unknown key": (tables(sweep={"sede": 3}), '[sweep] sede: unknown key, did you mean "seeds"?'),
     "unknown swept key": (
