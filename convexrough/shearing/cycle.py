@@ -110,7 +110,8 @@ class Cycle(Table, Drawn):
     def gradient(self, *, holding: Holding | None = None, tolerance: float = 1e-9) -> Gradient:
         """Derivatives of the energy with respect to the scene: two linear systems.
 
-        holding, tolerance : as in `Contact.gradient`; the forces are held
+        holding, tolerance : as in `Contact.gradient`; the forces are held, also where a
+            displacement was prescribed: `Gradient` says how to hold that
 
         Raises InputError in gross sliding where several asperities slide last, or the approach is
         held: there is no derivative.

@@ -83,7 +83,8 @@ class ShearState(Table, Drawn):
         """Derivatives of a weighted sum of results with respect to the scene.
 
         displacement : weight on X;  forces, slips : (n,) weights on those of the asperities
-        holding, tolerance : as in `Contact.gradient`; the shear force is held
+        holding, tolerance : as in `Contact.gradient`; the shear force is held, also where a
+            displacement was prescribed: `Gradient` says how to hold that
 
         Raises InputError in gross sliding where several asperities slide last, or the approach is
         held: there is no derivative.

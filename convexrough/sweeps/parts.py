@@ -195,7 +195,9 @@ def _unpacked(data: bytes, format: str, names: Sequence[str] | None) -> Columns:
     source = io.BytesIO(data)
     if format == "parquet":
         _, parquet = _arrow()
-        table = parquet.read_table(source, columns=None if names is None else list(names))
+        # Threads of its own could outlive the interpreter, which ends the process by an abort.
+        wanted = None if names is None else list(names)
+        table = parquet.read_table(source, columns=wanted, use_threads=False, pre_buffer=False)
         # Text of pyarrow comes as objects.
         arrays = {name: table[name].to_numpy() for name in table.column_names}
         arrays = {

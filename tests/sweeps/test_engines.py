@@ -1,5 +1,6 @@
 """The same table whoever computes it: processes, threads, Dask, in any order and any batches."""
 
+import multiprocessing
 import os
 import random
 import signal
@@ -21,6 +22,9 @@ from convexrough.sweeps import batch, engines, running
 from convexrough.sweeps.batch import Batch, Rows, compute
 from convexrough.sweeps.sources import Tables
 from convexrough.sweeps.sweep_file import plan_of
+
+#: Whatever ran before in this process, and whichever threads it left, nothing is forked.
+SPAWN = multiprocessing.get_context("spawn")
 
 PLAN = plan_of(tables(sweep={"seeds": 10}), Path("sweep"))
 WHOLE = cr.sweep(tables(sweep={"seeds": 10}), executor=ThreadPoolExecutor(1))
@@ -53,9 +57,10 @@ def test_processes(workers: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "executor", [lambda: ThreadPoolExecutor(3), lambda: ProcessPoolExecutor(2), Backwards],
+    "executor",
+    [lambda: ThreadPoolExecutor(3), lambda: ProcessPoolExecutor(2, mp_context=SPAWN), Backwards],
     ids=["threads", "processes of the user", "backwards"],
-)  # fmt: skip
+)
 def test_executors(executor: Any) -> None:
     given = executor()
     assert same(cr.sweep(tables(sweep={"seeds": 10}), executor=given), WHOLE)
@@ -96,7 +101,10 @@ def test_a_scene_that_kills_is_found_and_named() -> None:
 
 def test_an_executor_that_broke_is_said_to_be() -> None:
     plan = replace(PLAN, source=Deadly(PLAN.source.grid, PLAN.source.path, worst=3))  # type: ignore[attr-defined]
-    with ProcessPoolExecutor(1) as mine, pytest.raises(cr.WorkerError, match="of no use any more"):
+    with (
+        ProcessPoolExecutor(1, mp_context=SPAWN) as mine,
+        pytest.raises(cr.WorkerError, match="of no use any more"),
+    ):
         running.run(plan, engines.Given(mine))
 
 
