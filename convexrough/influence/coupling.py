@@ -106,7 +106,7 @@ class Influence(Coupling, Protocol):
     points : (n, 2) [length];  scale : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
     at_hand : the matrix is stored, so that to use it, or a part of it, costs nothing
     prefers_single : products of float32 loads are cheaper than those of float64 loads
-    sharp : `sums` are known, as a rule
+    sharp : `sums` cost few products, so that Newton's last step starts from them
     """
 
     @property
