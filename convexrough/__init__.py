@@ -30,28 +30,25 @@ if TYPE_CHECKING:
         SolverError,
         WorkerError,
     )
+    from convexrough.friction.curve import MemoryCurve
+    from convexrough.friction.cycle import Cycle, Loop, cycle, cycles, loops, steady
+    from convexrough.friction.onset import onset_of_sliding
+    from convexrough.friction.path import History, LoadPath, history, load_path
+    from convexrough.friction.phases import PhaseLosses, phase_losses
+    from convexrough.friction.shapes import elliptic_path
+    from convexrough.friction.shear import ShearCertificate, ShearState, certify_shear, shear
+    from convexrough.friction.side_by_side import PathComparison, PathEntry, compare_paths
     from convexrough.gradients.change import ContactChange, Direction, ShearChange
     from convexrough.gradients.gradient import Gradient
     from convexrough.gradients.objective import Objective
     from convexrough.gradients.states import onset_gradient
+    from convexrough.melan.shakedown import Shakedown, shakedown
     from convexrough.normal.certificate import Certificate, certify
-    from convexrough.paths.memory import MemoryCurve
-    from convexrough.paths.path import LoadPath, load_path
-    from convexrough.paths.phases import PhaseLosses, phase_losses
-    from convexrough.paths.shakedown import Shakedown, shakedown
-    from convexrough.paths.shapes import elliptic_path
-    from convexrough.paths.side_by_side import PathComparison, PathEntry, compare_paths
-    from convexrough.paths.steady import Steady, steady
     from convexrough.run.scene_file import SceneFile, read_scene
     from convexrough.scene.asperities import Asperities
     from convexrough.scene.material import Material
     from convexrough.scene.scene import Scene
-    from convexrough.shearing.certificate import ShearCertificate, certify_shear
-    from convexrough.shearing.cycle import Cycle, cycle, cycles, loops
-    from convexrough.shearing.history import History, history
-    from convexrough.shearing.loop import Loop
-    from convexrough.shearing.state import ShearState, onset_of_sliding, shear
-    from convexrough.sphere.smooth import SmoothSphere, smooth
+    from convexrough.sphere.smooth import SmoothEllipsoid, SmoothSphere, smooth
     from convexrough.sweeps.sweep import sweep
     from convexrough.sweeps.table import SweepTable, open_sweep
     from convexrough.vector_shear.cones import FrictionConic
@@ -71,28 +68,25 @@ _HOMES = {
         "SolverError",
         "WorkerError",
     ),
+    "friction.curve": ("MemoryCurve",),
+    "friction.cycle": ("Cycle", "Loop", "cycle", "cycles", "loops", "steady"),
+    "friction.onset": ("onset_of_sliding",),
+    "friction.path": ("History", "LoadPath", "history", "load_path"),
+    "friction.phases": ("PhaseLosses", "phase_losses"),
+    "friction.shapes": ("elliptic_path",),
+    "friction.shear": ("ShearCertificate", "ShearState", "certify_shear", "shear"),
+    "friction.side_by_side": ("PathComparison", "PathEntry", "compare_paths"),
     "gradients.change": ("ContactChange", "Direction", "ShearChange"),
     "gradients.gradient": ("Gradient",),
     "gradients.objective": ("Objective",),
     "gradients.states": ("onset_gradient",),
+    "melan.shakedown": ("Shakedown", "shakedown"),
     "normal.certificate": ("Certificate", "certify"),
-    "paths.memory": ("MemoryCurve",),
-    "paths.path": ("LoadPath", "load_path"),
-    "paths.phases": ("PhaseLosses", "phase_losses"),
-    "paths.shakedown": ("Shakedown", "shakedown"),
-    "paths.side_by_side": ("PathComparison", "PathEntry", "compare_paths"),
-    "paths.shapes": ("elliptic_path",),
-    "paths.steady": ("Steady", "steady"),
     "run.scene_file": ("SceneFile", "read_scene"),
     "scene.asperities": ("Asperities",),
     "scene.material": ("Material",),
     "scene.scene": ("Scene",),
-    "shearing.certificate": ("ShearCertificate", "certify_shear"),
-    "shearing.loop": ("Loop",),
-    "shearing.cycle": ("Cycle", "cycle", "cycles", "loops"),
-    "shearing.history": ("History", "history"),
-    "shearing.state": ("ShearState", "onset_of_sliding", "shear"),
-    "sphere.smooth": ("SmoothSphere", "smooth"),
+    "sphere.smooth": ("SmoothEllipsoid", "SmoothSphere", "smooth"),
     "sweeps.sweep": ("sweep",),
     "sweeps.table": ("SweepTable", "open_sweep"),
     "vector_shear.cones": ("FrictionConic",),
@@ -135,9 +129,9 @@ __all__ = [
     "ShearCertificate",
     "ShearChange",
     "ShearState",
+    "SmoothEllipsoid",
     "SmoothSphere",
     "SolverError",
-    "Steady",
     "SweepTable",
     "VectorShearState",
     "Verdict",

@@ -1,14 +1,14 @@
 """Check a proof of which asperities touch, and which slide: python checker.py proof.json
 
 Needs the standard library only and believes nothing in the file. The contact law asks of n contact
-radii a_i, with loads P_i = 4 E* a_i^3 / (3 R_i), 1 / R_i = 1 / R + 1 / rho_i and D_i = D0 + d_i,
+radii a_i, with loads P_i = 4 E* a_i^3 / (3 R_i), D_i = D0 + d_i and relative radii R_i,
 
     a_i^2 / R_i + sum_j 4 a_j^3 / (3 pi R_j r_ij)  =  D_i  where a_i > 0,  >=  D_i  where a_i = 0.
 
 The file states a scene, radii near its solution, a box of radii, why the energy is convex on that
 box, and what it claims. Its numbers are float64 in hexadecimal: exact rationals. Numbers computed
-here are rational, too, or enclosed between rationals. Pages
-docs/theory/proof-file-pressing.md and docs/theory/proof-file-friction.md derive (1) - (10).
+here are rational, too, or enclosed between rationals. docs/theory/proof-file-steps.md derives
+them, under the numbers (1) to (12) that comments cite.
 
 Exit status: 0 all that is claimed is proved; 1 refused, with the reason; 2 unreadable.
 """
@@ -22,19 +22,22 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from fractions import Fraction
-from operator import mul
+from operator import le, mul
 from pathlib import Path
 from typing import Any, NamedTuple
 
-FORMAT = "convexrough proof 1"
+FORMAT = "convexrough proof 2"
 MOST_ASPERITIES, MOST_BYTES = 3000, 1 << 24
+MOST_INVERTED = 600  # touching asperities whose matrix is inverted to prove order: half a minute
 BITS = 128  # significant bits to which the ends of an interval are rounded, outwards
-GRID = 160  # bits of the largest coordinate as an integer: points are known to 1 on that grid
-NEAREST = 1 << 80  # asperities nearer than this on the grid are refused
-UNIT = 1 << 240  # an inverse distance is an integer over this, too small by SLACK at most
-SLACK = 1 + Fraction(1, 1 << 70)
+GRID = 200  # bits of the largest coordinate as an integer: points are known to 1 on that grid
+NEAREST = 1 << 100  # asperities nearer than this on the grid are refused
+UNIT = 1 << 320  # an inverse distance is an integer over this, too small by SLACK at most
+SLACK = 1 + Fraction(1, 1 << 96)
 FAR = 1 << 400  # stands for the distance of an asperity to itself, as it does not push itself
 ROOT_BITS = 60  # of the integer Cholesky factor
+ONE_BITS = 80  # of fixed-point numbers in the proof of order
+ONE = 1 << ONE_BITS
 
 Tell = Callable[[str], object]
 
@@ -112,6 +115,10 @@ def interval(x: Interval | Fraction | int) -> Interval:
     return x if isinstance(x, Interval) else Interval(x)
 
 
+def added_up(values: Sequence[Interval]) -> Interval:
+    return sum(values, Interval(0))
+
+
 PI = Interval(*(Fraction(31415926535897932384626433832795028841971 + i, 10**40) for i in (0, 1)))
 
 
@@ -173,6 +180,11 @@ def numbers(values: Any, n: int | None = None) -> list[Fraction]:
     return [number(text) for text in listed(values, n)]
 
 
+def added(texts: Any) -> Fraction:
+    """A number to more digits than float64 has: the sum of a list."""
+    return sum(numbers(texts), Fraction(0))
+
+
 def digest(scene: Any, prescribed: Any) -> str:
     """SHA-256 of both as one JSON object with sorted keys and without blanks."""
     given = {"prescribed": prescribed, "scene": scene}
@@ -192,33 +204,41 @@ class Scene(NamedTuple):
     grid: Fraction  # grid units per unit of length
 
 
+def curvatures(value: Any) -> list[Fraction]:
+    """Of the base along x and y: 1 / R of one radius for both or of one for each, 0 of "inf"."""
+    radii = listed(value, 2) if isinstance(value, list) else [value, value]
+    found = [Fraction(0) if text == "inf" else number(text) for text in radii]
+    if any(text != "inf" and radius <= 0 for text, radius in zip(radii, found, strict=True)):
+        raise Refused("a radius of the base is not positive")
+    return [1 / radius if radius else radius for radius in found]
+
+
+SINGLE = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "geometry")
+SEVERAL = ("x", "y", "heights", "tip_radii")
+
+
 def read_scene(given: Any) -> Scene:
-    single, several = ("sphere_radius", "contact_modulus"), ("x", "y", "heights", "tip_radii")
-    others = ("poisson_ratio", "friction", "geometry")
-    *values, nu, f, geometry = table(given, *single, *several, *others)
-    radius, modulus = number(values[0]), number(values[1])
-    ratio, friction = number(nu), Fraction(0) if f is None else number(f)
-    x, y, heights, tips = (numbers(value, len(listed(values[2]))) for value in values[2:])
+    base, E, nu, f, geometry, *values = table(given, *SINGLE, *SEVERAL)
+    bends, modulus, ratio = curvatures(base), number(E), number(nu)
+    friction = Fraction(0) if f is None else number(f)
+    x, y, heights, tips = (numbers(value, len(listed(values[0]))) for value in values)
     if not 0 < len(x) <= MOST_ASPERITIES:
         raise Refused(f"{len(x)} asperities; from 1 to {MOST_ASPERITIES} can be checked in minutes")
-    if min(radius, modulus, *tips) <= 0 or friction < 0 or not 0 <= ratio <= Fraction(1, 2):
+    if min(modulus, *tips) <= 0 or friction < 0 or not 0 <= ratio <= Fraction(1, 2):
         raise Refused("a radius, the modulus, the friction or Poisson's ratio is out of range")
     if geometry not in ("summit", "closest"):
         raise Unreadable("the geometry is neither summit nor closest")
-    further = [tip if geometry == "closest" else Fraction(0) for tip in tips]  # beyond R
-    drops = [(p * p + q * q) / (2 * (radius + t)) for p, q, t in zip(x, y, further, strict=True)]
-    x, y = ([p * radius / (radius + t) for p, t in zip(ps, further, strict=True)] for ps in (x, y))
+    drops = [Fraction(0)] * len(x)
+    for ps, c in zip((x, y), bends, strict=True):
+        for i, tip in enumerate(tips):
+            p, ps[i] = ps[i], ps[i] / (1 + c * tip * (geometry == "closest"))  # p R / (R + rho)
+            drops[i] += c * p * ps[i] / 2
     largest = max(map(abs, x + y)) or Fraction(1)
     grid = Fraction(2) ** (GRID - largest.numerator.bit_length() + largest.denominator.bit_length())
-    return Scene(
-        modulus=modulus,
-        ratio=ratio,
-        friction=friction,
-        radii=[1 / (1 / radius + 1 / tip) for tip in tips],
-        offsets=[Interval(z - drop) for z, drop in zip(heights, drops, strict=True)],
-        points=[(math.floor(p * grid), math.floor(q * grid)) for p, q in zip(x, y, strict=True)],
-        grid=grid,
-    )
+    radii = [1 / (sum(bends, Fraction(0)) / 2 + 1 / tip) for tip in tips]
+    offsets = [Interval(z - drop) for z, drop in zip(heights, drops, strict=True)]
+    points = [(math.floor(p * grid), math.floor(q * grid)) for p, q in zip(x, y, strict=True)]
+    return Scene(modulus, ratio, friction, radii, offsets, points, grid)
 
 
 # Convexity ----------------------------------------------------------------------------------------
@@ -242,39 +262,46 @@ def distances(scene: Scene, among: list[int], tell: Tell) -> Iterator[tuple[int,
 class Box(NamedTuple):
     """Radii 0 <= a_i <= b_i, where the Hessian is at least 1 - theta of its local part."""
 
-    radii: list[Fraction]  # b_i; those with b_i = 0 are left out
+    radii: list[Fraction]  # b_i; those with b_i = 0 are held open
     able: list[int]  # the others
     theta: Fraction
 
 
-def read_box(scene: Scene, argument: Any, tell: Tell) -> Box:
+def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
     """Proves that A + diag(theta / (2 E* b)) is positive semidefinite (2)."""
-    box, convexity_number, shells = table(argument, "box", "convexity_number", "shells")
-    b, theta = numbers(box, len(scene.points)), number(convexity_number)
+    b, theta, shells = numbers(given[0], len(scene.points)), number(given[1]), given[2]
     able = [i for i in range(len(b)) if b[i] > 0]
     if min(b) < 0 or not 0 < theta < 1:
         raise Refused("the box is negative, or the convexity number not between 0 and 1")
+    radii = [b[i] / theta for i in able]
     if shells is None:
-        prove_definite(scene, [b[i] / theta for i in able], able, tell)
+        prove_definite(scene, radii, able, tell)
     else:
-        prove_apart(scene, numbers(shells, len(b)), [b[i] / theta for i in able], able, tell)
+        prove_by_shells(scene, numbers(shells, len(b)), radii, able, tell)
     return Box(b, able, theta)
 
 
-def prove_apart(
+def prove_by_shells(
     scene: Scene, shells: list[Fraction], radii: list[Fraction], able: list[int], tell: Tell
 ) -> None:
-    """That spheres about the asperities, of these or larger radii times 2 / pi, do not overlap."""
-    room = {i: math.ceil(shells[i] * scene.grid) for i in able}
-    if any(PI.low * shells[i] < 2 * radius for i, radius in zip(able, radii, strict=True)):
-        raise Refused("a shell is too small for its box")
+    """That A + diag(1 / (2 E* radii)) is, by spheres that overlap little or not at all (3)."""
+    place = {i: k for k, i in enumerate(able)}
+    sizes = [math.floor(shells[i] * scene.grid) for i in able]
+    if min(sizes, default=1) <= 0:
+        raise Refused("a shell is not positive")
     for i, apart in distances(scene, able, tell):
-        if i in room and any(room[i] + room[j] > m - 2 for j, m in zip(able, apart, strict=True)):
-            raise Refused(f"the shell of asperity {i} overlaps another")
+        if i not in place:
+            continue
+        size, overlap = sizes[place[i]], 0
+        for other, m in zip(sizes, apart, strict=True):
+            if (over := size + other - m + 2) > 0:
+                overlap -= -over * over // (4 * (m - 2))
+        if overlap > size * (size * PI.low / (2 * radii[place[i]] * scene.grid) - 1):
+            raise Refused(f"the shell of asperity {i} is too small for its box, or overlaps others")
 
 
 def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: Tell) -> None:
-    """That A + diag(1 / (2 E* radii)) is, by a Cholesky factorisation in integers (3)."""
+    """That A + diag(1 / (2 E* radii)) is, by a Cholesky factorisation in integers (4)."""
     scale = [math.isqrt(math.floor(2 * c * scene.grid * 4**ROOT_BITS)) for c in radii]
     wholes, parts = (PI.high * UNIT).as_integer_ratio()
     factor: list[list[int]] = []
@@ -295,60 +322,70 @@ def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: T
 
 
 class State(NamedTuple):
-    """Where a solution is proved to be, and the radii near it. Loads are over E*."""
+    """Where a solution is proved to be, and the loads near it. Forces and V are over E*."""
 
-    near: list[Interval]  # loads of those radii, scaled to the prescribed total, if any
-    local: list[Interval]  # a_i^2 / R_i of them
+    near: list[Interval]  # loads of the radii given, scaled to the prescribed total, if any
     pushed: list[Interval]  # (A P)_i of them
     approach: Interval  # D0 of the solution
     depths: list[Interval]  # D_i - (A P)_i of it: the indentation, or minus the gap
+    loads: list[Interval]  # P_i of it
+    total: Interval  # their sum
+    energy: Interval  # V of it: the least energy of all loads with this total
 
 
-def prove_state(
-    scene: Scene,
-    box: Box,
-    contact_radii: list[Fraction],
-    approach: Fraction,
-    load: Interval | None,
-    tell: Tell,
-) -> State:
-    """That the asperities of the box have one solution in it, with this approach or load."""
-    a, b, R, d = contact_radii, box.radii, scene.radii, scene.offsets
+def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
+    """That there is one solution in the box with this load, or with the approach of the place."""
+    radii, centre = table(place, "radii", "approach")
+    a = [added(radius) for radius in listed(radii, len(scene.points))]
+    approach, b, R, d = added(centre), box.radii, scene.radii, scene.offsets
     everyone = range(len(a))
     if min(a) < 0 or any(a[i] > b[i] for i in everyone):
         raise Refused("a contact radius is negative, or outside the box")
     exact = [4 * a[i] ** 3 / (3 * R[i]) for i in everyone]
     pushed, spread = push(scene, box, exact, tell)
-    loads, local = [Interval(p) for p in exact], [Interval(a[i] ** 2 / R[i]) for i in everyone]
-    if load is not None:  # (4) scaled to the total
-        share = load / sum(loads, Interval(0))
-        scaling = Interval(1).wider((share - 1).size())
-        loads, local, pushed = ([x * scaling for x in xs] for xs in (loads, local, pushed))
+    near, local = [Interval(p) for p in exact], [Interval(a[i] ** 2 / R[i]) for i in everyone]
+    if load is not None:  # (5) scaled to the total
+        scaling = Interval(1).wider((load / added_up(near) - 1).size())
+        near, local, pushed = ([x * scaling for x in xs] for xs in (near, local, pushed))
 
-    # (5) How far away the solution is in energy, so in each load (6): it is inside the box.
+    # (6) How far away the solution is in energy, so in each load (7): it is inside the box.
     trial = [d[i] + approach - pushed[i] for i in everyone]
     gaps = [local[i] - trial[i] for i in everyone]
     off = [gaps[i].size() if a[i] > 0 else max(-gaps[i].low, Fraction(0)) for i in everyone]
-    squares = sum((Interval(off[i]) * off[i] * (2 * b[i]) for i in box.able), Interval(0))
-    distance = squares.root() / (1 - box.theta)
+    misfit = added_up([Interval(off[i]) * off[i] * (2 * b[i]) for i in box.able]).root()
+    distance = misfit / (1 - box.theta)
     doubt = [(distance * interval(2 * radius).root()).high for radius in b]
-    if any(loads[i].high + doubt[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
+    if any(near[i].high + doubt[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
         raise Refused("the solution may be outside the box")
 
-    # (7) How deep each asperity is pressed: by the approach, less what the others push.
+    # (8) How deep each asperity is pressed: by the approach, less what the others push.
     moved = [(distance * s.root()).high for s in spread]
     shift = Fraction(0)
     if load is not None:
         known = [
-            (local[i] * doubt[i] / loads[i] + gaps[i].size() + moved[i]).high
+            (local[i] * doubt[i] / near[i] + gaps[i].size() + moved[i]).high
             for i in box.able
-            if doubt[i] < loads[i].low
+            if doubt[i] < near[i].low
         ]
         if not known:
             raise Refused("no asperity is sure enough to touch to tell the approach")
         shift = min(known)
+    D0 = Interval(approach).wider(shift)
     depths = [trial[i].wider(moved[i] + shift) for i in everyone]
-    return State(loads, local, pushed, Interval(approach).wider(shift), depths)
+    depths = [Interval(x.low, min(x.high, (D0 + d[i]).high)) for i, x in enumerate(depths)]
+    if any(b[i] == 0 and depths[i].high > 0 for i in everyone):
+        raise Refused("an asperity that may touch is held open")
+    deep = [depth.positive_part() for depth in depths]
+    loads = [(x * x * x * R[i]).root() * Fraction(4, 3) for i, x in enumerate(deep)]
+
+    # (9) The energy of the solution, at most distance * misfit below that of the loads near it.
+    mean = [local[i] * Fraction(3, 5) + pushed[i] * Fraction(1, 2) - d[i] for i in everyone]
+    energy = added_up([near[i] * mean[i] for i in everyone if a[i] > 0])
+    energy += Interval(-(distance * misfit).high, 0)
+    if load is None:
+        load = added_up(loads)
+        energy += (load - added_up(near)) * approach
+    return State(near, pushed, D0, depths, loads, load, energy)
 
 
 def push(
@@ -369,38 +406,160 @@ def push(
     return pushed, spread
 
 
-def scope(scene: Scene, box: Box, state: State, load: Interval | None) -> str:
-    """Whether all solutions of the contact law are in the box: "global", else "local" (8)."""
-    R, d, b = scene.radii, scene.offsets, box.radii
-    ceiling = state.approach.high
-    if load is not None:
-        pairs = list(zip(state.local, state.pushed, strict=True))
-        least = max(w.high for _, w in pairs)
-        most = max((u * Fraction(2, 3) + w).high for u, w in pairs)
-        ceiling = min(
-            ceiling_at(scene, box, state, load, least + (most - least) * Fraction(3, 4) ** k)
-            for k in range(12)
-        )
-    deepest = [(offset + ceiling).high for offset in d]
-    if any(b[i] <= 0 < deepest[i] for i in range(len(b))):
-        raise Refused("an asperity that could touch is left out of the box")
-    return "global" if all(b[i] ** 2 >= R[i] * deepest[i] for i in box.able) else "local"
+def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
+    """Whether all solutions of the contact law are in the box: "global", else "local" (10).
+
+    top : None where the approach is prescribed, else any number above all (A P)_i
+    """
+    ceiling = state.approach
+    if top is not None:
+        ceiling = Interval(top)
+        for p, w, d, R in zip(state.near, state.pushed, scene.offsets, scene.radii, strict=True):
+            if w.high >= top:
+                return "local"
+            if p.high > 0:
+                part = p / (w * -1 + top)
+                ceiling += p / state.total * (part * part / (12 * R) - d)
+    reach = [R * (d + ceiling).high for R, d in zip(scene.radii, scene.offsets, strict=True)]
+    return "global" if all(map(le, reach, (b * b for b in box.radii))) else "local"
 
 
-def ceiling_at(scene: Scene, box: Box, state: State, load: Interval, top: Fraction) -> Fraction:
-    """A bound on the approach of all solutions with this load, for any top from max A P on (8)."""
-    total = Interval(0)
-    for i in (i for i in box.able if state.near[i].high > 0):
-        q, below = state.near[i] / load, Interval(top) - state.pushed[i]
-        total += q * (state.near[i] / below) * (state.near[i] / below) / (12 * scene.radii[i])
-        total -= q * scene.offsets[i]
-    return (total + top).high
+# Friction -----------------------------------------------------------------------------------------
 
 
-def load_of(scene: Scene, i: int, depth: Interval) -> Interval:
-    """P = (4/3) (R delta^3)^(1/2), over E*."""
-    delta = depth.positive_part()
-    return (delta * delta * delta * scene.radii[i]).root() * Fraction(4, 3)
+def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
+    """How far D0 may fall from here, with the load, and no indentation rise: (11).
+
+    With C = diag(2 a) and H = (I + A C)^-1 that is so if  sum_k!=i max(-H_ik, 0) < H_ii  of those
+    that may touch, and if the gap of all others is more than what this is missed by times the fall.
+    """
+    near = [i for i, x in enumerate(state.depths) if x.high > 0]
+    reach = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
+    weights = [math.ceil(2 * a * scene.grid) for a in reach]
+    parts, wholes = (ONE / PI.high).as_integer_ratio()
+    rows: dict[int, list[int]] = {}  # of A C, in parts of ONE, less than `blur` too small
+    sums: dict[int, int] = {}
+    for i, apart in distances(scene, near, tell):
+        if (state.approach + scene.offsets[i]).high > 0:
+            row = [w * parts // ((m + 3) * wholes) for w, m in zip(weights, apart, strict=True)]
+            sums[i] = sum(row)
+            if len(near) <= MOST_INVERTED:
+                rows[i] = row
+    blur = 2 + (max(sums.values(), default=0) >> 68)
+    missed = {i: Fraction(each + blur * len(near) - ONE) for i, each in sums.items()}
+    if any(missed[i] > 0 for i in near):
+        missed = missed_by_inverse(rows, near, blur, tell) if rows else {near[0]: Fraction(1)}
+    if any(missed[i] >= 0 for i in near):
+        return Fraction(0)
+    falls = [-state.depths[i].high * ONE / each for i, each in missed.items() if each > 0]
+    return min(falls, default=Fraction(FAR))
+
+
+def missed_by_inverse(
+    rows: dict[int, list[int]], near: list[int], blur: int, tell: Tell
+) -> dict[int, Fraction]:
+    """sum_k!=i max(-H_ik, 0) - H_ii in parts of ONE, rounded up: from any X near (I + A C)^-1."""
+    n, place = len(near), {i: k for k, i in enumerate(near)}
+    X = [[*rows[i][:k], ONE, *rows[i][k + 1 :]] for k, i in enumerate(near)]
+    for k in range(n):  # Gauss and Jordan's elimination, in place
+        if X[k][k] <= 0:
+            return dict.fromkeys(rows, Fraction(1))
+        tell(f"inverting: {k} of {n}")
+        top = [ONE * x // X[k][k] for x in X[k]]
+        top[k] = ONE * ONE // X[k][k]
+        for i in range(n):
+            factor = X[i][k]
+            X[i][k] = 0
+            if i != k:
+                pairs = zip(X[i], top, strict=True)
+                X[i] = [x - (factor * t >> ONE_BITS) for x, t in pairs]
+        X[k] = top
+    columns = list(zip(*X, strict=True))
+    sizes = [sum(map(abs, row)) for row in X]
+    products = {i: [sum(map(mul, row, column)) for column in columns] for i, row in rows.items()}
+    left = max(
+        sum(abs(ONE * (ONE * (j == k) - X[k][j]) - x) for j, x in enumerate(products[i]))
+        for k, i in enumerate(near)
+    )
+    felt = blur * sum(sizes)
+    rest = Fraction(left + felt, ONE * ONE)  # the largest row sum of I - (I + A C) X
+    if 2 * rest > 1:
+        return dict.fromkeys(rows, Fraction(1))
+    widest = ONE + max(map(sum, rows.values())) + blur * n
+    off = 2 * rest * max(sizes) * widest / ONE + Fraction(felt, ONE) + n
+    found = {}
+    for i, product in products.items():
+        row = [-x // ONE for x in product] if i not in place else X[place[i]]
+        own = ONE if i not in place else X[place[i]][place[i]]
+        found[i] = off - own + sum(max(-x, 0) for x in row)
+    return found
+
+
+def prove_shear(
+    scene: Scene, box: Box, pressed: State, ordered: Fraction, entry: Any, tell: Tell
+) -> dict[str, Any]:
+    """A friction state: the difference of two pressed ones (12)."""
+    force, place = table(entry, "force", "held")
+    f, unit = scene.friction, scene.friction * scene.modulus
+    if number(force) <= 0 or f <= 0:
+        raise Refused("a shear force or the coefficient of friction is not positive")
+    fall = number(force) / unit
+    if (pressed.total - fall).low <= 0:
+        raise Refused("a shear force is not proved to be below what friction can carry")
+    held = prove_state(scene, box, place, pressed.total - fall, tell)
+    drop, mean = pressed.approach - held.approach, pressed.approach + held.approach
+    in_order, travel = drop.high < ordered, f * (2 - scene.ratio) / (2 * (1 - scene.ratio))
+    words, slips = list[str](), list[Interval]()
+    for i, (at, after) in enumerate(zip(pressed.depths, held.depths, strict=True)):
+        if not in_order and after.high > 0 and held.loads[i].high > pressed.loads[i].low:
+            raise Refused(f"asperity {i} may be dragged along by the others, against the theorem")
+        touches, slip = word(at, "contact", "open"), gap_of(after) * travel
+        words.append(word(after, "partial", "sliding") if touches == "contact" else touches)
+        slips.append(Interval(slip.low if at.low > 0 else 0, slip.high if at.high > 0 else 0))
+    excess = pressed.energy - held.energy - mean * (fall / 2)
+    return {
+        "order": "proved" if in_order else "proved for one step",
+        "status": words,
+        "forces": [(pressed.loads[i] - rest) * unit for i, rest in enumerate(held.loads)],
+        "slips": slips,
+        "displacement": drop * travel,
+        "loss": (excess * (8 * travel * unit)).positive_part() if in_order else None,
+    }
+
+
+# Claims -------------------------------------------------------------------------------------------
+
+KEYS = ("format", "scene", "prescribed", "sha256", "argument", "pressed", "sheared", "claims")
+WEAKER = {"global": "local", "local": "local", "proved": "proved for one step"}
+
+
+def prove(document: Any, tell: Tell) -> dict[str, Any]:
+    """All that is proved: words, and intervals of what can be claimed within bounds."""
+    form, given, prescribed, named, argument, pressed, sheared, _ = table(document, *KEYS)
+    if form != FORMAT:
+        raise Unreadable(f"expected the format {FORMAT!r}")
+    if named != digest(given, prescribed):
+        raise Refused("the sha256 is not that of this scene and what is prescribed")
+    scene, load, top = read_scene(given), None, None
+    *convexity, ceiling = table(argument, "box", "convexity_number", "shells", "ceiling")
+    if isinstance(prescribed, dict) and "load" in prescribed:
+        load, top = Interval(number(*table(prescribed, "load")) / scene.modulus), number(ceiling)
+    elif [*table(prescribed, "approach")] != table(pressed, "radii", "approach")[1]:
+        raise Refused("the approach is not the one prescribed")
+    elif ceiling is not None:
+        raise Unreadable("there is no ceiling under a prescribed approach")
+    box = read_box(scene, convexity, tell)
+    state = prove_state(scene, box, pressed, load, tell)
+    ordered = ordered_fall(scene, box, state, tell) if listed(sheared) else Fraction(0)
+    return {
+        "scope": scope(scene, box, state, top),
+        "approach": state.approach,
+        "load": state.total * scene.modulus,
+        "status": [word(depth, "contact", "open") for depth in state.depths],
+        "loads": [load * scene.modulus for load in state.loads],
+        "gaps": [gap_of(depth) for depth in state.depths],
+        "shear": [prove_shear(scene, box, state, ordered, entry, tell) for entry in sheared],
+    }
 
 
 def gap_of(depth: Interval) -> Interval:
@@ -411,81 +570,6 @@ def word(depth: Interval, positive: str, negative: str) -> str:
     return positive if depth.low > 0 else negative if depth.high < 0 else "undecided"
 
 
-def loss_of(pressed: Interval, held: Interval) -> Interval:
-    """Of partial slip in a cycle, over 4 P c_t f^2: (6/5) delta e, from depths at P and P - Q/f."""
-    stuck = (held.positive_part() / pressed).root() if pressed.low > 0 else Interval(0, 1)
-    slipped = (Interval(1) - stuck).positive_part()
-    e = slipped * slipped * slipped * (stuck * stuck + stuck * 3 + 1) / 6
-    return pressed.positive_part() * e * Fraction(6, 5)
-
-
-# Claims -------------------------------------------------------------------------------------------
-
-KEYS = ("format", "scene", "prescribed", "sha256", "argument", "pressed", "sheared", "claims")
-
-
-def prove(document: Any, tell: Tell) -> dict[str, Any]:
-    """All that is proved: words, and intervals of what can be claimed within bounds."""
-    form, given, prescribed, named, argument, pressed, sheared, _ = table(document, *KEYS)
-    if form != FORMAT:
-        raise Unreadable(f"expected the format {FORMAT!r}")
-    if named != digest(given, prescribed):
-        raise Refused("the sha256 is not that of this scene and what is prescribed")
-    scene, load = read_scene(given), None
-    radii, approach = table(pressed, "radii", "approach")
-    if isinstance(prescribed, dict) and "load" in prescribed:
-        load = Interval(number(*table(prescribed, "load")) / scene.modulus)
-    elif number(*table(prescribed, "approach")) != number(approach):
-        raise Refused("the approach is not the one prescribed")
-    n = len(scene.points)
-    box = read_box(scene, argument, tell)
-    state = prove_state(scene, box, numbers(radii, n), number(approach), load, tell)
-    loads = [load_of(scene, i, depth) for i, depth in enumerate(state.depths)]
-    total = load or sum(loads, Interval(0))
-    return {
-        "scope": scope(scene, box, state, load),
-        "approach": state.approach,
-        "load": total * scene.modulus,
-        "status": [word(depth, "contact", "open") for depth in state.depths],
-        "loads": [load * scene.modulus for load in loads],
-        "gaps": [gap_of(depth) for depth in state.depths],
-        "shear": [prove_shear(scene, box, state, total, entry, tell) for entry in listed(sheared)],
-    }
-
-
-def prove_shear(
-    scene: Scene, box: Box, pressed: State, total: Interval, entry: Any, tell: Tell
-) -> dict[str, Any]:
-    """A friction state: the difference of two pressed ones (9)."""
-    force, radii, approach = table(entry, "force", "radii", "approach")
-    f, n = scene.friction, len(pressed.depths)
-    if number(force) <= 0 or f <= 0:
-        raise Refused("a shear force or the coefficient of friction is not positive")
-    left = total - number(force) / (f * scene.modulus)
-    if left.low <= 0:
-        raise Refused("a shear force is not proved to be below what friction can carry")
-    held = prove_state(scene, box, numbers(radii, n), number(approach), left, tell)
-    mindlin = f * (2 - scene.ratio) / (2 * (1 - scene.ratio))
-    words, forces, slips, energy = list[str](), list[Interval](), list[Interval](), Interval(0)
-    for i, (at, after) in enumerate(zip(pressed.depths, held.depths, strict=True)):
-        load, rest = load_of(scene, i, at), load_of(scene, i, after)
-        if rest.high > load.low and after.high > 0:
-            raise Refused(f"asperity {i} may be dragged along by the others, against the theorem")
-        touches = word(at, "contact", "open")
-        words.append(word(after, "partial", "sliding") if touches == "contact" else touches)
-        forces.append((load - rest) * (f * scene.modulus))
-        slips.append(gap_of(after) * mindlin if at.high > 0 else Interval(0))
-        energy += load * (loss_of(at, after) * mindlin + slips[i]) * (4 * f * scene.modulus)
-    displacement = (pressed.approach - held.approach) * mindlin
-    return {
-        "status": words,
-        "forces": forces,
-        "slips": slips,
-        "displacement": displacement,
-        "energy": energy,
-    }
-
-
 def hold(what: str, claimed: Any, proved: Any) -> None:
     """Hold claims against what is proved: words and bounds, in tables and lists."""
     if isinstance(proved, dict):
@@ -494,9 +578,8 @@ def hold(what: str, claimed: Any, proved: Any) -> None:
     elif isinstance(proved, list):
         for i, claim in enumerate(listed(claimed, len(proved))):
             hold(f"{what} [{i}]", claim, proved[i])
-    elif isinstance(proved, str):
-        weaker = {"global": "local", "local": "local"}.get(proved, "undecided")
-        if claimed not in (proved, weaker):
+    elif not isinstance(proved, Interval):
+        if claimed not in (proved, WEAKER.get(proved, proved and "undecided")):
             raise Refused(f"{what}: claimed {str(claimed)[:20]!r}, proved {proved!r}")
     else:
         low, high = numbers(claimed, 2)
@@ -517,18 +600,15 @@ def sentence(document: Any) -> str:
         f"{counted(claims, 'contact', 'open')}, loads known to {known:g} of the largest",
     ]
     for entry, claim in zip(document["sheared"], claims["shear"], strict=True):
-        low, high = map(float.fromhex, claim["energy"])
-        lines.append(
-            f"under the shear force {float.fromhex(entry['force']):.10g}: "
-            f"{counted(claim, 'sliding', 'partial')}, a cycle loses {outwards(low, high)}"
-        )
+        lost = "no loss is proved"
+        if claim["loss"] is not None:
+            low, high = map(float.fromhex, claim["loss"])  # ten digits, rounded outwards
+            down, up = (Context(10, rounding) for rounding in (ROUND_FLOOR, ROUND_CEILING))
+            lost = f"a cycle loses {down.create_decimal(low):g} to {up.create_decimal(high):g}"
+        force = f"under the shear force {float.fromhex(entry['force']):.10g}"
+        counts = counted(claim, "sliding", "partial")
+        lines.append(f"{force} ({claim['order']}): {counts}, {lost}")
     return "\n  ".join([*lines, f"scene {document['sha256'][:12]}"])
-
-
-def outwards(low: float, high: float) -> str:
-    """Ten digits of each, rounded away from the other: bounds still."""
-    down, up = (Context(10, rounding) for rounding in (ROUND_FLOOR, ROUND_CEILING))
-    return f"{down.create_decimal(low):g} to {up.create_decimal(high):g}"
 
 
 def counted(claims: Any, *words: str) -> str:

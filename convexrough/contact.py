@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from convexrough import checks, solvers
-from convexrough.arrays import Array, frozen
+from convexrough import checks, solvers, threads
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.convex.newton_step import correct
 from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
@@ -19,19 +21,23 @@ from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
 from convexrough.kept import Keeper
-from convexrough.normal.certificate import Certificate, judge
+from convexrough.normal.certificate import Certificate, certificate_of, certify_on
+from convexrough.normal.level import Level, Levels
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.proved import Obstacle, proved
+from convexrough.normal.refine import refined_loads, refines
 from convexrough.normal.units import Units
+from convexrough.numbers.balls import Ball
 from convexrough.progress import Announce
-from convexrough.record import Along, Table
+from convexrough.record import LINE, Along, Table
+from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
 
 if TYPE_CHECKING:
-    from convexrough.gradients.adjoint import Holding
     from convexrough.gradients.change import ContactChange, Direction
-    from convexrough.gradients.gradient import Gradient
+    from convexrough.gradients.gradient import Gradient, Holding
     from convexrough.proof import Proof, Sheared
 
 
@@ -48,6 +54,8 @@ class Contact(Keeper, Table, Drawn):
         pressure as a point force, to leading order: max sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i
         over the loaded asperities
     crowding      : largest (a_i + a_j) / r_ij; above 1 contact discs overlap and the model fails
+    covered       : how many open summits lie under the contact disc of a neighbour, where a point
+        force does not stand for its pressure
     influence     : how the candidates were coupled: "dense", "lattice" or "scattered"
     seconds       : [s] that `press` took, or `solve`
 
@@ -69,6 +77,7 @@ class Contact(Keeper, Table, Drawn):
     certificate: Certificate
     model_error: float
     crowding: float
+    covered: int
     candidates: int
     influence: Kind
     solver: str
@@ -86,6 +95,21 @@ class Contact(Keeper, Table, Drawn):
         """(n,) "contact", "open" or "undecided"; each of the first two is proved."""
         return self.certificate.status
 
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know before relying on these loads: no proof, crowding, few contacts, yield.
+
+        >>> contact.warnings
+        ()
+        """
+        from convexrough.plausibility import warnings_of  # a floor above: when asked
+
+        return tuple(warnings_of(self))
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield from super()._rows()
+        yield from (("warning", each[:LINE]) for each in self.warnings)
+
     def proof(self, *, sheared: Sequence[Sheared] = (), announce: Announce | None = None) -> Proof:
         """A proof that `convexrough check` and anybody's checker can judge: `.save(path)` it.
 
@@ -95,15 +119,21 @@ class Contact(Keeper, Table, Drawn):
         Raises InputError for scenes too large for exact arithmetic, ProofError where nothing is
         proved.
         """
-        from convexrough.proof import prove  # it reads and writes: only when asked
+        from convexrough.proof import Near, prove, refuse_many  # it reads and writes: when asked
 
-        by_load = self.prescribed_load is not None
+        refuse_many(self.scene)
+        by_load, n = self.prescribed_load is not None, len(self.scene)
+        levels, held = self.keep(levels_of), []
+        for state in sheared:
+            drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
+            level = levels.below(Ball.exact(drop / Fraction(levels.problem.units.force)))
+            held.append((state.force, Near.of(level, n)))
         return prove(
             self.scene,
-            self.loads,
+            Near.of(levels.top, n),
             approach=None if by_load else self.approach,
             load=self.prescribed_load,
-            sheared=sheared,
+            sheared=held,
             announce=announce,
         )
 
@@ -115,14 +145,12 @@ class Contact(Keeper, Table, Drawn):
         approach: float | None = None,
         load: float | None = None,
         holding: Holding | None = None,
-        tolerance: float = 1e-9,
     ) -> Gradient:
         """Derivatives of a weighted sum of results with respect to the scene: one linear system.
 
         loads, gaps    : (n,) weights on them;  approach, load : weights on the approach and the
             total load. At least one is needed
         holding        : "load" or "approach": which of the two is held; default what was prescribed
-        tolerance      : of linear systems that are not solved by matrices, relative
 
         Raises InputError where no asperity is loaded, and SolverError where the state has no
         derivative because the energy is not convex there.
@@ -139,19 +167,18 @@ class Contact(Keeper, Table, Drawn):
             approach=approach,
             load=load,
             holding=holding,
-            tolerance=tolerance,
         )
 
-    def change(self, direction: Direction, *, tolerance: float = 1e-9) -> ContactChange:
+    def change(self, direction: Direction) -> ContactChange:
         """How loads, gaps and the approach change, to first order, when the scene does.
 
-        direction : of what, by how much;  tolerance : as in `gradient`
+        direction : of what, by how much
 
         Raises InputError and SolverError as `gradient`.
         """
         from convexrough.gradients.change import contact_change  # a floor above: when asked
 
-        return contact_change(self, direction, tolerance=tolerance)
+        return contact_change(self, direction)
 
     @property
     def mean_pressures(self) -> Array:
@@ -202,6 +229,34 @@ def solve(
     return _contact(problem, solvers.named(solver), start, announce, time.perf_counter())
 
 
+def levels_of(contact: Contact) -> Levels:
+    """The normal solutions of a contact's scene at loads up to its own.
+
+    `contact.keep(levels_of)` gives the same ones each time.
+    """
+    scene, load = contact.scene, contact.prescribed_load
+    approach = contact.approach if load is None else None
+    problem = NormalProblem.assemble(
+        scene, approach=approach, load=load, influence=contact.influence
+    )
+    state = refined_loads(problem, contact.loads[problem.candidates] / problem.units.force)
+    found = proved(problem, state)
+    if isinstance(found, Obstacle):
+        total = Ball.exact(state.loads).sum() if problem.load is None else problem.total
+        top = Level.unproved(problem, state, total)
+    else:
+        top = Level.of(found, found.total if problem.load is None else problem.total)
+    solver = solvers.named(contact.solver)
+
+    def pressed(at_load: NormalProblem) -> Array:
+        try:
+            return solver.solve(at_load).loads
+        except SolverError:  # crowded contacts: begin at the loads that are known
+            return solver.solve(at_load, state.loads.high).loads
+
+    return Levels(top, pressed)
+
+
 def _contact(
     problem: NormalProblem,
     solver: Solver,
@@ -210,32 +265,40 @@ def _contact(
     began: float,
 ) -> Contact:
     scene = problem.scene
-    force, length = problem.units.force, problem.units.length
+    force = problem.units.force
     first = None
     if start is not None:
         given = checks.array("start", start, length=len(scene), sign="not negative")
         first = given[problem.candidates] / force
-    if len(problem) == 0:  # too small an approach for anything to touch
-        solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
-    else:
-        solution = _solved(solver, problem, first, announce)
-    loads = frozen(problem.to_scene(solution.loads * force))
-    radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
-    if announce is not None:
-        announce("certifying")
-    certificate = judge(problem, loads, solution.displaced)
-    if not abs(solution.approach * length - certificate.approach) <= certificate.approach_error:
-        solution = replace(solution, approach=certificate.approach / length)
-    model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
+    with threads.one_where(4 * len(problem)):
+        if len(problem) == 0:  # too small an approach for anything to touch
+            solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
+        else:
+            solution = _solved(solver, problem, first, announce)
+        if announce is not None:
+            announce("certifying")
+        if solution.refine and len(problem) and refines(problem):
+            state = solution.trial
+            if state is None or not np.array_equal(state.loads.high, solution.loads):
+                state = refined_loads(problem, solution.loads)
+            solution = replace(solution, loads=state.loads.high)
+            loads = frozen(problem.to_scene(solution.loads * force))
+            certificate = certificate_of(problem, loads, state, proved(problem, state))
+        else:
+            loads = frozen(problem.to_scene(solution.loads * force))
+            certificate = certify_on(problem, loads)
+        radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
+        model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
     return Contact(
         scene=scene,
         loads=loads,
         contact_radii=frozen(radii),
-        approach=solution.approach * length,
+        approach=certificate.approach,
         load=float(loads.sum()),
         certificate=certificate,
         model_error=model_error,
         crowding=crowding,
+        covered=_covered(scene, radii),
         candidates=len(problem),
         influence=problem.influence.name,
         solver=solver.name,
@@ -279,6 +342,19 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
     return float((moved / prescribed[touching]).max()), A.crowding(a)
 
 
+def _covered(scene: Scene, radii: Array) -> int:
+    """How many open summits lie under a disc of one of these radii (n,) [length]."""
+    discs, summits = np.flatnonzero(radii), np.flatnonzero(radii == 0)
+    nearest = 0.0 if scene.lattice is None else scene.lattice.spacing
+    if len(discs) == 0 or len(summits) == 0 or float(radii.max()) < 0.99 * nearest:
+        return 0
+    from scipy.spatial import cKDTree  # 0.1 s to import: only where discs may be that wide
+
+    points = scene.contact_points
+    under = cKDTree(points[summits]).query_ball_point(points[discs], radii[discs])
+    return len({int(i) for each in under for i in each})
+
+
 def closest_changes(contact: Contact) -> Array:
     """(n,) [force] what loads would gain, to first order, in the geometry "closest"; 0 in that.
 
@@ -287,25 +363,37 @@ def closest_changes(contact: Contact) -> Array:
 
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,     at the same approach,
 
-    with H = (2/3) indentation / P the local part of the Hessian.
+    with H = (2/3) indentation / P the local part of the Hessian; along x and y where the base has
+    a radius for each.
     """
     scene, touching = contact.scene, np.flatnonzero(contact.loads)
     gains = np.zeros(len(scene))
     if scene.geometry == "closest" or len(touching) == 0:
         return frozen(gains)
     k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii[touching])
-    loads, R, rho = (
-        contact.loads[touching],
-        scene.sphere_radius,
-        scene.asperities.tip_radii[touching],
-    )
+    loads, rho = contact.loads[touching], scene.asperities.tip_radii[touching]
     indentations = hertz.indentation(loads, k)
     units = Units.of(float(indentations.max()), float(np.median(k)))
     scale = units.force / units.length / (np.pi * scene.material.contact_modulus)
     A = couple(scene, touching, scale, contact.influence)
     slopes = 1.5 * (loads / units.force) / (indentations / units.length)
-    rise = scene.asperities.distances[touching] ** 2 * rho / (2.0 * R * (R + rho)) / units.length
-    deeper = rise - rho / R * A.apply(loads / units.force)
+    rise = np.zeros(len(touching))
+    for R, axes in scene.curved:
+        squares = (scene.asperities.positions[touching, axes] ** 2).sum(axis=1)
+        rise += squares * rho / (2.0 * R * (R + rho)) / units.length
+    deeper = rise - _nearer(scene, touching, A, loads / units.force)
     change = correct(A, shells(A), np.sqrt(slopes), -deeper, balanced=False, tolerance=1e-3)
     gains[touching] = slopes * change * units.force
     return frozen(gains)
+
+
+def _nearer(scene: Scene, touching: Indices, A: Influence, loads: Array) -> Array:
+    """(n,) what displacements gain where points move inwards by rho / R of their place."""
+    rho, radii = scene.asperities.tip_radii[touching], along(scene.sphere_radius)
+    if radii[0] == radii[1]:
+        return np.asarray(rho / radii[0] * A.apply(loads))
+    moved = -scene.asperities.positions[touching] * rho[:, None] / np.array(radii)
+    gained = (moved * A.slopes(loads)).sum(axis=1)
+    for k in (0, 1):
+        gained -= A.slopes(moved[:, k] * loads)[:, k]
+    return np.asarray(gained)

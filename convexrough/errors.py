@@ -92,15 +92,20 @@ class ProofError(ConvexroughError):
     """Nothing could be proved; the message says why."""
 
 
+#: What extras hold, where that is not what they are called.
+PACKAGES = {"parquet": "pyarrow", "dask": "'dask[dataframe]' distributed"}
+
+
 class ExtraError(ConvexroughError, ImportError):
     """A package that is not among the requirements is missing; the message says what to install.
 
-    extra : its name, which is that of the extra to install
+    extra : the name of the extra that holds it
     """
 
     def __init__(self, extra: str) -> None:
         self.extra = extra
-        super().__init__(f"needs {extra}: pip install 'convexrough[{extra}]'")
+        packages = PACKAGES.get(extra, extra)
+        super().__init__(f"needs {packages.split()[-1]}: pip install {packages}")
 
 
 class WorkerError(ConvexroughError):

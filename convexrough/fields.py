@@ -15,7 +15,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.shearing.state import ShearState
+from convexrough.friction.shear import ShearState
 from convexrough.sphere import hertz, surface_shear
 
 #: Pairs of a point and an asperity evaluated at a time: what stays in a cache.

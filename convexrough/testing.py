@@ -14,12 +14,12 @@ from convexrough.arrays import Indices
 from convexrough.compare import Answer, contradictions, listed
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.friction.shear import ShearCertificate
+from convexrough.friction.verdict import verify_shear
 from convexrough.normal.certificate import Certificate, certify
 from convexrough.normal.claims import Claim
 from convexrough.scene.scene import Scene
-from convexrough.shearing.certificate import ShearCertificate
-from convexrough.shearing.verdict import verify_shear
-from convexrough.verdict import verify
+from convexrough.verdict import Verdict, verify
 
 
 def assert_certified(
@@ -39,6 +39,7 @@ def assert_certified(
         it the loads need only be good enough for the words
     floor  : [force] a load up to this claims that its asperity is open
     """
+    __tracebackhide__ = True
     verdict = verify(scene, loads, approach=approach, load=load, within=within, floor=floor)
     if len(verdict.undecided) == len(scene):
         _check_proof(verdict.certificate)
@@ -61,6 +62,7 @@ def assert_shear_certified(
     within  : also, no force is further from the solution than this part of the largest
     sliding : (n,) who is claimed to slide; default: those whose force is f P to 1e-4 of it
     """
+    __tracebackhide__ = True
     verdict = verify_shear(contact, forces, force=force, within=within, sliding=sliding)
     _check(verdict, "force", contact.scene)
     return verdict.certificate
@@ -85,6 +87,7 @@ def assert_agree(
     They exclude each other where loads, gaps or approaches are further apart than the sum of their
     proved bounds, or where one proves that an asperity touches and the other that it is open.
     """
+    __tracebackhide__ = True
     answers = [
         _answer(name, given, scene, approach, load)
         for name, given in (("first", first), ("second", second))
@@ -129,6 +132,7 @@ def _answer(
 
 
 def _check_proof(certificate: Certificate, whose: str = "") -> None:
+    __tracebackhide__ = True
     if certificate.scope == "none":
         raise AssertionError(
             f"nothing is proved of the loads{whose}: they are too far from a solution, or the "
@@ -139,8 +143,15 @@ def _check_proof(certificate: Certificate, whose: str = "") -> None:
 
 def _check(claim: Claim, name: str, scene: Scene) -> None:
     """Raise AssertionError unless the claim holds; `name` is what its numbers are called."""
+    __tracebackhide__ = True
     if claim.holds:
         return
+    hints = claim.hints() if isinstance(claim, Verdict) else ()
+    raise AssertionError("\n".join([_wrong(claim, name, scene), *(f"hint: {h}" for h in hints)]))
+
+
+def _wrong(claim: Claim, name: str, scene: Scene) -> str:
+    """What keeps a claim from holding."""
 
     def described(which: Indices) -> str:
         return _described(claim, name, scene, which)
@@ -149,18 +160,16 @@ def _check(claim: Claim, name: str, scene: Scene) -> None:
         first = claim.suspects[np.isin(claim.suspects, wrong)]
         named = np.append(first, np.setdiff1d(wrong, first))
         kinds = ", ".join(f"{len(who)} {what}" for what, who in claim.wrong.items() if len(who))
-        raise AssertionError(f"{kinds}: {described(named)}")
+        return f"{kinds}: {described(named)}"
     if len(doubtful := claim.undecided):
         count = f"{len(doubtful)} of {len(scene)} asperities are undecided"
-        raise AssertionError(f"{count}: {described(doubtful)}")
+        return f"{count}: {described(doubtful)}"
     if not claim.near_enough:
         worst = claim.suspects if len(claim.suspects) else claim.off
         bound = f"{name}s are proved to {claim.error:.2g} of the largest"
         needed = "enough for every word" if claim.within is None else f"{claim.within:g}"
-        raise AssertionError(f"{bound}, expected {needed}: {described(worst)}")
-    raise AssertionError(
-        f"{name}s add up to {claim.total_given:.17g}, expected {claim.total_prescribed:.17g}"
-    )
+        return f"{bound}, expected {needed}: {described(worst)}"
+    return f"{name}s add up to {claim.total_given:.17g}, expected {claim.total_prescribed:.17g}"
 
 
 def _described(claim: Claim, name: str, scene: Scene, which: Indices) -> str:

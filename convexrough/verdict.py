@@ -10,6 +10,8 @@ the same for shear forces.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -23,11 +25,20 @@ from convexrough.contact import Contact, solve
 from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.coupling import Kind
-from convexrough.normal.certificate import Certificate, judge
+from convexrough.normal.certificate import Certificate, certify_on
 from convexrough.normal.claims import Claim
 from convexrough.normal.problem import NormalProblem
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
+
+#: A load so small beside the largest is taken for noise, in hints only.
+NOISE = 1e-6
+
+#: Distances in parts of the array that are none; and what is left of errors that are mended.
+SAME_PLACE, MENDED = 1e-9, 1e-3
+
+#: How a force is called that is 10 to this power too large.
+PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,6 +108,60 @@ class Verdict(Claim, Table, Drawn):
         found = self.solution
         return None if found is None else (found.loads, found.certificate.load_errors)
 
+    def hints(self, force_unit: str = "N") -> Iterator[str]:
+        """What loads that are wrong may come from."""
+        small = self.loads[self.wrongly_loaded]
+        if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
+            yield (
+                f"{len(small):,} of the loads, on asperities proved open, are at most {noise:.2g}, "
+                f"{noise / self.largest:.1g} of the largest: --floor {rounded_up(noise)} counts "
+                "them as open"
+            )
+        expected = self.total_prescribed
+        if expected is None and self.solution is not None:
+            expected = self.solution.load
+        if expected and (power := power_of_ten(self.total_given / expected)):
+            prefix = PREFIXES.get(power)
+            example = f", as {prefix}{force_unit} for {force_unit}" if prefix else ""
+            yield f"the loads are 10^{power} times what they should be: another unit{example}?"
+        if self.solution is not None and (moved := self._moved(self.solution.loads)):
+            yield f"the loads are right with {moved}"
+
+    def _moved(self, true: Array) -> str:
+        """What exchange of asperities, that leaves the array as it is, makes the loads right."""
+        from scipy.spatial import cKDTree  # 0.1 s to import: only when loads are wrong
+
+        points = self.scene.asperities.positions
+        tree, size = cKDTree(points), float(np.abs(points).max())
+        for said, moved in (
+            ("x and y exchanged", points[:, ::-1]),
+            ("the other sign of x", points * [-1, 1]),
+            ("the other sign of y", points * [1, -1]),
+            ("the other sign of x and y", -points),
+        ):
+            distances, partners = map(np.asarray, tree.query(moved))
+            off = np.abs(self.loads[partners] - true).max()
+            if (
+                distances.max() <= SAME_PLACE * size
+                and off <= MENDED * np.abs(self.loads - true).max()
+            ):
+                return said
+        return ""
+
+
+def rounded_up(value: float) -> str:
+    """One digit, not below the value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return f"{math.ceil(value / power * (1 - 1e-12)) * power:.0e}"
+
+
+def power_of_ten(ratio: float) -> int:
+    """The power of ten that a ratio is to 1 %; 0 where it is none."""
+    if not (ratio > 0 and math.isfinite(ratio)):
+        return 0
+    exact = math.log10(ratio)
+    return round(exact) if abs(exact - round(exact)) < 0.005 else 0
+
 
 def verify(
     scene: Scene,
@@ -125,6 +190,7 @@ def verify(
     >>> verdict.holds, verdict.wrongly_open.tolist()
     (False, [3])
     """
+    checks.instance("scene", scene, Scene)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
     return verify_on(problem, loads, within=within, floor=floor)
 
@@ -146,7 +212,7 @@ def verify_on(
         raise InputError(f"loads[{first}]", found=given[first], expected=expected)
     claimed = np.where(given > floor, given, 0.0)
     total = None if problem.load is None else problem.load * problem.units.force
-    certificate = judge(problem, claimed)
+    certificate = certify_on(problem, claimed)
     verdict = Verdict(problem.scene, given, floor, within, total, certificate)
     if verdict.holds:
         return verdict

@@ -4,6 +4,8 @@ Those of performance.md show what was measured, so `convexrough bench --page doc
 draws them with its tables.
 """
 
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 from runpy import run_path
 
@@ -16,9 +18,17 @@ from convexrough.paper.figures import paper_figures
 FOLDER = Path(__file__).parent / "figures"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
+#: Of the paper's example: names of files, and what its figures are called. The first is also at the
+#: top of the README.
+PAPER = {"pressure": "fig3_pressure"} | {
+    name: name
+    for name in ("fig4_rings", "fig5_traction", "fig6_section", "fig7_asperities", "fig8_loops",
+                 "fig9_energy")
+}  # fmt: skip
+
 
 def once_differentiable() -> Figure:
-    """Load, slope and curvature of a sphere that makes contact: of theory/why-gradients-...md."""
+    """Load, slope and curvature of a sphere that makes contact: of theory/gradients.md."""
     figure = Figure(figsize=(7.0, 2.4), layout="constrained")
     delta = np.linspace(-1.0, 1.0, 801)
     pressed = np.maximum(delta, 0.0)
@@ -35,18 +45,22 @@ def once_differentiable() -> Figure:
     return figure
 
 
-def main() -> None:
-    figures = paper_figures(example.findings().contact)
-    figures["pressure"] = figures.pop("fig3_pressure")  # also at the top of the README
-    figures["once-differentiable"] = once_differentiable()
-    for name, figure in figures.items():
-        path = FOLDER / f"{name}.png"
-        figure.savefig(path, dpi=150)
-        print(path)
-    example_of_design = run_path(str(EXAMPLES / "design_a_damper.py"))
-    example_of_design["draw"](str(FOLDER / "design.png"))
-    example_of_design["draw"](str(FOLDER / "design-fine.png"), 4)
+def drawings() -> dict[str, Callable[[Path], object]]:
+    """What draws each file, by its name: given the path to write."""
+    paper = cache(lambda: paper_figures(example.findings().contact))
+    design = cache(lambda: run_path(str(EXAMPLES / "design_a_damper.py"))["draw"])
+    return {f"{name}.png": partial(_save, paper, stem) for name, stem in PAPER.items()} | {
+        "once-differentiable.png": lambda path: once_differentiable().savefig(path, dpi=150),
+        "design.png": lambda path: design()(str(path)),
+        "design-fine.png": lambda path: design()(str(path), 4),
+    }
+
+
+def _save(figures: Callable[[], dict[str, Figure]], stem: str, path: Path) -> None:
+    figures()[stem].savefig(path, dpi=150)
 
 
 if __name__ == "__main__":
-    main()
+    for name, draw in drawings().items():
+        draw(FOLDER / name)
+        print(FOLDER / name)

@@ -36,7 +36,7 @@ def curve(parameters: Array) -> tuple[Array, Array]:
     tip, spacing = np.exp(parameters)
     asperities = cr.Asperities.hexagonal(spacing=SPACING, tip_radius=tip, within=0.0125)
     stretched = cr.Asperities(asperities.positions * (spacing / SPACING), asperities.tip_radii)
-    scene = cr.Scene(1.0, stretched, cr.Material(1.0, 0.3))
+    scene = cr.Scene(1.0, stretched, cr.Material(1.0, 0.3), geometry="summit")
     loads, slopes = [], []
     for approach in APPROACHES:
         gradient = cr.press(scene, approach=approach).gradient(load=1.0)

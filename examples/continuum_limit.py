@@ -31,7 +31,7 @@ def refined(k: float) -> cr.Scene:
         spacing=SPACING / k, tip_radius=8 * SPACING / k, within=np.sqrt(2 * RADIUS * APPROACH)
     )
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
-    return cr.Scene(RADIUS, asperities, material, friction=FRICTION)
+    return cr.Scene(RADIUS, asperities, material, friction=FRICTION, geometry="summit")
 
 
 def at_zero_spacing(values: list[float]) -> float:

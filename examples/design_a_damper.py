@@ -37,7 +37,7 @@ def scene(finer: int = 1) -> cr.Scene:
     asperities = cr.Asperities.hexagonal(
         spacing=0.0025 / finer, tip_radius=0.02 / finer, within=0.0102
     )
-    return cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), FRICTION)
+    return cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), FRICTION, geometry="summit")
 
 
 def design(sign: float, seed: int, finer: int = 1) -> tuple[Array, float, float]:

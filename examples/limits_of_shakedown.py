@@ -21,7 +21,7 @@ def compare() -> Pairs:
     """(quantity, computed, reference)."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.0)
-    scene = cr.Scene(1.0, asperities, material, friction=FRICTION)
+    scene = cr.Scene(1.0, asperities, material, friction=FRICTION, geometry="summit")
     contact = cr.press(scene, approach=5e-5)
     P, last = contact.load, 31  # an asperity of ring A, the last to touch
     swing = FRICTION * P * np.array([1.0, -1.0])
@@ -60,7 +60,7 @@ def compare() -> Pairs:
 def over_both_amplitudes() -> cr.Shakedown:
     """The same array where load and shear swing, a quarter of a cycle apart."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.0), friction=FRICTION)
+    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.0), friction=FRICTION, geometry="summit")
     P = 0.9 * cr.press(scene, approach=5e-5).load
     p, q = cr.elliptic_path(
         load=0.0, load_amplitude=0.1 * P, force_amplitude=0.2 * FRICTION * P, friction=FRICTION

@@ -66,7 +66,7 @@ def radius_of_least_gap() -> float:
     asperities, load = case.scene.asperities, float(case.exact_load)
     lower = asperities.heights - 1e-6 * np.array([1.0, 0.0, 0.0, 0.0])
     low = cr.Asperities(asperities.positions, asperities.tip_radii, lower)
-    scene = cr.Scene(case.scene.sphere_radius, low, case.scene.material)
+    scene = cr.Scene(case.scene.sphere_radius, low, case.scene.material, geometry="summit")
     found = minimize_scalar(
         lambda part: cr.press(scene, load=part * load).gaps[0] * 1e6,
         bracket=(0.8, 1.0, 1.04),

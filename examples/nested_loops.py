@@ -18,17 +18,19 @@ def compare() -> Pairs:
         spacing=0.0025, tip_radius=0.02, within=0.0126, height_std=1e-6, tip_radius_cv=0.1, seed=7
     )
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
-    contact = cr.press(cr.Scene(1.0, asperities, material, friction=0.5), approach=5e-5)
+    contact = cr.press(
+        cr.Scene(1.0, asperities, material, friction=0.5, geometry="summit"), approach=5e-5
+    )
     limit = 0.5 * contact.load
 
     plain = cr.history(contact, forces=np.array([0.6, -0.6, 0.6]) * limit)
     nested = cr.history(contact, forces=np.array([0.6, -0.2, 0.3, -0.1, 0.3, -0.6, 0.6]) * limit)
 
     # Loops inside loops: 0.3 to -0.1 and back inside -0.2 to 0.3, inside 0.6 to -0.6.
-    outer = cr.cycle(contact, maximum=0.6 * limit).energy
-    middle = cr.cycle(contact, maximum=0.3 * limit, minimum=-0.2 * limit).energy
-    inner = cr.cycle(contact, maximum=0.3 * limit, minimum=-0.1 * limit).energy
-    spent = nested.energy[-1] - nested.energy[0]
+    outer = cr.cycle(contact, maximum=0.6 * limit).loss
+    middle = cr.cycle(contact, maximum=0.3 * limit, minimum=-0.2 * limit).loss
+    inner = cr.cycle(contact, maximum=0.3 * limit, minimum=-0.1 * limit).loss
+    spent = nested.losses[-1] - nested.losses[0]
     return [
         (
             "displacement at the end, over the plain one",
@@ -37,7 +39,7 @@ def compare() -> Pairs:
         ),
         (
             "largest force difference at the end",
-            float(np.abs(nested.forces[-1] - plain.forces[-1]).max() / limit),
+            float(np.abs(nested.asperity_forces[-1] - plain.asperity_forces[-1]).max() / limit),
             0.0,
         ),
         ("energy, over the sum of the loops", float(spent / (outer + middle + inner)), 1.0),

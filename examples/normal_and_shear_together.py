@@ -22,7 +22,7 @@ RATIO = (2 - 0.3) / (2 * (1 - 0.3))  # tangential over normal compliance
 def one_sphere() -> Pairs:
     """Shear that grows twice as fast as friction, on a load that grows too."""
     asperity = cr.Asperities(positions=[[0.0, 0.0]], tip_radii=1.0)
-    scene = cr.Scene(1.0, asperity, MATERIAL, friction=FRICTION)
+    scene = cr.Scene(1.0, asperity, MATERIAL, friction=FRICTION, geometry="summit")
     first, last, shear = 1e-6, 1.4e-6, 0.8e-6  # P from, P to; T = Q / f in the end
     path = cr.load_path(scene, loads=[first, last], forces=[0.0, FRICTION * shear])
 
@@ -39,7 +39,7 @@ def one_sphere() -> Pairs:
 def rough() -> Pairs:
     """Three cycles between the same loads and the same shear forces, in different phase."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION)
+    scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION, geometry="summit")
     P = cr.press(scene, approach=4e-5).load
     p, t = 0.2 * P, 0.4 * P  # amplitudes of P and of Q / f
 
@@ -64,8 +64,8 @@ def rough() -> Pairs:
     bracket = mean(P - t, P + p) + mean(P - t, P - p) - mean(P - p, P + p) - still
     line = 4 * RATIO * FRICTION**2 * t * bracket
     return [
-        ("line in phase, loss / closed form", in_phase.energy / line, 1.0),
-        ("line that follows the load, loss", gentle.energy / in_phase.energy, 0.0),
+        ("line in phase, loss / closed form", in_phase.loss / line, 1.0),
+        ("line that follows the load, loss", gentle.loss / in_phase.loss, 0.0),
         ("quarter of a cycle behind, stuck level / P", behind.level / P, 1 - np.hypot(0.2, 0.4)),
     ]
 
@@ -73,7 +73,7 @@ def rough() -> Pairs:
 def against_phase() -> cr.PhaseLosses:
     """The same cycle at every phase, of three sizes, and the smooth sphere's beside it."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION)
+    scene = cr.Scene(1.0, asperities, MATERIAL, friction=FRICTION, geometry="summit")
     P = cr.press(scene, approach=4e-5).load
     return cr.phase_losses(
         scene,
@@ -103,7 +103,7 @@ def phases() -> Pairs:
         ("smooth sphere in step, loss / closed form", losses.smooth[whole][3] / in_step, 1.0),
         ("quarter behind, stuck level / P", losses.levels[whole][0] / P, 1 - reach[0]),
         ("30 degrees, stuck level / P", losses.levels[whole][1] / P, 1 - reach[1]),
-        ("costs more in step than 30 degrees off", float(losses.energy[10] > losses.energy[8]), 0),
+        ("costs more in step than 30 degrees off", float(losses.losses[10] > losses.losses[8]), 0),
     ]
 
 

@@ -87,7 +87,9 @@ def surface(height_std: float, tip_radius_cv: float, seed: int) -> cr.Contact:
         tip_radius_cv=tip_radius_cv,
         seed=seed,
     )
-    return cr.press(cr.Scene(1.0, asperities, cr.Material(1.0, NU), FRICTION), load=LOAD)
+    return cr.press(
+        cr.Scene(1.0, asperities, cr.Material(1.0, NU), FRICTION, geometry="summit"), load=LOAD
+    )
 
 
 def crossing_by_bisection(contact: cr.Contact) -> float:
@@ -95,7 +97,7 @@ def crossing_by_bisection(contact: cr.Contact) -> float:
 
     def beyond(amplitude: float) -> float:
         cycle = cr.cycle(contact, maximum=amplitude * FRICTION * contact.load)
-        return float(np.log(cycle.energy_normalised / cycle.smooth_normalised))
+        return float(np.log(cycle.loss_normalised / cycle.smooth_normalised))
 
     return float(brentq(beyond, 0.2, 0.9, xtol=1e-10))
 

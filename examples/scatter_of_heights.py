@@ -28,7 +28,7 @@ SMALL, LARGE = 1e-7, 1e-6  # [length] 0.2 % and 2 % of the approach
 
 def scene() -> cr.Scene:
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    return cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), FRICTION)
+    return cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), FRICTION, geometry="summit")
 
 
 def loss(heights: Array) -> cr.Cycle:
@@ -44,15 +44,15 @@ def sampled(deviation: float, samples: int) -> tuple[Array, Array]:
     slopes = equal.gradient(holding="load").heights
     rng = np.random.default_rng(0)
     heights = deviation * rng.normal(size=(samples, 61))
-    found = np.array([loss(each).energy for each in heights])
-    return found / equal.energy, 1.0 + heights @ slopes / equal.energy
+    found = np.array([loss(each).loss for each in heights])
+    return found / equal.loss, 1.0 + heights @ slopes / equal.loss
 
 
 def foretold(deviation: float) -> float:
     """The standard deviation to first order."""
     equal = loss(np.zeros(61))
     length = np.linalg.norm(equal.gradient(holding="load").heights)
-    return float(deviation * length / equal.energy)
+    return float(deviation * length / equal.loss)
 
 
 def unexplained(found: Array, first_order: Array) -> float:

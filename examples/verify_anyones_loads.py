@@ -17,7 +17,7 @@ def compare() -> Pairs:
     asperities = cr.Asperities.hexagonal(
         spacing=25e-6, tip_radius=2e-4, within=126e-6, height_std=1e-8, seed=1
     )
-    scene = cr.Scene(0.01, asperities, material)
+    scene = cr.Scene(0.01, asperities, material, geometry="summit")
     contact = cr.press(scene, approach=0.5e-6)
 
     # Six digits: every word can still be proved, and the bound is of the size of the rounding.

@@ -1,9 +1,12 @@
 """What every test may ask for, and how random scenes are drawn.
 
-Random scenes are new on every run by hand, and the same ones in continuous integration.
+Random scenes are new on every run by hand, and the same ones in continuous integration. Of a test
+marked `sample(n)` only n of its cases run, drawn anew each time; `--full` runs all of them.
 """
 
 import os
+import random
+from collections import defaultdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,7 +35,41 @@ if os.environ.get("CI"):
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--full", action="store_true", help="10,000 scenes audited, 60 sweeps killed")
+    parser.addoption("--full", action="store_true", help="long audits and samples run whole")
+    parser.addoption("--seed", type=int, help="what samples are drawn by; a new one if not given")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The seed is drawn once: processes of pytest-xdist inherit it from the first."""
+    config.addinivalue_line("markers", "sample(n): so many cases of a test, drawn anew each time")
+    if config.option.seed is None:
+        drawn = str(random.SystemRandom().randrange(10**6))
+        config.option.seed = int(os.environ.setdefault("CONVEXROUGH_SAMPLES", drawn))
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    if not config.option.full:
+        terminalreporter.write_line(f"samples were drawn by --seed {config.option.seed}")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the cases that are not drawn."""
+    if config.option.full:
+        return
+    cases: dict[str, list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("sample"):
+            cases[item.nodeid.partition("[")[0]].append(item)
+    left_out: set[pytest.Item] = set()
+    for test, found in cases.items():
+        marker = found[0].get_closest_marker("sample")
+        assert marker is not None
+        many = min(marker.args[0], len(found))
+        drawn = random.Random(f"{config.option.seed} {test}").sample(found, many)
+        left_out |= set(found) - set(drawn)
+    config.hook.pytest_deselected(items=[item for item in items if item in left_out])
+    items[:] = [item for item in items if item not in left_out]
 
 
 class Outcome(NamedTuple):

@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from flint import arb, ctx
 from numpy.testing import assert_allclose
-from scenes import NAMED, solve_exactly
+from scenes import NAMED
 
 import convexrough as cr
 from convexrough import FrictionConic, VectorShearState, shear_vector
@@ -51,56 +51,6 @@ def in_doubt(contact: cr.Contact, digits: int, control: str) -> cr.Contact:
 def with_friction(scene: cr.Scene, friction: float = FRICTION, nu: float = 0.3) -> cr.Scene:
     material = cr.Material(scene.material.contact_modulus, nu)
     return cr.Scene(scene.sphere_radius, scene.asperities, material, friction, scene.geometry)
-
-
-class Exact(NamedTuple):
-    """A friction state in 80 digits; lists of arb."""
-
-    forces: list[Any]
-    displacement: Any
-    slips: list[Any]
-    energy: Any  # of the cycle between +-Q
-    loads: list[Any]
-
-
-@cache
-def exact(name: str, fraction: float, control: str = "approach") -> Exact:
-    """Ciavarella-Jaeger by definition: Q_i = f (P_i - p_i(L)), L = P - Q / f, by the normal oracle.
-
-    Nothing of the increment form is used. The differences lose digits as Q -> 0: 80 can afford it.
-    """
-    contact = pressed(name)
-    scene, E, nu = contact.scene, arb(contact.scene.material.contact_modulus), arb(0.3)
-    with ctx.workdps(DIGITS + 30):
-        f, force = arb(FRICTION), arb(fraction * FRICTION * contact.load)
-        given = {control: getattr(contact, control)}
-        full = solve_exactly(scene, **given, digits=DIGITS, start=contact.loads)
-        near = cr.press(scene, load=(1 - fraction) * contact.load).loads
-        left = (full.load - force / f).mid()
-        reduced = solve_exactly(scene, load=left, digits=DIGITS, start=near)
-        travel = f * (2 - nu) / (2 * (1 - nu))
-        forces = [f * (a - b) for a, b in zip(full.loads, reduced.loads, strict=True)]
-        slips = [
-            travel * gap if load > 0 else arb(0)
-            for load, gap in zip(full.loads, reduced.gaps, strict=True)
-        ]
-        energy = arb(0)
-        rho = scene.asperities.tip_radii
-        for i, (load, q, slip) in enumerate(zip(full.loads, forces, slips, strict=True)):
-            if load > 0:
-                t = q / (f * load)
-                left = 1 - t if not slip > 0 else arb(0)
-                e = 1 - root(left) ** 5 - 5 * t / 6 * (1 + root(left) ** 2)
-                R = 1 / (1 / arb(scene.sphere_radius) + 1 / arb(float(rho[i])))
-                a = (3 * load * R / (4 * E)).root(3)
-                G = E * (1 - nu)
-                energy += 9 * (2 - nu) * f * f * load * load / (5 * G * a) * e + 4 * f * load * slip
-        displacement = travel * (full.approach - reduced.approach)
-        return Exact(forces, displacement, slips, energy, list(full.loads))
-
-
-def root(x: Any) -> Any:
-    return arb(0) if x == 0 else x.root(3)
 
 
 def off(value: float, true: Any) -> float:

@@ -1,4 +1,4 @@
-"""The answers of the gallery, in ball arithmetic: convexrough/gallery/answers.json is its output.
+"""The answers of the gallery, in ball arithmetic: convexrough/gallery/cases.json is its output.
 
     PYTHONPATH=tests python tests/gallery_answers.py            computes all anew and writes them
     PYTHONPATH=tests python tests/gallery_answers.py one collinear   only those
@@ -15,21 +15,21 @@ from typing import Any
 
 import numpy as np
 from flint import arb, ctx
+from gallery_recipes import FITTED, RECIPES, Recipe
 from multiprecision import NotProved
 from scenes import solve_exactly
 
 import convexrough as cr
-from convexrough.gallery import answers, cases, grazing
-from convexrough.gallery.recipe import Recipe
+from convexrough.gallery import cases
 from convexrough.sphere import hertz
 
-PATH = Path(cr.gallery.__file__).with_name(answers.DATA)
+PATH = Path(cr.gallery.__file__).with_name(cases.DATA)
 DIGITS, KEPT = 75, 50  # near Q = 0 a difference loses 12
 
 
 def tune(name: str) -> float:
     """The height with the gap, indentation or load that the name says, over approach or load."""
-    make, which = grazing.FITTED[name]
+    make, which = FITTED[name]
     _, kind, near = name.split("-", 2)
     low = make(-1.0)  # far below all others
     contact = cr.press(low.scene, approach=low.approach)
@@ -56,21 +56,34 @@ def digits(ball: arb) -> str:
         return str(ball.str(KEPT, radius=False))
 
 
-def answer(recipe: Recipe) -> dict[str, Any]:
-    """What is stored of a case, but for the height."""
-    scene = recipe.scene
+def stored(recipe: Recipe) -> dict[str, Any]:
+    """All that is stored of a case."""
+    scene, a = recipe.scene, recipe.scene.asperities
     given = {"approach": recipe.approach} if recipe.load is None else {"load": recipe.load}
     contact = cr.press(scene, **given)
     full = solve_exactly(scene, **given, start=contact.loads, digits=DIGITS)
     force = recipe.fraction * scene.friction * float(full.load.mid())
     return {
-        "sha256": answers.digest(recipe),
-        "approach": digits(full.approach),
-        "load": digits(full.load),
-        "loads": [digits(load) for load in full.loads],
-        "gaps": [digits(gap) for gap in full.gaps],
-        "shear_force": force.hex(),
-        **sheared(recipe, full, force),
+        "family": recipe.family,
+        "why": recipe.why,
+        "sphere_radius": scene.sphere_radius,
+        "contact_modulus": scene.material.contact_modulus,
+        "poisson_ratio": scene.material.poisson_ratio,
+        "friction": scene.friction,
+        "geometry": scene.geometry,
+        "positions": a.positions.tolist(),
+        "tip_radii": a.tip_radii.tolist(),
+        "heights": a.heights.tolist(),
+        "prescribed": given,
+        "shear_force": force,
+        "reversals": recipe.reversals,
+        "answer": {
+            "approach": digits(full.approach),
+            "load": digits(full.load),
+            "loads": [digits(load) for load in full.loads],
+            "gaps": [digits(gap) for gap in full.gaps],
+            **sheared(recipe, full, force),
+        },
     }
 
 
@@ -105,24 +118,24 @@ def true_words(case: cr.gallery.HardCase, words: Any) -> bool:
 
 
 def write(wanted: list[str]) -> None:
-    stored = json.loads(PATH.read_text()) if PATH.exists() else {"heights": {}, "cases": {}}
-
-    def save() -> None:
-        answers._stored.cache_clear()
-        PATH.write_text(json.dumps(stored, indent=0, sort_keys=True) + "\n")
-
+    """A line for each case. A height that is fitted is stored first, and read by its recipe."""
+    found = json.loads(PATH.read_text())
     for name in wanted:
-        if name in grazing.FITTED:
-            stored["heights"][name] = tune(name).hex()
-    save()
-    for name in wanted:
-        stored["cases"][name] = answer(cases.RECIPES[name]())
-        print(name, stored["cases"][name]["load"][:12])
-    stored["cases"] = {
-        name: stored["cases"][name] for name in stored["cases"] if name in cases.RECIPES
-    }
-    save()
+        if name in FITTED:
+            make, _ = FITTED[name]
+            heights = make(tune(name)).scene.asperities.heights.tolist()
+            found[name] = {**found[next(iter(FITTED))], **found.get(name, {}), "heights": heights}
+            _save(found)
+        found[name] = stored(RECIPES[name]())
+        print(name, found[name]["answer"]["load"][:12])
+    _save({name: found[name] for name in RECIPES})
+
+
+def _save(found: dict[str, Any]) -> None:
+    lines = [f"{json.dumps(name)}: {json.dumps(case)}" for name, case in found.items()]
+    PATH.write_text("{\n" + ",\n".join(lines) + "\n}\n")
+    cases._cases.cache_clear()
 
 
 if __name__ == "__main__":
-    write(sys.argv[1:] or list(cases.RECIPES))
+    write(sys.argv[1:] or list(RECIPES))

@@ -43,7 +43,9 @@ class Setup:
     @classmethod
     def of(cls, contact: cr.Contact, holding: str, forces: Any = ()) -> "Setup":
         scene, material = contact.scene, contact.scene.material
-        control = contact.load if holding == "load" else contact.approach
+        prescribed = contact.prescribed_load
+        load = contact.load if prescribed is None else prescribed
+        control = load if holding == "load" else contact.approach
         numbers = scene.sphere_radius, material.contact_modulus, material.poisson_ratio
         return cls(
             exact(scene.asperities.positions),
@@ -355,37 +357,38 @@ class _Starts(dict[tuple[int, int], Balls]):
         return exact(state.displacements[np.flatnonzero(self.contact.loads)] / travel)
 
 
-def assert_slopes(judge: Judge, gradient: cr.Gradient, tolerance: float, seed: int = 0) -> None:
-    """Every derivative against differences, arrays along random directions of signs.
+#: Names of the bounds on derivatives.
+ERRORS = {"heights": "height_errors", "tip_radii": "tip_radius_errors"}
+ERRORS |= {"positions": "position_errors", "forces": "force_errors", "loads": "load_errors"}
 
-    tolerance : over the largest term of each
+
+def known(gradient: cr.Gradient, name: str) -> tuple[Array, Array]:
+    """A derivative and its bound."""
+    error = ERRORS.get(name, f"{name}_error")
+    return np.asarray(getattr(gradient, name)), np.asarray(getattr(gradient, error))
+
+
+def assert_slopes(
+    judge: Judge, gradient: cr.Gradient, *, seed: int = 0, sharp: float = 0.0
+) -> None:
+    """Every derivative within its bound of differences, arrays along random signs.
+
+    sharp : what no bound may exceed of the largest derivative of its kind; 0 for any
     """
-    rng, scene = np.random.default_rng(seed), gradient.contact.scene
-    sizes = {
-        "heights": gradient.contact.approach,
-        "tip_radii": float(scene.asperities.tip_radii.min()),
-        "positions": float(np.ptp(scene.asperities.positions)) / 20,
-    }
-    for name, size in sizes.items():
-        slopes = getattr(gradient, name)
-        for _ in range(2):
-            v = rng.choice([-1.0, 1.0], size=slopes.shape) * size
-            close(judge.slope(name, exact(v)), slopes * v, tolerance, name)
-    held = gradient.load if gradient.load is not None else gradient.approach
-    for name, slope in (
-        ("sphere_radius", gradient.sphere_radius),
-        ("contact_modulus", gradient.contact_modulus),
-        ("poisson_ratio", gradient.poisson_ratio),
-        ("friction", gradient.friction),
-        ("control", held),
-    ):
-        if slope is None:  # infinite, or none
-            continue
-        size = float(getattr(judge.setup, name))
-        close(judge.slope(name, arb(size)), np.array([slope * size]), tolerance, name)
+    rng = np.random.default_rng(seed)
+    names = ["heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"]
+    names += ["poisson_ratio"] + ["friction"] * (gradient.friction is not None)
+    for name in [*names, "control"]:
+        slopes, errors = known(gradient, gradient.holding if name == "control" else name)
+        v = rng.choice([-1.0, 1.0], size=slopes.shape)
+        assert_close(judge.difference(name, exact(v)[()]), slopes * v, errors, name, sharp)
 
 
-def close(found: float, terms: Any, tolerance: float, name: str) -> None:
-    """A difference, and the terms whose sum it should be."""
-    scale = max(np.abs(terms).max(), abs(found))
-    assert abs(found - terms.sum()) <= tolerance * scale, (name, found, terms.sum(), scale)
+def assert_close(true: Balls, terms: Any, errors: Any, name: str, sharp: float = 0.0) -> None:
+    """A difference, and terms whose sum it is within their errors."""
+    with ctx.workdps(DIGITS):
+        off = float(abs(exact(terms).sum() - true))
+    # The difference itself has some 20 digits.
+    assert off <= errors.sum() + 1e-18 * abs(float(true)), (name, off, errors.sum(), float(true))
+    if sharp:
+        assert errors.max() <= sharp * np.abs(terms).max() + 1e-200, name

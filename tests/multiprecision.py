@@ -60,7 +60,7 @@ def solve(
     tip_radii: ArrayLike,
     heights: ArrayLike,
     *,
-    sphere_radius: float,
+    sphere_radius: float | tuple[float, float],
     contact_modulus: float,
     geometry: str = "summit",
     approach: float | None = None,
@@ -72,6 +72,7 @@ def solve(
 
     positions : (n, 2) [length];  tip_radii, heights : (n,) [length], taller is positive
     contact_modulus : E* = E / (2 (1 - nu^2)) [force / length^2]
+    sphere_radius : R, or one along x and one along y; inf is flat
     geometry : "summit", or "closest" for contact points at r_i R / (R + rho_i)
     approach [length] or load [force] : what is prescribed, exactly one of the two
     start : (n,) loads [force] to begin Newton at, such as an approximate solution
@@ -84,17 +85,19 @@ def solve(
         raise ValueError("prescribe either the approach or a positive load")
     by_load = load is not None
     with ctx.workdps(digits + GUARD_DIGITS):
-        radius, modulus = arb(float(sphere_radius)), arb(float(contact_modulus))
+        radii = sphere_radius if isinstance(sphere_radius, tuple) else (sphere_radius,) * 2
+        bends = np.array([ZERO if inf == R else 1 / arb(float(R)) for R in radii])
+        modulus = arb(float(contact_modulus))
         control, tips = arb(approach if load is None else load), _exact(tip_radii)
-        points, descents = _contact_points(_exact(positions), tips, radius, geometry)
+        points, descents = _contact_points(_exact(positions), tips, bends, geometry)
         shape = _exact(heights) - descents  # d_i = D_i - D0
         influence = _influence(points, modulus)
-        law = _cube_root(9 / (16 * modulus * modulus) * (1 / radius + 1 / tips))  # k_i
+        law = _cube_root(9 / (16 * modulus * modulus) * (bends.sum() / 2 + 1 / tips))  # k_i
 
         # A P >= 0, so an asperity with D_i <= 0 cannot touch: it is left out of the equations.
         able = np.full(len(shape), True) if by_load else ~(shape + control <= 0)
-        if by_load:  # u: the smooth sphere's approach, or the largest prescribed D_i
-            unit = (9 * control * control / (16 * modulus * modulus * radius)).root(3).mid()
+        if by_load:  # u: the indentation of one asperity, or the largest prescribed D_i
+            unit = (law[0] * (control * control).root(3)).mid()
         else:
             unit = max((shape + control)[able], default=ONE).mid()
         problem = NormalMap(
@@ -218,13 +221,15 @@ def relative_errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArra
         )
 
 
-def _contact_points(summits: Balls, tips: Balls, radius: arb, geometry: str) -> tuple[Balls, Balls]:
+def _contact_points(
+    summits: Balls, tips: Balls, bends: Balls, geometry: str
+) -> tuple[Balls, Balls]:
     """Where the asperities touch, (n, 2) [length], and how far below the apex, (n,) [length]."""
-    squares = (summits * summits).sum(axis=1)
     if geometry == "summit":
-        return summits, squares / (2 * radius)
-    if geometry == "closest":
-        return summits * (radius / (radius + tips))[:, None], squares / (2 * (radius + tips))
+        return summits, (summits * summits * bends).sum(axis=1) / 2
+    if geometry == "closest":  # r R / (R + rho), with 1 / R
+        points = summits / (1 + tips[:, None] * bends)
+        return points, (summits * points * bends).sum(axis=1) / 2
     raise ValueError(f'the geometry is "summit" or "closest", not {geometry!r}')
 
 

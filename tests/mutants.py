@@ -180,7 +180,9 @@ def _odd_arrays(values: Any) -> list[Any]:
 
 @cache
 def _honest_proof() -> bytes:
-    scene = cr.Scene(1.0, cr.Asperities(POINTS, 0.02), cr.Material(1.0, 0.3), friction=0.5)
+    scene = cr.Scene(
+        1.0, cr.Asperities(POINTS, 0.02), cr.Material(1.0, 0.3), friction=0.5, geometry="summit"
+    )
     contact = cr.press(scene, approach=2e-5)
     proof = contact.proof(sheared=[cr.shear(contact, force=0.1 * contact.load)])
     return json.dumps(proof.document).encode()

@@ -34,4 +34,4 @@ def shaded() -> cr.Scene:
     around = np.column_stack((np.cos(turn), np.sin(turn)))
     points = np.vstack(([0.0, 0.0], around))
     asperities = cr.Asperities(points, np.r_[0.05, np.ones(5)], np.r_[-0.06, np.zeros(5)])
-    return cr.Scene(1e6, asperities, MATERIAL, friction=0.5)
+    return cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")

@@ -1,5 +1,6 @@
 """What a proof file claims, judged by the 50-digit reference; knows nothing of the checker."""
 
+from math import inf
 from typing import Any
 
 import multiprecision
@@ -34,13 +35,14 @@ def _false_shear(
 ) -> list[str]:
     """The friction state by Ciavarella and Jaeger's theorem, and the loss of its cycle."""
     f, nu, force = (_number(x) for x in (scene["friction"], scene["poisson_ratio"], state["force"]))
-    held = _solved(scene, state["radii"], {"load": pressed.load - force / f})
+    held = _solved(scene, state["held"]["radii"], {"load": pressed.load - force / f})
     travel = f * (2 - nu) / (2 * (1 - nu))
-    modulus, radius = _number(scene["contact_modulus"]), _number(scene["sphere_radius"])
+    modulus, radii = _number(scene["contact_modulus"]), _radii(scene)
+    bend = sum((arb(0) if inf == R else 1 / arb(R) for R in radii), arb(0)) / 2
     false = _outside(
         "displacement", claim["displacement"], travel * (pressed.approach - held.approach)
     )
-    energy = arb(0)
+    loss = arb(0)
     for i, word in enumerate(claim["status"]):
         P, p = pressed.loads[i], held.loads[i]
         if p > P:
@@ -52,33 +54,47 @@ def _false_shear(
         false += _outside(f"force {i}", claim["forces"][i], f * (P - p))
         false += _outside(f"slip {i}", claim["slips"][i], slip)
         if P > 0:
-            relative = 1 / (1 / radius + 1 / _number(scene["tip_radii"][i]))
+            relative = 1 / (bend + 1 / _number(scene["tip_radii"][i]))
             ceiling = (9 * P * P / (16 * modulus * modulus * relative)).root(3)
             t = 1 - p / P
             e = 1 - (1 - t) * _cube_root(1 - t) ** 2 - 5 * t / 6 * (1 + _cube_root(1 - t) ** 2)
-            energy += arb(24) / 5 * travel * f * ceiling * P * e + 4 * f * P * slip
-    return false + _outside("energy", claim["energy"], energy)
+            loss += arb(24) / 5 * travel * f * ceiling * P * e + 4 * f * P * slip
+    if claim["loss"] is None:
+        return false
+    between = _solved(scene, state["held"]["radii"], {"load": pressed.load - force / (2 * f)})
+    for low, middle, high in zip(held.loads, between.loads, pressed.loads, strict=True):
+        if not low <= middle <= high:
+            false.append("a loss without order")
+    return false + _outside("loss", claim["loss"], loss)
+
+
+def _radii(scene: Any) -> tuple[float, float]:
+    """Along x and y."""
+    given = scene["sphere_radius"]
+    x, y = given if isinstance(given, list) else (given, given)
+    return float.fromhex(x), float.fromhex(y)
 
 
 def _cube_root(x: arb) -> arb:
     return x.root(3) if x > 0 else arb(0)
 
 
-def _solved(scene: Any, radii: list[str], control: Any) -> multiprecision.Reference:
-    x, y, heights, tips, a = (
-        np.array([float.fromhex(text) for text in values])
-        for values in (scene["x"], scene["y"], scene["heights"], scene["tip_radii"], radii)
+def _solved(scene: Any, radii: list[list[str]], control: Any) -> multiprecision.Reference:
+    x, y, heights, tips = (
+        np.array([float.fromhex(text) for text in scene[key]])
+        for key in ("x", "y", "heights", "tip_radii")
     )
-    radius, modulus = (float.fromhex(scene[key]) for key in ("sphere_radius", "contact_modulus"))
+    a = np.array([sum(map(float.fromhex, radius)) for radius in radii])
+    modulus = float.fromhex(scene["contact_modulus"])
     return multiprecision.solve(
         np.stack([x, y], axis=1),
         tips,
         heights,
-        sphere_radius=radius,
+        sphere_radius=_radii(scene),
         contact_modulus=modulus,
         geometry=scene["geometry"],
         digits=DIGITS,
-        start=4 * modulus * a**3 * (1 / radius + 1 / tips) / 3,
+        start=4 * modulus * a**3 * (sum(1 / R for R in _radii(scene)) / 2 + 1 / tips) / 3,
         **control,
     )
 

@@ -9,6 +9,7 @@ HEXAGONAL = """
 pattern = "hexagonal"
 spacing = 0.0025
 tip_radius = 0.02
+geometry = "summit"
 """
 
 

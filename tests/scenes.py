@@ -49,7 +49,9 @@ def steel(geometry: Any = "summit") -> cr.Scene:
 def twins() -> tuple[cr.Scene, float]:
     """Two equal asperities so close that both may touch, but at no least of the energy; a load."""
     points = [[-5e-5, 0.0], [5e-5, 0.0]]
-    return cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, friction=0.5), 6.6e-8
+    return cr.Scene(
+        1.0, cr.Asperities(points, 0.02), MATERIAL, friction=0.5, geometry="summit"
+    ), 6.6e-8
 
 
 #: name -> (scene, approach): every one in the convex range.

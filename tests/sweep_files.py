@@ -19,6 +19,7 @@ SMALL: dict[str, Any] = {
     "material": {"contact_modulus": 1.0, "poisson_ratio": 0.3},
     "asperities": {
         "pattern": "hexagonal", "spacing": 0.0025, "tip_radius": 0.02, "within": 0.0102,
+        "geometry": "summit",
     },
     "normal": {"load": 3e-7},
     "friction": {"coefficient": 0.5},

@@ -13,7 +13,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -24,6 +23,7 @@ import convexrough as cr
 from convexrough import plots, solvers
 from convexrough.compare import compare
 from convexrough.errors import ExtraError, SceneFileError
+from convexrough.record import Record
 
 NEW_SCENE = Path(plots.__file__).parent.parent / "run/new_scene.toml"
 
@@ -59,10 +59,10 @@ def results() -> dict[str, Any]:
         cr.verify(scene, wrong, approach=PAPER_APPROACH),
         compare(scene, approach=PAPER_APPROACH, solvers=few),
         cr.smooth(scene, load=contact.load),
+        cr.smooth(dataclasses.replace(scene, sphere_radius=(1.0, 2.0)), load=contact.load),
         cr.read_scene(NEW_SCENE),
         contact.proof(),
         cr.load_path(scene, loads=contact.load * np.array([1.0, 0.7]), forces=[Q, -Q / 2]),
-        cr.steady(scene, loads=[contact.load, contact.load / 2], forces=[Q, -Q / 2]),
         cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q]),
         cr.phase_losses(
             scene,
@@ -87,7 +87,7 @@ def results() -> dict[str, Any]:
 
 def on(asperities: cr.Asperities, surface: cr.surface.Surface) -> cr.Contact:
     radius = 1e4 * surface.pixel[0]
-    return cr.press(cr.Scene(radius, asperities, MATERIAL), load=10.0)
+    return cr.press(cr.Scene(radius, asperities, MATERIAL, geometry="summit"), load=10.0)
 
 
 NAMES = tuple(results())
@@ -101,7 +101,7 @@ def test_every_kind_is_here() -> None:
     sweeps = {"SweepTable"}  # tested in tests/sweeps
     assert public - settings - sweeps <= set(NAMES)
     assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "History",
-                          "Verdict", "Comparison", "LoadPath", "Steady", "Shakedown",
+                          "Verdict", "Comparison", "LoadPath", "Shakedown",
                           "MemoryCurve", "PhaseLosses", "PathComparison",
                           "Gradient", "Surface", "Summits", "Provability"}  # fmt: skip
 
@@ -120,20 +120,10 @@ def test_what_is_printed_is_what_is_there() -> None:
     assert "status           37 contact, 24 open\n" in repr(contact)
     assert f"loads            61 from 0 to {contact.loads.max():.6g}\n" in repr(contact)
     assert "certificate      Certificate: global; 37 contact, 24 open\n" in repr(contact)
-    assert "sliding                 6 of 61\n" in repr(results()["Cycle"])
+    assert "status                  31 partial, 6 sliding, 24 open\n" in repr(results()["Cycle"])
     assert "wrongly_open      3\n" in repr(verdict)
     assert "wrongly_loaded    none\n" in repr(verdict)
     assert "contradictions          none" in repr(results()["Comparison"])
-
-
-def test_nothing_printed_grows_with_the_scene() -> None:
-    asperities = cr.Asperities.hexagonal(spacing=1e-4, tip_radius=8e-4, within=0.003)
-    scene = cr.Scene(1.0, asperities, MATERIAL)
-    contact = cr.press(scene, approach=5e-6)
-    wrong = cr.verify(scene, np.zeros(len(scene)), approach=5e-6)
-    for result in (contact, wrong):
-        assert len(repr(result).split("\n")) <= 24
-        assert max(map(len, repr(result).split("\n"))) <= 110
 
 
 class Cells(HTMLParser):
@@ -145,6 +135,7 @@ class Cells(HTMLParser):
         self.text.append(data)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", NAMES)
 def test_a_notebook_shows_the_same_lines(name: str) -> None:
     cells = Cells()
@@ -160,14 +151,15 @@ def arrays(record: Any) -> Iterator[np.ndarray[Any, Any]]:
         value = getattr(record, field.name)
         if isinstance(value, np.ndarray):
             yield value
-        elif dataclasses.is_dataclass(value):
+        elif isinstance(value, Record):
             yield from arrays(value)
         elif isinstance(value, tuple):
             for each in value:
-                if dataclasses.is_dataclass(each):
+                if isinstance(each, Record):
                     yield from arrays(each)
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(
     "copied", [lambda it: pickle.loads(pickle.dumps(it)), copy.deepcopy], ids=["pickle", "deepcopy"]
@@ -209,6 +201,7 @@ def test_a_pickled_contact_goes_on() -> None:
     np.testing.assert_array_equal(state.forces, results()["ShearState"].forces)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", NAMES)
 def test_replace(name: str) -> None:
     replace = getattr(copy, "replace", dataclasses.replace)  # copy.replace is new in Python 3.13
@@ -222,7 +215,7 @@ def test_replace(name: str) -> None:
 def test_a_data_frame_has_the_arrays(name: str) -> None:
     result = results()[name]
     frame = result.to_dataframe()
-    rows = {"History": "step", "Loop": "point", "Comparison": "entry", "LoadPath": "point"}
+    rows = {"History": "point", "Loop": "point", "Comparison": "entry", "LoadPath": "point"}
     rows |= {"MemoryCurve": "vertex", "PhaseLosses": "ellipse", "PathComparison": "entry"}
     rows |= {"Provability": "level"}
     assert frame.index.name == rows.get(name, "asperity")
@@ -258,8 +251,8 @@ def test_asperities_can_be_found_by_name() -> None:
     np.testing.assert_array_equal(frame["y"], y)
     assert frame.query("status == 'contact'")["loads"].sum() == pytest.approx(contact.load)
     held = past.to_xarray()
-    assert dict(held.sizes) == {"step": 2, "asperity": 61}
-    np.testing.assert_array_equal(held["forces"].sel(step=1), past.forces[1])
+    assert dict(held.sizes) == {"point": 2, "asperity": 61}
+    np.testing.assert_array_equal(held["forces"].sel(point=1), past.forces[1])
     loop = results()["Loop"]
     own = loop.to_xarray()["asperity_forces"].sel(asperity=3)
     np.testing.assert_array_equal(own, loop.asperity_forces[:, 1])
@@ -269,29 +262,11 @@ def test_asperities_can_be_found_by_name() -> None:
     )
 
 
-def test_solvers_side_by_side() -> None:
-    comparison = results()["Comparison"]
-    frame, held = comparison.to_dataframe(), comparison.to_xarray()
-    assert frame["solver"].tolist() == [entry.solver for entry in comparison.entries]
-    assert (frame["scope"] == "global").all()
-    assert held["loads"].shape == (3, 61)
-    refused = compare(
-        cr.Scene(1.0, cr.Asperities([[0.0, 0.0], [0.001, 0.0]], 1.0), MATERIAL),
-        approach=1e-5,
-        solvers=[solvers.Conic()],
-    )
-    assert refused.entries[1].contact is None
-    assert np.isnan(refused.to_xarray()["loads"][1]).all()
-    assert np.isnan(refused.to_dataframe()["seconds"][1])
-    assert refused.entries[1].outcome in repr(refused)
-    refused.plot()
-
-
 @pytest.mark.parametrize("extra", ["pandas", "xarray"])
 def test_without_an_extra(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, extra, None)
     contact = results()["Contact"]
-    with pytest.raises(ExtraError, match=rf"needs {extra}: pip install 'convexrough\[{extra}\]'"):
+    with pytest.raises(ExtraError, match=rf"needs {extra}: pip install {extra}"):
         _ = contact.to_dataframe() if extra == "pandas" else contact.to_xarray()
     assert issubclass(ExtraError, cr.ConvexroughError)
     assert issubclass(ExtraError, ImportError)
@@ -308,6 +283,7 @@ print({"pandas", "xarray", "matplotlib"} & set(sys.modules))
     assert done.stdout.strip() == "set()"
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", DRAWN)
 def test_axes_in_axes_out(name: str) -> None:
     result = results()[name]
@@ -321,37 +297,9 @@ def test_axes_in_axes_out(name: str) -> None:
     assert other.get_xlabel()
 
 
-@pytest.mark.parametrize("name", ["Contact", "ShearState", "VectorShearState", "Cycle", "History"])
-def test_axes_without_contact(name: str) -> None:
-    scene = dataclasses.replace(paper(), friction=0.5)
-    heights = np.full(len(scene), -1e-3)
-    low = cr.Asperities(scene.asperities.positions, scene.asperities.tip_radii, heights)
-    contact = cr.press(dataclasses.replace(scene, asperities=low), approach=PAPER_APPROACH)
-    made = {
-        "Contact": lambda: contact,
-        "ShearState": lambda: cr.shear(contact, force=0.0),
-        "VectorShearState": lambda: cr.shear_vector(contact, force=0.0),
-        "Cycle": lambda: cr.cycle(contact, maximum=0.0),
-        "History": lambda: cr.history(contact, forces=[0.0]),
-    }[name]()
-    assert [text.get_text() for text in made.plot().texts] == ["no contact"]
-    repr(made)
-    made.to_dataframe()
-
-
 def test_what_has_no_picture_says_so() -> None:
     with pytest.raises(cr.InputError, match="found something of Scene, expected a result that has"):
         plots.plot(results()["Scene"])
-
-
-def test_the_loop_that_is_drawn_is_the_loop() -> None:
-    matplotlib.use("agg")
-    cycle = results()["Cycle"]
-    rough = cycle.plot().lines[0]
-    loop, whole = cycle.loop(), cr.smooth(cycle.contact.scene, load=cycle.contact.load)
-    np.testing.assert_allclose(rough.get_ydata(), loop.forces / whole.largest_force)
-    farthest = whole.displacement(whole.largest_force)
-    np.testing.assert_allclose(rough.get_xdata(), loop.displacements / farthest)
 
 
 PUBLIC = sorted({*cr.__all__} - {"__version__", "solvers"})  # functions and classes
@@ -385,8 +333,3 @@ def test_examples_in_docstrings(module: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", [name for name in PUBLIC if not name.endswith("Error")])
 def test_every_public_name_has_an_example(name: str) -> None:
     assert "\n    >>> " in (getattr(cr, name).__doc__ or "")
-
-
-@pytest.mark.parametrize("name", cr.surface.__all__)
-def test_every_name_of_surfaces_has_an_example(name: str) -> None:
-    assert "\n    >>> " in (getattr(cr.surface, name).__doc__ or "")

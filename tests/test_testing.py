@@ -44,10 +44,6 @@ def test_certified(contact: cr.Contact, control: str) -> None:
     assert_certified(paper(), list(contact.loads), **prescribed)
 
 
-def test_a_scene_out_of_reach_is_certified_too() -> None:
-    assert_certified(paper(), 0.0, approach=-1e-6, within=1e-12)
-
-
 def test_loads_not_certified_as_closely_as_asked(contact: cr.Contact) -> None:
     loads = np.array(contact.loads)
     loads[5] *= 1 + 1e-4
@@ -73,22 +69,8 @@ def test_an_asperity_left_out(contact: cr.Contact, index: int) -> None:
     assert message.endswith(f", solved {contact.loads[index]:.6g}, contact")
 
 
-def test_a_spurious_load(contact: cr.Contact) -> None:
-    loads = np.array(contact.loads)
-    loads[50] = 1e-9 * loads.max()
-    message = failure(assert_certified, paper(), loads, approach=PAPER_APPROACH)
-    assert message.startswith("1 claimed to touch, proved open: 50 at (")
-    assert_certified(paper(), loads, approach=PAPER_APPROACH, floor=1e-8 * loads.max())
-
-
-def test_a_total_in_another_unit(contact: cr.Contact) -> None:
-    message = failure(assert_certified, paper(), 1e3 * contact.loads, load=contact.load)
-    assert message.startswith("loads add up to 0.00036085")
-    assert "expected 3.6085" in message
-
-
 def test_shear_forces() -> None:
-    scene = cr.Scene(1.0, paper().asperities, paper().material, friction=0.5)
+    scene = cr.Scene(1.0, paper().asperities, paper().material, friction=0.5, geometry="summit")
     pressed = cr.press(scene, approach=PAPER_APPROACH)
     force = 0.25 * pressed.load
     state = cr.shear(pressed, force=force)

@@ -42,6 +42,7 @@ def corrupted(contact: cr.Contact, kind: str, rng: Any) -> tuple[Any, set[int]]:
     return loads, {int(i)}
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_single_corruptions(kind: str, control: str) -> None:
@@ -155,3 +156,33 @@ def test_where_nothing_can_be_proved_nothing_holds() -> None:
     assert contact.certificate.scope == "none"
     assert len(verdict.undecided) == len(scene)
     assert not verdict.holds
+
+
+@pytest.mark.parametrize(
+    ("moved", "said"),
+    [
+        (lambda points: points[:, ::-1], "x and y exchanged"),
+        (lambda points: points * [-1, 1], "the other sign of x"),
+        (lambda points: points * [1, -1], "the other sign of y"),
+        (lambda points: -points, "the other sign of x and y"),
+    ],
+)
+def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:
+    """Positions match all the same; only the loads tell."""
+    asperities = cr.Asperities.square(
+        spacing=0.0025, tip_radius=0.02, within=0.0102, height_std=2e-6, seed=3
+    )
+    scene = cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit")
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    points = asperities.positions
+    partners = [int(np.hypot(*(points - place).T).argmin()) for place in moved(points)]
+    verdict = cr.verify(scene, contact.loads[partners], approach=PAPER_APPROACH)
+    assert not verdict.holds
+    assert f"the loads are right with {said}" in list(verdict.hints())
+    unlike = cr.verify(scene, np.roll(contact.loads, 7), approach=PAPER_APPROACH)
+    assert not any("the loads are right" in hint for hint in unlike.hints())
+
+
+def test_swapped_arguments() -> None:
+    with pytest.raises(cr.InputError, match="scene: found something of ndarray, expected a Scene"):
+        cr.verify(np.zeros(3), paper(), approach=PAPER_APPROACH)  # type: ignore[arg-type]

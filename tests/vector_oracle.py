@@ -121,7 +121,10 @@ def _problem(
     E, nu = arb(scene.material.contact_modulus), arb(scene.material.poisson_ratio)
     tips, radius = _exact(scene.asperities.tip_radii[touching]), arb(scene.sphere_radius)
     points, _ = _contact_points(
-        _exact(scene.asperities.positions[touching]), tips, radius, scene.geometry
+        _exact(scene.asperities.positions[touching]),
+        tips,
+        np.array([1 / radius, 1 / radius]),
+        scene.geometry,
     )
     relative = 1 / (1 / radius + 1 / tips)
     ceilings = np.array(

@@ -1,104 +1,137 @@
-"""What was measured, for people: aligned lines, and a page of the documentation."""
+"""What was measured, for people: aligned lines, files, and a page of the documentation."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
-from convexrough.bench import sweeping
-from convexrough.bench.gradients import GradientRow
-from convexrough.bench.machine import busy
-from convexrough.bench.measure import CostRow, Row
-from convexrough.bench.paths import PathRow
-from convexrough.bench.suite import Bench, Panel, ShearRow
-from convexrough.bench.summary import condensed, verdicts
+from convexrough.bench.measure import TASKS
+from convexrough.bench.rows import Bench, Row, frontier
 from convexrough.errors import FileError
 from convexrough.run.columns import aligned, markdown
+from convexrough.run.results import beside, write_figures, write_tables
+from convexrough.run.summary import to_json
 from convexrough.version import __version__
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 
-WORK_HEADING = ["solver", "setting", "error", "seconds", "assembling", "certifying", "A P"]
-WORK_HEADING += ["single", "iterations", "MB", ""]
-COST_HEADING = ["scene", "asperities", "touching", "seconds", "from nothing", "in products"]
-COST_HEADING += [
-    "assembling",
-    "solving",
-    "certifying",
-    "A P",
-    "single",
-    "MB",
-    "B each",
-    "proved error",
-]
-PATH_HEADING = ["scene", "asperities", "touching", "presses", "first call, s", "next, s"]
-PATH_HEADING += ["presses per segment", "undecided", "proved error", "MB", "order"]
-GRADIENT_HEADING = ["scene", "asperities", "touching", "press", "cycle", "gradient"]
-GRADIENT_HEADING += ["A P", "single"]
-SHEAR_HEADING = ["what", "asperities", "touching", "states", "seconds", "s per state", "MB"]
+#: Tasks with a column of seconds, beside those of a press.
+OTHERS = [task for task in TASKS if task not in ("press", "from nothing")]
 
 
 def describe(bench: Bench) -> list[str]:
     """Aligned lines for people."""
-    lines = [f"{name:<16}{text}" for name, text in _machine_lines(bench)]
-    for title, table, left, messages in (*_panels(bench), *_costs(bench)):
-        lines += ["", title, *aligned(table, left=left), *messages]
-    return [*lines, "", *verdicts(bench)]
+    lines = [machine_line(bench)]
+    for (family, n), rows in bench.panels().items():
+        lines += ["", f"{n:,} asperities ({family})", *aligned(_work_table(rows), left=2)]
+    return [*lines, "", *aligned(size_table(bench), left=1), "", *_messages(bench)]
 
 
-def page_block(bench: Bench, figures: str) -> list[str]:
-    """Lines of Markdown; `figures` is where the figures are, from the page."""
-    lines = [*(f"- {line}" for line in verdicts(bench)), ""]
-    lines += [
-        f"![Time against error, every solver, at each size]({figures}/work-precision.png)",
+def page_block(bench: Bench) -> list[str]:
+    """Lines of Markdown: on what, one figure, one table of sizes, and what follows from them."""
+    return [
+        machine_line(bench),
         "",
+        "![Time against error, every solver, at each size](figures/work-precision.png)",
+        "",
+        *markdown(size_table(bench), left=1),
+        "",
+        *(f"- {line}" for line in _messages(bench)),
     ]
-    lines += [f"![Time of a press against the number of asperities]({figures}/cost.png)", ""]
-    lines += ["### The machine", ""]
-    lines += markdown([["", ""], *([name, text] for name, text in _machine_lines(bench))], left=2)
-    for title, table, left, messages in (*_costs(bench), *_panels(bench)):
-        heading = f"### {title[0].upper()}{title[1:]}"
-        lines += ["", heading, "", *markdown(table, left=left), *messages]
+
+
+def machine_line(bench: Bench) -> str:
+    """On what it ran, and beside what."""
+    on = bench.machine
+    versions = ", ".join(f"{name} {number}" for name, number in on["versions"].items())
+    load = on["load_average"] or 0.0
+    busy = "; other work was running, so times are high" if load > 0.3 else ""
+    return (
+        f"{'Quick' if bench.quick else 'Full'} run of {bench.seconds / 60:.1f} min, {on['date']}, "
+        f"on {on['cores']} cores ({on['processor']}, {on['memory'] / 2**30:.0f} GiB, "
+        f"{on['system']}): convexrough {__version__}, Python {on['python']}, {versions}. Threads "
+        f"of linear algebra: {on['linear_algebra_threads']}. Load average: {load:.1f}"
+        f"{busy}."
+    )
+
+
+def size_table(bench: Bench) -> list[list[str]]:
+    """Seconds of each task, a line for each scene; of a press also in plain products."""
+    on = f"in products on {bench.machine['cores']} cores"
+    heading = ["scene", "asperities", "touching", "press", on, "from nothing", on, *OTHERS]
+    table = [[*heading, "MB", "proved error"]]
+    found = {(row.task, row.family, row.asperities): row for row in bench.rows}
+    for row in bench.rows:
+        if row.task == "press" and row.outcome == "answered":
+            cells = [row.family, f"{row.asperities:,}", f"{row.touching:,}"]
+            for task in ("press", "from nothing"):
+                one = found[task, row.family, row.asperities]
+                counted = f"{one.products:.0f}" if math.isfinite(one.products) else "-"
+                cells += [_seconds(one), counted]
+            cells += [_seconds(found.get((task, row.family, row.asperities))) for task in OTHERS]
+            memory = "-" if row.memory is None else f"{row.memory / 1e6:.0f}"
+            table.append([*cells, memory, f"{row.bound:.0e}"])
+    return table
+
+
+def _messages(bench: Bench) -> list[str]:
+    """What follows, what a scene of a sweep takes, and why some did not answer."""
+    lines = bench.verdicts()
+    for row in bench.rows:
+        if row.task == "sweep":
+            lines.append(f"A scene of about {row.asperities:,} with a cycle in a sweep "
+                         f"({row.message}): {1e3 * row.seconds:.2f} ms.")  # fmt: skip
+        elif row.task != "solve" and row.outcome != "answered":
+            place = f"{row.task}, {row.asperities:,} asperities ({row.family})"
+            lines.append(f"{place}: {row.outcome}, {row.message}")
     return lines
 
 
-class Section(NamedTuple):
-    """A table with what is above and below it; so many of its columns are aligned to the left."""
+def write_bench(folder: Path, bench: Bench, *, figures: bool, page: Path | None) -> list[Path]:
+    """Write bench.json, rows.csv and the figures; renew the page, if one is given.
 
-    title: str
-    table: list[list[str]]
-    left: int
-    messages: list[str]
-
-
-def _panels(bench: Bench) -> Iterator[Section]:
-    for panel in bench.panels:
-        yield Section(_title(panel), _work_table(panel), 2, _messages(panel.rows))
-
-
-def _costs(bench: Bench) -> Iterator[Section]:
-    yield Section("cost of a press", _cost_table(bench.cost), 1, _messages(bench.cost))
-    if bench.shear:
-        yield Section("cost of shear", _shear_table(bench.shear), 1, _messages(bench.shear))
-    if bench.paths:
-        title = "cost of a load path of seven segments, with every bound and word"
-        yield Section(title, _path_table(bench.paths), 1, _messages(bench.paths))
-    if bench.sweeps:
-        yield Section("cost of a sweep", sweeping.table(bench.sweeps), 0, [])
-    if bench.gradients:
-        messages = _messages(bench.gradients)
-        yield Section("cost of a gradient", _gradient_table(bench.gradients), 1, messages)
-
-
-def renewed_page(page: Path, bench: Bench, figures: str) -> str:
-    """The text of a page with the block between the markers written anew; the rest as it was.
-
-    Raises FileError where the page has no such block.
+    Returns the paths. Raises FileError; files already written stay.
     """
+    rows = [asdict(row) for row in bench.rows]
+    written = write_tables(
+        folder, {"rows": {name: [row[name] for row in rows] for name in rows[0]}}
+    )
+    if figures:
+        written += write_figures(folder, _drawn(bench))
+    with beside(path := folder / "bench.json") as temporary:
+        temporary.write_text(to_json(bench.summary()) + "\n", encoding="utf-8")
+    if page is not None:
+        written += _renew(page, bench)
+    return [path, *written]
+
+
+def _drawn(bench: Bench) -> dict[str, Figure]:
+    from convexrough.bench.figures import bench_figures  # matplotlib: only when it draws
+
+    return bench_figures(bench)
+
+
+def _renew(page: Path, bench: Bench) -> list[Path]:
+    """The figures first, so that the page never shows what is not there."""
     before, after = split_page(page)
-    return "\n".join([before + BEGIN, "", *page_block(bench, figures), "", END + after])
+    folder, written = page.parent / "figures", []
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{folder}: cannot be made: {error.strerror or error}") from error
+    for stem, figure in _drawn(bench).items():
+        with beside(path := folder / f"{stem}.png") as temporary:
+            figure.savefig(temporary, format="png", dpi=200)
+        written.append(path)
+    with beside(page) as temporary:
+        block = [before + BEGIN, "", *page_block(bench), "", END + after]
+        temporary.write_text("\n".join(block), encoding="utf-8")
+    return [*written, page]
 
 
 def split_page(page: Path) -> tuple[str, str]:
@@ -114,136 +147,19 @@ def split_page(page: Path) -> tuple[str, str]:
     return before, after
 
 
-def _title(panel: Panel) -> str:
-    title = f"{panel.asperities:,} asperities, {panel.family}"
-    if (reference := panel.reference) is None:
-        return f"{title}; {panel.without}"
-    return (
-        f"{title}; {reference.touching:,} touch; reference good to {reference.correction:.0e} "
-        f"({reference.how}, residual {reference.residual:.0e})"
-    )
-
-
-def _work_table(panel: Panel) -> list[list[str]]:
-    table = [WORK_HEADING]
-    for row in condensed(panel.rows):
-        guess = f"({row.expected:.0e})" if math.isfinite(row.expected) else "-"
-        cells = [row.outcome, guess, *["-"] * 6, ""]
-        if row.outcome == "answered":
-            cells = [f"{row.error:.1e}" if math.isfinite(row.error) else "unknown"]
-            cells += [_seconds(row.seconds), _seconds(row.assembling), _seconds(row.certifying)]
-            cells += [
-                str(row.products),
-                str(row.single),
-                str(row.iterations),
-                _megabytes(row.memory),
-            ]
-            cells.append("frontier" if row.frontier else "")
-        solver = f"{row.solver} (default)" if row.default else row.solver
-        table.append([solver, row.setting, *cells])
+def _work_table(rows: list[Row]) -> list[list[str]]:
+    best = frontier(rows)
+    table = [["solver", "setting", "error", "seconds", "iterations", ""]]
+    for row in rows:
+        error = f"{row.error:.1e}" if row.known else row.outcome
+        mark = "frontier" if row in best else ""
+        table.append([row.solver, row.setting, error, _seconds(row), str(row.iterations), mark])
     return table
 
 
-def _cost_table(rows: Sequence[CostRow]) -> list[list[str]]:
-    table = [COST_HEADING]
-    for row in rows:
-        cells = [f"{row.asperities:,}", row.outcome, *["-"] * 11]
-        if row.outcome == "answered":
-            each = "-" if row.memory is None else f"{row.memory / row.asperities:,.0f}"
-            proved = f"{row.load_error:.1e}" if row.certified else f"not proved ({row.scope})"
-            counted = row.first / row.product
-            cells = [f"{row.asperities:,}", f"{row.touching:,}", _seconds(row.seconds)]
-            cells += [_seconds(row.first), f"{counted:.0f}" if math.isfinite(counted) else "-"]
-            cells += [_seconds(row.assembling), _seconds(row.solving), _seconds(row.certifying)]
-            cells += [str(row.products), str(row.single), _megabytes(row.memory), each, proved]
-        table.append([row.family, *cells])
-    return table
-
-
-def _shear_table(rows: Sequence[ShearRow]) -> list[list[str]]:
-    table = [SHEAR_HEADING]
-    for row in rows:
-        cells = [f"{row.asperities:,}", f"{row.touching:,}", str(row.states)]
-        if row.outcome == "answered":
-            cells += [_seconds(row.seconds), _seconds(row.seconds / row.states)]
-            cells.append(_megabytes(row.memory))
-        else:
-            cells += [row.outcome, "-", "-"]
-        table.append([row.what, *cells])
-    return table
-
-
-def _path_table(rows: Sequence[PathRow]) -> list[list[str]]:
-    table = [PATH_HEADING]
-    for row in rows:
-        cells = [f"{row.asperities:,}", row.outcome, *["-"] * 8]
-        if row.outcome == "answered":
-            cells = [f"{row.asperities:,}", f"{row.touching:,}", str(row.presses)]
-            cells += [_seconds(row.first), _seconds(row.again)]
-            cells += [f"{row.presses / row.segments:.1f}", str(row.undecided)]
-            cells += [f"{row.error:.0e}", _megabytes(row.memory), row.order]
-        table.append([row.family, *cells])
-    return table
-
-
-def _gradient_table(rows: Sequence[GradientRow]) -> list[list[str]]:
-    table = [GRADIENT_HEADING]
-    for row in rows:
-        cells = [f"{row.asperities:,}", row.outcome, *["-"] * 5]
-        if row.outcome == "answered":
-            times = (row.pressing, row.cycling, row.differentiating)
-            cells = [f"{row.asperities:,}", f"{row.touching:,}", *map(_seconds, times)]
-            cells += [str(row.products), str(row.single)]
-        table.append([row.family, *cells])
-    return table
-
-
-def _messages(
-    rows: Sequence[Row]
-    | Sequence[CostRow]
-    | Sequence[ShearRow]
-    | Sequence[PathRow]
-    | Sequence[GradientRow],
-) -> list[str]:
-    """Why some did not answer, below their table."""
-    found: dict[str, list[str]] = {}
-    for row in rows:
-        if row.outcome != "answered":
-            name = row.solver if isinstance(row, Row) else f"{row.asperities:,} asperities"
-            named = found.setdefault(f"{row.outcome}: {row.message}", [])
-            named += [name] if name not in named else []
-    lines = [f"- {'; '.join(names)} {why}" for why, names in found.items()]
-    return ["", *lines] if lines else []
-
-
-def _machine_lines(bench: Bench) -> list[tuple[str, str]]:
-    machine = bench.machine
-    versions = ", ".join(f"{name} {number}" for name, number in machine["versions"].items())
-    limits = machine["linear_algebra_threads"]
-    threads = limits if isinstance(limits, str) else _listed(limits)
-    load = machine["load_average"]
-    shared = "; other work was running, so times are high" if busy(machine) else ""
-    return [
-        ("processor", f"{machine['processor']}, {machine['cores']} cores, {machine['system']}"),
-        ("memory", f"{machine['memory'] / 2**30:.0f} GiB"),
-        ("threads", f"linear algebra ({machine['linear_algebra']}): {threads}"),
-        ("", f"transforms: {machine['transform_threads']}"),
-        ("versions", f"convexrough {__version__}, Python {machine['python']}, {versions}"),
-        ("date", f"{machine['date']}, {'quick' if bench.quick else 'full'} run of "
-                 f"{bench.seconds / 60:.1f} min"),
-        ("load average", "unknown" if load is None else f"{load:.2f} at the start{shared}"),
-    ]  # fmt: skip
-
-
-def _listed(limits: Mapping[str, str]) -> str:
-    return ", ".join(f"{name}={value}" for name, value in limits.items())
-
-
-def _seconds(value: float) -> str:
-    if value < 1e-3:
-        return f"{1e6 * value:.0f}e-6"
-    return f"{value:.2g}" if value < 100 else f"{value:.0f}"
-
-
-def _megabytes(memory: int | None) -> str:
-    return "-" if memory is None else f"{memory / 1e6:.1f}"
+def _seconds(row: Row | None) -> str:
+    if row is None or row.outcome != "answered":
+        return "-"
+    if row.seconds < 1e-3:
+        return f"{1e6 * row.seconds:.0f}e-6"
+    return f"{row.seconds:.2g}" if row.seconds < 100 else f"{row.seconds:.0f}"

@@ -12,28 +12,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array
 from convexrough.convex.newton_step import correct
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.scene.lattice import Lattice
-from convexrough.scene.scene import Scene
+from convexrough.scene import base
 from convexrough.sphere import hertz
 
 Long = np.longdouble
 LongArray = NDArray[np.longdouble]
 Product = Callable[[LongArray], LongArray]
 
-#: Up to so many asperities all pairs are summed; of more on a lattice, transforms do it.
-FEW = 2000
-
-#: Off a lattice nothing but the sum of all pairs is as accurate; of more it takes too long.
-MOST_PAIRS = 40_000
+#: Of more asperities the sum of all pairs takes too long.
+MOST = 10_000
 
 MOST_STEPS = 8
 
@@ -41,7 +36,7 @@ MOST_STEPS = 8
 MOST_LEFT = 1e-6
 
 #: What one unit in the last place must be at most: some thousand times better than float64.
-LEAST_PRECISION = 2e-19
+LEAST = 2e-19
 
 #: Entries computed at a time.
 BLOCK = 2**20
@@ -50,19 +45,13 @@ BLOCK = 2**20
 @dataclass(frozen=True, eq=False)
 class Reference:
     """loads   : (n,) of the candidates, in the problem's units
-    touching   : how many are positive
     residual   : max |F| over the approach
     correction : what one more step would change, max |P| over max P: about its error
-    digits     : of the arithmetic
-    how        : how A P was computed
     """
 
     loads: LongArray
-    touching: int
     residual: float
     correction: float
-    digits: float
-    how: str
 
     def error(self, loads: Array) -> float:
         """max |P - P_ref| / max P_ref, of loads (n,) in the problem's units."""
@@ -72,48 +61,39 @@ class Reference:
 def refine(problem: NormalProblem, loads: Array) -> Reference:
     """The solution near these loads (n,); approach control and the "summit" geometry only.
 
-    Raises InputError where nothing accurate enough is known for the product A P, and SolverError
-    where Newton's method does not get near the precision of the numbers.
+    Raises InputError where A P cannot be computed so accurately, and SolverError where Newton's
+    method does not get near the precision of the numbers.
     """
-    scene = problem.scene
-    if np.finfo(Long).eps > LEAST_PRECISION:
-        expected = "numbers longer than float64, which this machine has not"
-        raise InputError(
-            "reference", found=f"long double of {np.finfo(Long).eps:.1g}", expected=expected
-        )
-    if problem.approach is None or scene.geometry != "summit":
-        expected = 'approach control and the geometry "summit"'
-        raise InputError("reference", found="another problem", expected=expected)
-    approach = problem.approach
+    precision = np.finfo(Long).eps
+    summit = problem.approach is not None and problem.scene.geometry == "summit"
+    for holds, found, expected in (
+        (precision <= LEAST, f"long double of {precision:.1g}", "numbers longer than float64"),
+        (summit, "another problem", 'approach control and the geometry "summit"'),
+        (len(problem) <= MOST, f"{len(problem)} asperities", f"at most {MOST}"),
+    ):
+        if not holds:
+            raise InputError("reference", found=found, expected=expected)
     k, prescribed = _law(problem)
-    product, how = _product(problem)
+    product = _product(problem)
+    approach = float(problem.approach or 0.0)
 
     delta = np.where(loads > 0, hertz.indentation(loads.astype(Long), k), Long(-1))
-    best: tuple[float, LongArray, LongArray] | None = None
+    best: tuple[float, LongArray, LongArray] = (np.inf, delta, delta)
     for _ in range(MOST_STEPS):
         P: LongArray = hertz.load(delta, k)
         gap = product(P) - prescribed
         delta = np.where(P > 0, delta, np.minimum(-gap, 0))
-        defect = delta + gap
-        residual = float(np.abs(defect).max()) / approach
-        change = _correction(problem, P, defect)
-        if best is not None and not residual < 0.5 * best[0]:
+        residual = float(np.abs(delta + gap).max()) / approach
+        if not residual < 0.5 * best[0]:
             break
+        change = _correction(problem, P, delta + gap)
         best = residual, P, change
         delta = delta + change
-    assert best is not None
     residual, P, change = best
     if not residual <= 1e-14:
         raise SolverError(f"residual {residual:.2g} of the approach", solver="reference")
     slope = 1.5 * np.cbrt(P) / k
-    return Reference(
-        loads=P,
-        touching=int(np.count_nonzero(P)),
-        residual=residual,
-        correction=float((slope * np.abs(change)).max() / P.max()),
-        digits=float(-np.log10(np.finfo(Long).eps)),
-        how=how,
-    )
+    return Reference(P, residual, float((slope * np.abs(change)).max() / P.max()))
 
 
 def _law(problem: NormalProblem) -> tuple[LongArray, LongArray]:
@@ -121,7 +101,8 @@ def _law(problem: NormalProblem) -> tuple[LongArray, LongArray]:
     scene, which, units = problem.scene, problem.candidates, problem.units
     rho = scene.asperities.tip_radii[which].astype(Long)
     x, y = scene.asperities.positions[which].astype(Long).T
-    R, modulus = Long(scene.sphere_radius), Long(scene.material.contact_modulus)
+    R = Long(base.sphere_radius(scene.sphere_radius, "reference"))
+    modulus = Long(scene.material.contact_modulus)
     k = np.cbrt(9 / (16 * modulus * modulus) * (1 / R + 1 / rho)) * Long(units.local)
     d = (scene.asperities.heights[which].astype(Long) - (x * x + y * y) / (2 * R)) / units.length
     assert problem.approach is not None
@@ -129,30 +110,18 @@ def _law(problem: NormalProblem) -> tuple[LongArray, LongArray]:
 
 
 def _correction(problem: NormalProblem, P: LongArray, defect: LongArray) -> LongArray:
-    root = np.sqrt(1.0 / problem.stiffness(P.astype(np.float64)))
-    step = correct(
-        problem.influence,
-        problem.shells,
-        root,
-        defect.astype(np.float64),
-        balanced=False,
-        tolerance=MOST_LEFT,
-    )
-    return step.astype(Long)
+    root, off = np.sqrt(1.0 / problem.stiffness(P.astype(float))), defect.astype(float)
+    given = problem.influence, problem.shells, root, off
+    return correct(*given, balanced=False, tolerance=MOST_LEFT).astype(Long)
 
 
-def _product(problem: NormalProblem) -> tuple[Product, str]:
-    """P -> A P, and how."""
-    scene, units, n = problem.scene, problem.units, len(problem)
+def _product(problem: NormalProblem) -> Product:
+    """P -> A P, the sum of all pairs in long double."""
+    scene, units = problem.scene, problem.units
     modulus, pi = Long(scene.material.contact_modulus), 4 * np.arctan(Long(1))
     scale = Long(units.force) / Long(units.length) / (pi * modulus)
     points = scene.contact_points[problem.candidates]
-    if n > FEW and (lattice := scene.lattice) is not None:
-        return _OnLattice(points, lattice, scale).apply, "transforms"
-    if n <= MOST_PAIRS:
-        return partial(_pairs, points.astype(Long), scale), "sum over pairs"
-    found = f"{n} asperities off a lattice"
-    raise InputError("reference", found=found, expected=f"at most {MOST_PAIRS}")
+    return partial(_pairs, points.astype(Long), scale)
 
 
 def _pairs(points: LongArray, scale: Long, loads: LongArray) -> LongArray:
@@ -167,76 +136,3 @@ def _pairs(points: LongArray, scale: Long, loads: LongArray) -> LongArray:
         squares[squares == 0] = np.inf
         total[block] = (1 / np.sqrt(squares)) @ strengths
     return scale * total
-
-
-class _OnLattice:
-    """A P by transforms in extended precision, of the points as they are.
-
-    Computed points are off their sites X by rounding, e. Near neighbours feel that in the 12th
-    digit of large lattices, so the first order in it is added, with G(X) = -X / |X|^3:
-
-        sum_j P_j / |x_i - x_j|  =  sum_j [K(X_ij) P_j  +  G(X_ij).(e_i - e_j) P_j]  +  O(e^2).
-    """
-
-    def __init__(self, points: Array, lattice: Lattice, scale: Long) -> None:
-        sites = lattice.sites(points)
-        assert sites is not None  # the lattice is that of these points
-        basis = lattice.basis.astype(Long)
-        self.scale = scale
-        self.off = points.astype(Long) - lattice.origin.astype(Long) - sites.astype(Long) @ basis
-        low = sites.min(axis=0)
-        self.index: Indices = sites - low
-        self.shape = tuple(int(size) for size in self.index.max(axis=0) + 1)
-        self.padded = tuple(_fast(2 * size - 1) for size in self.shape)
-        i, j = (_differences(size) for size in self.padded)
-        x, y = (np.add.outer(i * basis[0, axis], j * basis[1, axis]) for axis in (0, 1))
-        r = np.sqrt(x * x + y * y)
-        r[0, 0] = np.inf
-        self.kernel = _forward(1 / r)
-        self.gradient = [_forward((-axis / r**3).astype(np.float64)) for axis in (x, y)]
-
-    def apply(self, loads: LongArray) -> LongArray:
-        total = self._back(self.kernel * self._spread(loads))
-        small = self._spread(loads.astype(np.float64))
-        for axis, kernel in enumerate(self.gradient):
-            e = self.off[:, axis].astype(np.float64)
-            here = e * self._back(kernel * small)
-            there = self._back(kernel * self._spread(e * loads.astype(np.float64)))
-            total = total + (here - there)
-        return self.scale * total
-
-    def _spread(self, values: NDArray[Any]) -> NDArray[Any]:
-        field = np.zeros(self.padded, dtype=values.dtype)
-        field[self.index[:, 0], self.index[:, 1]] = values
-        return _forward(field)
-
-    def _back(self, spectrum: NDArray[Any]) -> NDArray[Any]:
-        from scipy import fft
-
-        field = fft.irfft2(spectrum, s=self.padded, workers=-1)
-        values: NDArray[Any] = field[self.index[:, 0], self.index[:, 1]]
-        return values
-
-
-def _forward(field: NDArray[Any]) -> NDArray[Any]:
-    from scipy import fft  # 0.1 s to import: only when used
-
-    spectrum: NDArray[Any] = fft.rfft2(field, workers=-1)
-    return spectrum
-
-
-def _fast(length: int) -> int:
-    from scipy.fft import next_fast_len
-
-    return int(next_fast_len(length, real=True))
-
-
-def _differences(length: int) -> LongArray:
-    """0, 1, ..., -2, -1, as exact numbers."""
-    i = np.arange(length)
-    return np.where(i <= (length - 1) // 2, i, i - length).astype(Long)
-
-
-def measurable(scene: Scene) -> bool:
-    """Whether a reference is within reach."""
-    return len(scene) <= MOST_PAIRS or scene.lattice is not None

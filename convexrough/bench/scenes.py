@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,47 +15,32 @@ Family = Literal["lattice", "rough", "scattered"]
 #: [R] The paper's approach; it reaches as far as the asperities go.
 APPROACH = 5e-5
 
-#: What each family is, in words.
-WORDS: dict[Family, str] = {
-    "lattice": "a hexagonal lattice of equal asperities",
-    "rough": "the lattice with random heights (standard deviation 1e-6 R) and tip radii (10 %)",
-    "scattered": "the lattice with every asperity moved at random, by up to 0.15 of the spacing",
-}
+#: A hexagonal lattice of equal asperities; with random heights (standard deviation 1e-6 R) and tip
+#: radii (10 %); with every asperity moved at random, by up to 0.15 of the spacing.
+WORDS: tuple[Family, ...] = ("lattice", "rough", "scattered")
 
 #: Refinements by which a scene has about so many asperities.
-REFINEMENTS = {
-    61: 1.0,
-    250: 2.0,
-    700: 3.4,
-    1_500: 5.0,
-    8_400: 12.0,
-    13_000: 15.0,
-    36_000: 25.0,
-    120_000: 45.0,
-    330_000: 75.0,
-    1_300_000: 150.0,
-    5_200_000: 300.0,
-}
+REFINEMENTS = {61: 1.0, 700: 3.4, 8_400: 12.0, 13_000: 15.0, 36_000: 25.0, 120_000: 45.0,
+               330_000: 75.0, 1_300_000: 150.0, 5_200_000: 300.0}  # fmt: skip
 
 
 def scene(family: Family, refinement: float) -> Scene:
     """The paper's scene with spacing and tip radius divided by the refinement."""
-    spacing, tip_radius, within = 0.0025 / refinement, 0.02 / refinement, 0.01
+    spacing, tip_radius = 0.0025 / refinement, 0.02 / refinement
+    lattice: dict[str, Any] = dict(spacing=spacing, tip_radius=tip_radius, within=0.01)
     if family == "rough":
-        asperities = Asperities.hexagonal(
-            spacing=spacing,
-            tip_radius=tip_radius,
-            within=within,
-            height_std=1e-6,
-            tip_radius_cv=0.1,
-            seed=1,
-        )
-    else:
-        asperities = Asperities.hexagonal(spacing=spacing, tip_radius=tip_radius, within=within)
+        lattice |= dict(height_std=1e-6, tip_radius_cv=0.1, seed=1)
+    asperities = Asperities.hexagonal(**lattice)
     if family == "scattered":
         random = np.random.default_rng(1)
         distance = 0.15 * spacing * np.sqrt(random.random(len(asperities)))
         angle = 2.0 * np.pi * random.random(len(asperities))
         moved = distance[:, None] * np.column_stack((np.cos(angle), np.sin(angle)))
         asperities = Asperities(asperities.positions + moved, tip_radius)
-    return Scene(1.0, asperities, Material(contact_modulus=1.0, poisson_ratio=0.3), friction=0.5)
+    return Scene(
+        1.0,
+        asperities,
+        Material(contact_modulus=1.0, poisson_ratio=0.3),
+        friction=0.5,
+        geometry="summit",
+    )

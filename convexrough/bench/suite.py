@@ -1,275 +1,138 @@
-"""Run a plan: everything that is measured, with what was left out and why."""
+"""What is measured, on which scenes, and how patiently."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from dataclasses import replace
 
-import numpy as np
-
-from convexrough import checks
-from convexrough.bench.frontier import better_than_default, exponent, mark_frontier
-from convexrough.bench.gradients import GradientRow, measure_gradient
 from convexrough.bench.machine import describe_machine
-from convexrough.bench.measure import (
-    Attempt,
-    CostRow,
-    Outcome,
-    Row,
-    measure,
-    measure_cost,
-    outcome_of,
-    timed,
-)
-from convexrough.bench.paths import PathRow, measure_path
-from convexrough.bench.plan import Plan, attempts
-from convexrough.bench.reference import Reference, measurable, refine
+from convexrough.bench.measure import Attempt, measure_attempt, measure_sweep, measure_task
+from convexrough.bench.reference import refine
+from convexrough.bench.rows import Bench, Row, better_than_default
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
-from convexrough.bench.sweeping import SweepRow, measure_sweeps
-from convexrough.contact import Contact, press
+from convexrough.contact import press
 from convexrough.errors import InputError, SolverError
-from convexrough.memory import MemoryRise
+from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
 from convexrough.progress import Announce
-from convexrough.scene.scene import Scene
-from convexrough.shearing.cycle import cycles
-from convexrough.shearing.state import shear
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 
-#: The exponent of cost is fitted from so many asperities on: below, fixed costs count.
-FITTED_FROM = 10_000
+Sizes = tuple[tuple[Family, int], ...]
 
 #: How often the default solver and what seems to beat it are timed in turns.
 ROUNDS = 4
 
-PARTS = ("assembling", "solving", "certifying")
+#: Couplings that Newton's method is tried with, and up to how many asperities.
+COUPLINGS: dict[Kind | None, int] = {None: 10**9, "dense": 2_000, "lattice": 10**9,
+                                     "scattered": 10**9}  # fmt: skip
 
-#: What a solver, set so, took last: the number of asperities, and seconds.
-Spent = dict[tuple[str, str], tuple[int, float]]
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """Every solver on one scene.
-
-    reference : what the errors are relative to; None, and then `without` says why
-    """
-
-    family: Family
-    asperities: int
-    reference: Reference | None
-    without: str
-    rows: tuple[Row, ...]
-
-    @property
-    def default(self) -> Row | None:
-        """The row of the default solver."""
-        return next((row for row in self.rows if row.default), None)
-
-    @property
-    def offenders(self) -> tuple[Row, ...]:
-        """Points that are clearly faster than the default solver, and at least as accurate."""
-        return better_than_default(self.rows)
+#: Up to how many asperities a cone or quadratic program is tried: it takes the square of them.
+PROGRAMS = 1_000
 
 
-@dataclass(frozen=True)
-class ShearRow:
-    """what    : "state" or "loss curve";  states : how many amplitudes
-    outcome : "answered", "refused", "failed" or "left out", and why
-    seconds : [s];  memory : [bytes] risen
-    """
-
-    what: str
-    family: str
-    asperities: int
-    touching: int
-    states: int
-    outcome: Outcome
-    message: str = ""
-    seconds: float = np.nan
-    memory: int | None = None
+def _of(family: Family, *sizes: int) -> Sizes:
+    return tuple((family, size) for size in sizes)
 
 
-@dataclass(frozen=True, eq=False)
-class Bench:
-    """All that was measured."""
+#: Where every solver is compared.
+WORK = (*_of("lattice", 61, 700, 8_400), *_of("rough", 8_400), *_of("scattered", 8_400))
 
-    machine: dict[str, Any]
-    quick: bool
-    panels: tuple[Panel, ...]
-    cost: tuple[CostRow, ...]
-    shear: tuple[ShearRow, ...]
-    paths: tuple[PathRow, ...]
-    gradients: tuple[GradientRow, ...]
-    seconds: float
-    sweeps: tuple[SweepRow, ...] = ()
+#: Where the default one is timed.
+PRESSES = (
+    *_of("lattice", 61, 700, 13_000, 36_000, 120_000, 330_000, 1_300_000, 5_200_000),
+    *_of("rough", 13_000, 36_000, 120_000, 330_000, 1_300_000),
+    *_of("scattered", 13_000, 36_000, 120_000, 330_000),
+)
 
-    def fitted(self, family: Family) -> list[CostRow]:
-        """The presses of `FITTED_FROM` asperities and more."""
-        rows = [row for row in self.cost if row.family == family and row.outcome == "answered"]
-        return [row for row in rows if row.asperities >= FITTED_FROM]
+#: The same of what follows a press, by the name of the task.
+FOLLOWING = {
+    "shear": _of("lattice", 61, 700, 36_000, 120_000, 330_000),
+    "loss curve": _of("lattice", 61, 700, 120_000),
+    "load path": (*_of("lattice", 61, 700, 120_000), *_of("rough", 120_000)),
+    "gradient": _of("lattice", 700, 36_000, 330_000),
+}
 
-    def exponent(self, family: Family) -> float:
-        """Of the time of these presses against the number of asperities."""
-        rows = self.fitted(family)
-        return exponent([row.asperities for row in rows], [row.seconds for row in rows])
+#: Size, scenes, and processes.
+SWEEPS = ((61, 10_000, 1), (61, 10_000, 2), (700, 500, 1), (700, 500, 2))
+
+#: A quick run leaves out larger sizes, compares solvers on the first three scenes only, and takes a
+#: part of the scenes of the first sweep.
+QUICK, PART = 20_000, 20
 
 
-def run(plan: Plan, announce: Announce | None = None) -> Bench:
+def attempts(quick: bool) -> list[Attempt]:
+    """Every solver at several tolerances, those that end with a Newton step also without it."""
+    found = [Attempt("newton", "default", Newton())]
+    for kind, most in COUPLINGS.items():
+        label = "newton" if kind is None else f"newton, {kind}"
+        for power in (2, 6, 12) if quick else (2, 4, 8, 12):
+            solver = Newton(tolerance=10.0**-power)
+            found.append(Attempt(label, f"tolerance 1e-{power}", solver, kind, most))
+    for step, ending in ((True, " + Newton step"), (False, "")):
+        for power in (3, 9) if quick else (3, 6, 9, 11):
+            setting, tolerance = f"tolerance 1e-{power}", 10.0**-power
+            conic = Conic(tolerance=tolerance, newton_step=step)
+            convex = ConicCVXPY(tolerance=tolerance, newton_step=step)
+            found.append(Attempt(f"conic{ending}", setting, conic, most=PROGRAMS))
+            found.append(Attempt(f"conic in CVXPY{ending}", setting, convex, most=PROGRAMS))
+        for rows, power in ((16, 4), (64, 6)) if quick else ((16, 4), (16, 6), (64, 6), (256, 6)):
+            program = BristleQP(rows, newton_step=step, tolerance=10.0**-power)
+            setting = f"{rows} bristles, tolerance 1e-{power}"
+            found.append(Attempt(f"bristles{ending}", setting, program, most=PROGRAMS))
+    return found
+
+
+def run(*, quick: bool, announce: Announce | None = None) -> Bench:
     """Measure all of it.
 
     announce : told in a line what is going on
     """
-    began = time.perf_counter()
-    machine = describe_machine()
+    patience = 0.1 if quick else 1.0
+    began, machine, rows = time.perf_counter(), describe_machine(), list[Row]()
     say = announce or (lambda line: None)
-    _load_code(say)
-    panels: list[Panel] = []
-    spent: Spent = {}
-    for family, size in plan.work:
-        panels.append(_panel(plan, family, size, spent, say))
-    cost = []
-    for family, size in plan.cost:
-        say(f"cost: {family}, about {size:,}")
-        make = partial(scene, family, REFINEMENTS[size])
-        cost.append(measure_cost(family, make, patience=plan.patience))
-    sheared: list[ShearRow] = []
-    for what, sizes in (("state", plan.shear), ("loss curve", plan.cycles)):
-        for family, size in sizes:
-            say(f"shear, {what}: {family}, about {size:,}")
-            sheared.append(_shear_row(plan, what, family, size, sheared))
-    followed = []
-    for family, size in plan.paths:
-        say(f"load path: {family}, about {size:,}")
-        followed.append(measure_path(family, scene(family, REFINEMENTS[size])))
-    swept: list[SweepRow] = []
-    for size, scenes, workers in plan.sweeps:
-        say(f"sweep: {scenes:,} scenes of about {size:,}")
-        swept += measure_sweeps(size, scenes, workers)
-    slopes = []
-    for family, size in plan.gradients:
-        say(f"gradient: {family}, about {size:,}")
-        slopes.append(measure_gradient(family, scene(family, REFINEMENTS[size])))
-    return Bench(
-        machine=machine,
-        quick=plan.quick,
-        panels=tuple(panels),
-        cost=tuple(cost),
-        shear=tuple(sheared),
-        paths=tuple(followed),
-        sweeps=tuple(swept),
-        gradients=tuple(slopes),
-        seconds=time.perf_counter() - began,
-    )
-
-
-def _load_code(say: Announce) -> None:
-    """Have every solver import what it needs, so that times are those of solving."""
-    say("loading the solvers")
-    small = scene("lattice", 1.0)
-    for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):
+    for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # have them import what they need
         with suppress(InputError, SolverError):  # it will come again, and be told
-            press(small, approach=APPROACH, solver=solver)
+            press(scene("lattice", 1.0), approach=APPROACH, solver=solver)
+    for family, size in WORK[:3] if quick else WORK:
+        rows += _panel(family, size, quick, patience, say)
+    for task, sizes in {"press": PRESSES, "from nothing": PRESSES, **FOLLOWING}.items():
+        for family, size in sizes:
+            if size <= QUICK or not quick:
+                say(f"{task}: {family}, about {size:,}")
+                rows.append(measure_task(task, family, size, patience))
+    for size, scenes, workers in SWEEPS[:1] if quick else SWEEPS:
+        say(f"sweep: scenes of about {size:,}")
+        rows.append(measure_sweep(size, scenes // PART if quick else scenes, workers))
+    return Bench(machine, quick, tuple(rows), time.perf_counter() - began)
 
 
-def _panel(plan: Plan, family: Family, size: int, spent: Spent, say: Announce) -> Panel:
-    """Every attempt at one scene; `spent` knows what the smaller ones took, and is added to."""
-    each = scene(family, REFINEMENTS[size])
-    n = len(each)
-    title = f"{family}, {n:,} asperities"
-    say(f"{title}: reference")
-    reference, without = _reference(each)
-    used = NormalProblem.assemble(each, approach=APPROACH).influence.name
-    tried: list[Attempt] = []
-    rows: list[Row] = []
-    for attempt in attempts(plan):
-        if attempt.influence == used:
-            continue  # the default takes it anyway
-        say(f"{title}: {attempt.solver}, {attempt.setting}")
-        expected = _expected(attempt, n, spent)
-        if expected > plan.longest:
-            message = f"more than {plan.longest:g} s expected (in brackets: about how many)"
-            setting = attempt.setting
-            row = Row(attempt.solver, setting, attempt.default, "left out", message, expected)
-        else:
-            row = measure(each, attempt, reference, patience=plan.patience)
-        tried.append(attempt)
-        rows.append(row)
-    say(f"{title}: the closest again")
-    rows = _timed_in_turns(each, tried, rows, plan.patience)
-    answered = [row for row in rows if row.outcome == "answered"]
-    spent |= {(row.solver, row.setting): (n, row.seconds) for row in answered}
-    return Panel(family, n, reference, without, mark_frontier(rows))
+def _panel(family: Family, size: int, quick: bool, patience: float, say: Announce) -> list[Row]:
+    """Every attempt at one scene.
 
-
-def _timed_in_turns(
-    each: Scene, tried: Sequence[Attempt], rows: Sequence[Row], patience: float
-) -> list[Row]:
-    """What seems to beat the default solver is timed again, and so is that: in turns.
-
-    Both keep their least times, so that a moment in which the machine was busy decides nothing.
+    What seems to beat the default solver is timed again, and so is that: in turns. Both keep their
+    least times, so that a moment in which the machine was busy decides nothing.
     """
-    rows = list(rows)
+    say(f"{family}, about {size:,}: reference")
+    each = scene(family, REFINEMENTS[size])
+    problem = NormalProblem.assemble(each, approach=APPROACH)
+    reference = None
+    with suppress(InputError, SolverError):
+        reference = refine(problem, Newton().solve(problem).loads)
+    tried = [
+        attempt
+        for attempt in attempts(quick)
+        if attempt.influence != problem.influence.name and len(each) <= attempt.most
+    ]
+    rows = []
+    for attempt in tried:
+        say(f"{family}, about {size:,}: {attempt.solver}, {attempt.setting}")
+        rows.append(measure_attempt(family, each, attempt, reference, patience))
     for _ in range(ROUNDS):
         rivals = better_than_default(rows)
-        if not rivals:
-            break
         for i, row in enumerate(rows):
-            if row.default or row in rivals:
-                again = measure(each, tried[i], None, patience=patience)
+            if rivals and (row.default or row in rivals):
+                again = measure_attempt(family, each, tried[i], None, patience)
                 if again.outcome == "answered":
-                    least = {name: min(getattr(row, name), getattr(again, name)) for name in PARTS}
-                    rows[i] = replace(row, **least)
+                    rows[i] = replace(row, seconds=min(row.seconds, again.seconds))
     return rows
-
-
-def _expected(attempt: Attempt, n: int, spent: Spent) -> float:
-    """[s] what an attempt is going to take, from a smaller scene; 0 where nothing is known."""
-    if attempt.growth is None or (attempt.solver, attempt.setting) not in spent:
-        return 0.0
-    size, seconds = spent[attempt.solver, attempt.setting]
-    return float(seconds * max(1.0, n / size) ** attempt.growth)
-
-
-def _reference(each: Scene) -> tuple[Reference | None, str]:
-    """And why there is none."""
-    if not measurable(each):
-        return None, f"no reference for {len(each):,} asperities off a lattice"
-    problem = NormalProblem.assemble(each, approach=APPROACH)
-    try:
-        return refine(problem, Newton().solve(problem).loads), ""
-    except (InputError, SolverError) as error:
-        return None, str(error)
-
-
-def _shear_row(
-    plan: Plan, what: str, family: Family, size: int, before: list[ShearRow]
-) -> ShearRow:
-    each = scene(family, REFINEMENTS[size])
-    states = 1 if what == "state" else plan.amplitudes
-    contact = press(each, approach=APPROACH)
-    touching = int(np.count_nonzero(contact.loads))
-    blank = ShearRow(what, family, len(each), touching, states, "answered")
-    smaller = [row for row in before if row.what == what and row.outcome == "answered"]
-    if smaller:
-        growth = len(each) / smaller[-1].asperities
-        if (expected := smaller[-1].seconds * growth) > 5 * plan.longest:
-            message = f"at least {expected:.1g} s expected, more than {5 * plan.longest:g} s"
-            return replace(blank, outcome="left out", message=message)
-    memory = MemoryRise()
-    try:
-        _, seconds = timed(lambda: _sheared(contact, states))
-    except (InputError, SolverError) as error:
-        return replace(blank, outcome=outcome_of(error), message=str(error))
-    return replace(blank, seconds=seconds, memory=memory.risen())
-
-
-def _sheared(contact: Contact, states: int) -> object:
-    most = checks.friction(contact.scene.friction) * contact.load
-    if states == 1:
-        return shear(contact, force=0.5 * most)
-    return cycles(contact, most * np.arange(1, states + 1) / (states + 1))

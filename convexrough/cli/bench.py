@@ -19,25 +19,23 @@ def bench(
 ) -> int:
     """Speed against error: every solver, many sizes, the true error of each answer.
 
-    Results go to the folder bench-results unless --out names another. With --page, the tables also
-    go between the markers of that page, and the figures into the folder figures beside it.
+    Results go to the folder bench-results unless --out names another. With --page, what was found
+    also goes between the markers of that page, and the figures into the folder figures beside it.
     """
+    from convexrough.bench import page as pages
     from convexrough.bench import suite
-    from convexrough.bench.files import write_bench
-    from convexrough.bench.page import describe, split_page
-    from convexrough.bench.plan import full_plan, quick_plan
-    from convexrough.bench.summary import summarise
     from convexrough.run.results import claim_folder
     from convexrough.run.summary import to_json
 
     if page is not None:
-        split_page(page)  # a page without markers is refused before anything is computed
+        pages.split_page(page)  # a page without markers is refused before anything is computed
     folder = out or Path("bench-results")
     claim_folder(folder, force=force)
-    plan = quick_plan() if quick else full_plan()
     with progress("measuring") as show:
-        found = suite.run(plan, announce=show)
-        files = write_bench(folder, found, figures=not no_figures, page=page)
-    lines = [to_json(summarise(found))] if as_json else describe(found)
-    click.echo("\n".join(lines if as_json else [*lines, *written(folder, files)]))
+        found = suite.run(quick=quick, announce=show)
+        files = pages.write_bench(folder, found, figures=not no_figures, page=page)
+    if as_json:
+        click.echo(to_json(found.summary()))
+    else:
+        click.echo("\n".join([*pages.describe(found), *written(folder, files)]))
     return DONE

@@ -13,8 +13,8 @@ import click
 from convexrough.errors import InputError
 
 if TYPE_CHECKING:
-    from convexrough.run.scene_file import UnitNames
     from convexrough.run.summary import Summary
+    from convexrough.tabular.units import UnitNames
 
 DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2, 3, 4, 130
 

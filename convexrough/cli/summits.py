@@ -73,9 +73,9 @@ def summits(
 ) -> int:
     """Find the summits of a measured surface, and how far they can be trusted.
 
-    SURFACE is .npy, .npz, a matrix or x, y, height in text, or an instrument's file. Pressed by a
-    sphere about the middle of the map (--scene, or --radius with --approach or --load), contacts,
-    proof, crowding and model error are held against the pruning.
+    SURFACE is .npy, .npz, .mat, a matrix or x, y, height in text, or an instrument's file. Pressed
+    by a sphere about the middle of the map (--scene, or --radius with --approach or --load),
+    contacts, proof, crowding and model error are held against the pruning.
 
     Exit status: 3 where the contact at the chosen pruning is not certified.
     """
@@ -155,6 +155,9 @@ def _scan(
         from convexrough.run.scene_file import read_scene
 
         file = read_scene(how["scene"], asperities=chosen)
+        if file.units.length and not surface.unit:
+            expected = f"--unit, as the scene is in {file.units.length}"
+            raise InputError("unit", found="none", expected=expected)
         if surface.unit and file.units.length and surface.unit != file.units.length:
             surface = surface.to_unit(file.units.length)
             chosen = surface.summits(prune, fit)
@@ -167,7 +170,7 @@ def _scan(
         contact = press(chosen)
     except SolverError:
         contact = None
-    return Scanned(surface, maxima, chosen, curve, contact, file.units.length if file else "")
+    return Scanned(surface, maxima, chosen, curve, contact)
 
 
 def _pressing(

@@ -114,7 +114,7 @@ def _iterate(
     tolerance: float,
 ) -> Array:
     """Preconditioned conjugate gradients: docs/theory/newton.md, "Many"."""
-    single = influence.prefers_single
+    single = not influence.at_hand
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
     size = float(np.abs(defect).max()) or 1.0

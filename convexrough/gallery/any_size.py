@@ -9,7 +9,7 @@ import numpy as np
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.errors import InputError
-from convexrough.gallery.recipe import FRICTION, MATERIAL
+from convexrough.gallery.cases import FRICTION, MATERIAL
 from convexrough.influence.choice import couple
 from convexrough.record import Record
 from convexrough.scene.asperities import Asperities
@@ -52,7 +52,7 @@ def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufac
     patch = Asperities.hexagonal(spacing=1.0, tip_radius=1.0, within=0.6 * np.sqrt(count) + 1)
     tips = random.uniform(4.0, 8.0, count)
     flat = Asperities(patch.positions[:count], tips)
-    scene = Scene(1e3 * np.sqrt(count), flat, MATERIAL, FRICTION)
+    scene = Scene(1e3 * np.sqrt(count), flat, MATERIAL, FRICTION, geometry="summit")
 
     touches = random.random(count) < part
     radii = np.where(touches, random.uniform(0.1, 0.45, count), 0.0)

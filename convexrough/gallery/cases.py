@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -14,19 +17,20 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
-from convexrough.gallery import friction, grazing, layouts, limits, units
-from convexrough.gallery.answers import answer
-from convexrough.gallery.recipe import Recipes
 from convexrough.record import Record
+from convexrough.scene.asperities import Asperities
+from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
 
-RECIPES: Recipes = {
-    **limits.RECIPES,
-    **grazing.RECIPES,
-    **layouts.RECIPES,
-    **units.RECIPES,
-    **friction.RECIPES,
-}
+#: Scenes and answers, a line for each case; `tests/gallery_answers.py` writes it.
+DATA = "cases.json"
+
+#: That of every case but those in other units: the words of friction do not depend on it.
+FRICTION = 0.5
+MATERIAL = Material(contact_modulus=1.0, poisson_ratio=0.3)
+
+#: How many times the shear turns in a history.
+REVERSALS = 100_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,7 +104,7 @@ class HardCase(Record):
 
     @cached_property
     def touching(self) -> NDArray[np.bool_]:
-        """(n,) who touches."""
+        """(n,) which asperities touch."""
         return frozen(np.array([digits != "0" for digits in self.loads]))
 
     def judge(self, loads: ArrayLike, *, within: float = 1e-6, floor: float = 0.0) -> Judged:
@@ -147,14 +151,14 @@ def names(*wanted: str) -> tuple[str, ...]:
     >>> cr.gallery.names("few", "clustered")
     ('one', 'one-under-load', 'two-equal', 'clustered')
     """
-    families = {name: recipe().family for name, recipe in RECIPES.items()}
+    families = {name: stored["family"] for name, stored in _cases().items()}
     for each in wanted:
-        if each not in RECIPES and each not in families.values():
-            valid = [*RECIPES, *sorted(set(families.values()))]
+        if each not in families and each not in families.values():
+            valid = [*families, *sorted(set(families.values()))]
             expected = f"the name of a case or a family; {checks.nearest(str(each), valid)}"
             raise InputError("names", found=repr(each), expected=expected)
     return tuple(
-        name for name in RECIPES if not wanted or name in wanted or families[name] in wanted
+        name for name in families if not wanted or name in wanted or families[name] in wanted
     )
 
 
@@ -164,25 +168,56 @@ def case(name: str) -> HardCase:
     >>> cr.gallery.case("one").why
     'one contact: no neighbours, no shells, an answer in closed form'
     """
-    if name not in RECIPES:
-        expected = f"the name of a case; {checks.nearest(str(name), RECIPES)}"
+    if name not in _cases():
+        expected = f"the name of a case; {checks.nearest(str(name), _cases())}"
         raise InputError("name", found=repr(name), expected=expected)
-    recipe = RECIPES[name]()
-    stored = answer(name, recipe)
+    stored = _cases()[name]
+    answer = stored["answer"]
     return HardCase(
         name=name,
-        family=recipe.family,
-        why=recipe.why,
-        scene=recipe.scene,
-        approach=recipe.approach,
-        load=recipe.load,
-        loads=tuple(stored["loads"]),
-        gaps=tuple(stored["gaps"]),
-        exact_approach=stored["approach"],
-        exact_load=stored["load"],
-        shear_force=float.fromhex(stored["shear_force"]),
-        history=frozen(np.array(recipe.history) * float.fromhex(stored["shear_force"])),
-        forces=tuple(stored["forces"]),
-        slips=tuple(stored["slips"]),
-        displacement=stored["displacement"],
+        family=stored["family"],
+        why=stored["why"],
+        scene=Scene(
+            stored["sphere_radius"],
+            Asperities(stored["positions"], stored["tip_radii"], stored["heights"]),
+            Material(stored["contact_modulus"], stored["poisson_ratio"]),
+            stored["friction"],
+            stored["geometry"],
+        ),
+        approach=stored["prescribed"].get("approach"),
+        load=stored["prescribed"].get("load"),
+        loads=tuple(answer["loads"]),
+        gaps=tuple(answer["gaps"]),
+        exact_approach=answer["approach"],
+        exact_load=answer["load"],
+        shear_force=stored["shear_force"],
+        history=frozen(np.array(_reversals(stored["reversals"])) * stored["shear_force"]),
+        forces=tuple(answer["forces"]),
+        slips=tuple(answer["slips"]),
+        displacement=answer["displacement"],
     )
+
+
+@cache
+def _cases() -> dict[str, Any]:
+    text = files("convexrough.gallery").joinpath(DATA).read_text(encoding="utf-8")
+    found: dict[str, Any] = json.loads(text)
+    return found
+
+
+def _reversals(kind: str) -> list[float]:
+    """Shear forces over the last one; each is wiped out by that.
+
+    "random" : up to 0.9 of it, some repeated, some 0
+    "nested" : each turn inside the one before, so that all are remembered until the last
+    """
+    if kind == "nested":
+        turns = [(-0.9 if k % 2 else 0.9) * (1 - k / REVERSALS) for k in range(REVERSALS)]
+        return [*turns, 1.0]
+    if kind == "random":
+        numbers, turns = random.Random(8), [0.0]
+        for k in range(1, REVERSALS):
+            kept = turns[-1] if k % 10 == 0 else 1.8 * numbers.random() - 0.9
+            turns.append(0.0 if k % 7 == 0 else kept)
+        return [*turns, 1.0]
+    return []

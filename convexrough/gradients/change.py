@@ -1,30 +1,32 @@
 """Forward derivatives: what changes when a scene and its load change a little, in one direction.
 
-One linear system for the pressed state and one for a friction state: the same as of gradients, read
-the other way (docs/theory/gradients.md, "Forwards").
+One linear system at each level that a result hangs on: the same as of gradients, read the other way
+(docs/theory/gradients.md, "Forwards").
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.gradients.adjoint import Friction
-from convexrough.gradients.origin import far_radii, felt, held, pressed
-from convexrough.gradients.system import TOLERANCE, System
-from convexrough.influence import Influence
+from convexrough.friction.shear import ShearState
+from convexrough.gradients.gradient import held, levels
+from convexrough.gradients.pulled import ZERO, product
+from convexrough.gradients.scene import Geometry, curvatures
+from convexrough.gradients.states import Frictional
 from convexrough.influence.choice import couple
+from convexrough.normal.level import Level
+from convexrough.numbers import balls
+from convexrough.numbers.balls import Ball
 from convexrough.record import Along, Record, Table
-from convexrough.scene.scene import Scene
-from convexrough.shearing.problem import TangentialProblem
-from convexrough.shearing.state import ShearState
+from convexrough.scene.base import sphere_radius
 
 #: What a direction has one number of.
 WHOLE = (
@@ -103,164 +105,180 @@ class ShearChange(Table):
     displacement: float
 
 
-def contact_change(
-    contact: Contact, direction: Direction, *, tolerance: float = TOLERANCE
-) -> ContactChange:
+def contact_change(contact: Contact, direction: Direction) -> ContactChange:
     """As `Contact.change`: what friction and a shear force do is asked of a friction state."""
     checks.instance("direction", direction, Direction)
     for name in ("friction", "force"):
         if (given := getattr(direction, name)) != 0.0:
             expected = "0: a contact depends on neither friction nor force; states change by both"
             raise InputError(name, found=given, expected=expected)
-    return _pressed_change(contact, direction, tolerance)
+    top = levels(contact).top
+    return _pressed(contact, direction, _Bent.of(top, direction), top)[0]
 
 
-def _pressed_change(contact: Contact, direction: Direction, tolerance: float) -> ContactChange:
-    """Of the contact alone.
-
-    zeta + A (c0 zeta) = dd - P^(2/3) dk - dA P + dD0,  dP = c0 zeta;  sum dP = dP under load.
-    """
+def _pressed(
+    contact: Contact, direction: Direction, bent: _Bent, top: Level
+) -> tuple[ContactChange, _Moved]:
+    """Of the contact alone, and of its level."""
     if direction.load is not None and direction.approach is not None:
         found, expected = "both", "at most one of the two, as only one is held"
         raise InputError("load, approach", found=found, expected=expected)
-    holding = held(contact, None)
+    by_load = held(contact, None) == "load"
     if direction.load is not None or direction.approach is not None:
-        holding = "approach" if direction.load is None else "load"
-    problem = pressed(contact)
-    bent = _Bent.of(contact, direction)
-    units, touching = problem.units, problem.touching
-    turned = bent.coupling(problem.influence, touching, problem.loads)
-    local = problem.ceilings * bent.local[touching]
-    right = bent.offsets[touching] / units.length - local - turned
-    system = System(problem, problem.stiffest, tolerance)
-    if holding == "load":
-        solution = system.solve(right, (direction.load or 0.0) / units.force)
-        approach = solution.shift * units.length
+        by_load = direction.approach is None
+    units = top.problem.units
+    if by_load:
+        total = Ball.exact(direction.load or 0.0) / units.force
     else:
-        approach = direction.approach or 0.0
-        solution = system.solve(right + approach / units.length)
-    loads = problem.stiffest * solution.values
-    apart = np.flatnonzero(contact.loads == 0.0)
-    return ContactChange(
+        alone = bent.of_level(top, ZERO).approach
+        lowered = Ball.exact(direction.approach or 0.0) / units.length - alone
+        total = lowered / top.tangent.approach
+    moved = bent.of_level(top, total)
+    loads = top.problem.to_scene(moved.loads.value * units.force)
+    approach = float(moved.approach.value) * units.length if by_load else direction.approach or 0.0
+    change = ContactChange(
         contact=contact,
         direction=direction,
-        loads=frozen(problem.to_scene(loads * units.force)),
-        gaps=frozen(_gap_changes(contact, problem, bent, apart, loads, approach)),
+        loads=frozen(loads),
+        gaps=frozen(_gap_changes(contact, bent, loads, approach)),
         approach=approach,
-        load=float(loads.sum()) * units.force,
+        load=float(moved.total.value) * units.force,
     )
+    return change, moved
 
 
-def _gap_changes(
-    contact: Contact,
-    problem: TangentialProblem,
-    bent: _Bent,
-    apart: Indices,
-    loads: Array,
-    approach: float,
-) -> Array:
-    """(n,) [length] of open asperities: dg = A dP + dA P - dd - dD0."""
-    scene, changes = contact.scene, np.zeros(len(contact.scene))
-    if len(apart) == 0:
-        return changes
-    everywhere = np.arange(len(scene))
-    influence = couple(scene, everywhere, problem.influence.scale, contact.influence)
-    moved = influence.apply(problem.to_scene(loads))
-    moved += bent.coupling(influence, everywhere, problem.to_scene(problem.loads))
-    gap = moved * problem.units.length - bent.offsets - approach
-    changes[apart] = gap[apart]
-    return changes
+def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -> Array:
+    """(n,) [length] of open asperities: dg = A dP + dA P - dd - dD0, in float64."""
+    scene, open_ones = contact.scene, contact.loads == 0.0
+    if not open_ones.any():
+        return np.zeros(len(scene))
+    scale = 1.0 / (np.pi * scene.material.contact_modulus)
+    influence = couple(scene, np.arange(len(scene)), scale, contact.influence)
+    moved = influence.apply(loads) - bent.modulus * influence.apply(contact.loads)
+    points = bent.everywhere.points.value
+    if points.any():
+        moved += (points * influence.slopes(contact.loads)).sum(axis=1)
+        for k in (0, 1):
+            moved -= influence.slopes(points[:, k] * contact.loads)[:, k]
+    return np.where(open_ones, moved - bent.everywhere.offsets.value - approach, 0.0)
 
 
-def shear_change(
-    state: ShearState, direction: Direction, *, tolerance: float = TOLERANCE
-) -> ShearChange:
-    """As `ShearState.change`.
-
-    m = sigma x dP - c eta dlog k,  Y + A (c Y) = beta - dA u - A m,  sum c Y = dT - sum m;
-    du = m + c Y,  dDelta = beta,  d|slip| = sigma Y - C (dlog k + 2 dP / (3 P)) where sliding.
-    """
+def shear_change(state: ShearState, direction: Direction) -> ShearChange:
+    """As `ShearState.change`: the change at the level P less that at L = P - Q / f."""
     contact = state.contact
     checks.instance("direction", direction, Direction)
-    first = _pressed_change(contact, direction, tolerance)
-    problem, bent = pressed(contact), _Bent.of(contact, direction)
-    there = Friction.of_state(problem, state)
-    felt(problem, "force", np.array([there.total]))
-    sign = -1.0 if state.force < 0 else 1.0
-    if problem.at_limit(np.array([there.total]))[0]:
+    sheared = Frictional.of(state)
+    if sheared.height(state.force) == sheared.known.load:
         expected = "a force below f P, where the derivative is finite"
         raise InputError("force", found=f"{state.force}: gross sliding", expected=expected)
-    touching, f = problem.touching, problem.friction
-    dP = first.loads[touching] / problem.units.force
-    local = bent.local[touching]
-    dT = sign * direction.force / problem.force_unit - there.total * direction.friction / f
-    m = there.signs * there.widths * dP - there.slopes * there.deflections * local
-    turned = bent.coupling(problem.influence, touching, there.increments)
-    system = System(problem, there.slopes, tolerance)
-    solution = system.solve(-turned - problem.couple(m), dT - float(m.sum()))
-    du = m + there.slopes * solution.values
-    ceilings = problem.ceilings * (local + 2.0 * dP / (3.0 * problem.loads))
-    slides = np.where(there.slides, solution.values - there.signs * ceilings, 0.0)
-    nu = contact.scene.material.poisson_ratio
-    ratio = direction.poisson_ratio / ((1.0 - nu) * (2.0 - nu)) + direction.friction / f
-    travel = sign * problem.travel_unit
-    slips = problem.to_scene(travel * slides) + state.slips * ratio
-    forces = (
-        problem.to_scene(sign * problem.force_unit * du) + state.forces * direction.friction / f
-    )
+    sign = -1.0 if state.force < 0 else 1.0
+    top, low = sheared.known.top, sheared.below("force", state.force, "load")
+    bent, f, unit = _Bent.of(top, direction), sheared.f, sheared.unit
+    first, above = _pressed(contact, direction, bent, top)
+    by_friction = Ball.exact(direction.friction) / f
+    slid = sign * direction.force / f / unit - (top.load - low.load) * by_friction  # dT
+    below = bent.of_level(low, above.total - slid)
+    ratio = Ball.exact(direction.poisson_ratio) * sheared.by_ratio + by_friction
+    far, travel = sign * sheared.known.travel_unit, sign * sheared.known.force_unit
+    sliding = ~low.springs.touching & (top.loads.value > 0)
+    gaps, opened = -low.indentation, -below.indentation
+    slips = balls.where(sliding, far * (opened + ratio * gaps), 0.0 * gaps)
+    carried, moved = top.loads - low.loads, above.loads - below.loads
+    rise, risen = top.approach - low.approach, above.approach - below.approach
+    to_scene = top.problem.to_scene
     return ShearChange(
         contact=contact,
         direction=direction,
         pressed=first,
-        forces=frozen(forces),
-        slips=frozen(slips),
-        displacement=travel * solution.shift + state.displacement * ratio,
+        forces=frozen(to_scene((travel * (moved + by_friction * carried)).value)),
+        slips=frozen(to_scene(slips.value)),
+        displacement=float((far * (risen + ratio * rise)).value),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Bent:
-    """What a direction does to a scene: (n,) each, and (n, 2).
+class _Moved(NamedTuple):
+    """How a level changes, in own units: P, n, D0 and the total load."""
 
-    offsets : dd [length];  local : d log k;  points : of the contact points [length]
-    modulus : d log E*
+    loads: Ball
+    indentation: Ball
+    approach: Ball
+    total: Ball
+
+
+class _Bending(NamedTuple):
+    """What a direction does to some asperities: dd [length], dlog k, and dc [length]."""
+
+    offsets: Ball
+    local: Ball
+    points: Ball
+
+
+@dataclass(frozen=True)
+class _Bent:
+    """What a direction does to a scene.
+
+    everywhere : all asperities;  here : the candidates;  modulus : dlog E*
     """
 
-    offsets: Array
-    local: Array
-    points: Array
+    geometry: Geometry
+    everywhere: _Bending
+    here: _Bending
     modulus: float
 
     @classmethod
-    def of(cls, contact: Contact, direction: Direction) -> _Bent:
-        scene: Scene = contact.scene
-        n, asperities, R = len(scene), scene.asperities, scene.sphere_radius
+    def of(cls, top: Level, direction: Direction) -> _Bent:
+        problem = top.problem
+        scene, n = problem.scene, len(problem.scene)
         heights = checks.array("heights", direction.heights, length=n)
         tips = checks.array("tip_radii", direction.tip_radii, length=n)
-        moved = _moved(direction.positions, n)
-        sphere = direction.sphere_radius
-        modulus = direction.contact_modulus / scene.material.contact_modulus
-        points, rho = asperities.positions, asperities.tip_radii
-        far = far_radii(contact, np.arange(n))
-        closest = scene.geometry == "closest"
-        dfar = sphere + (tips if closest else 0.0)
-        r2 = (points**2).sum(axis=1)
-        sunk = (points * moved).sum(axis=1) / far - r2 * dfar / (2.0 * far**2)
-        radii = scene.relative_radii * (sphere / R**2 + tips / rho**2)  # d log R_i
-        if closest:
-            turned = (sphere * rho - tips * R) / far**2
-            moved = moved * (R / far)[:, None] + points * turned[:, None]
-        return cls(heights - sunk, -(2.0 * modulus + radii) / 3.0, moved, modulus)
+        if direction.sphere_radius:
+            sphere_radius(scene.sphere_radius, "sphere_radius")
+        moved, sphere = _moved(direction.positions, n), Ball.exact(direction.sphere_radius)
+        modulus = Ball.exact(direction.contact_modulus) / scene.material.contact_modulus
+        every = Geometry(
+            problem,
+            Ball.exact(scene.asperities.positions),
+            Ball.exact(scene.asperities.tip_radii),
+            curvatures(scene),
+        )
+        bent = _bending(every, Ball.exact(heights), Ball.exact(tips), Ball.exact(moved), sphere)
+        bent = bent._replace(local=bent.local - modulus * 2.0 / 3.0)
+        here = _Bending(*(each[problem.candidates] for each in bent))
+        return cls(Geometry.of(problem), bent, here, float(modulus.value))
 
-    def coupling(self, influence: Influence, places: Indices, loads: Array) -> Array:
-        """(n,) dA loads among the asperities at these places."""
-        change = -self.modulus * influence.apply(loads)
-        points = self.points[places]
-        if points.any():
-            change += (points * influence.slopes(loads)).sum(axis=1)
+    def of_level(self, level: Level, total: Ball) -> _Moved:
+        """dP / c + A dP = dd - C dlog k - dA P + dD0,  sum dP = total."""
+        problem = level.problem
+        raised = self.here.offsets / problem.units.length - self._felt(level)
+        right = raised - level.indentation.positive_part() * self.here.local
+        loads, approach = level.response(right, total)
+        return _Moved(loads, approach + raised - product(level, loads), approach, total)
+
+    def _felt(self, level: Level) -> Ball:
+        """(n,) dA P."""
+        felt = level.approach + level.problem.exact.offsets - level.indentation
+        change, points = felt * -self.modulus, self.here.points
+        if points.value.any():
+            every, loads = np.arange(len(level.problem)), level.loads
+            change = change + (points * self.geometry.slopes(loads, every)).sum()
             for k in (0, 1):
-                change -= influence.slopes(points[:, k] * loads)[:, k]
-        return np.asarray(change)
+                change = change - self.geometry.slopes(points[:, k] * loads, every)[:, k]
+        return change
+
+
+def _bending(geometry: Geometry, heights: Ball, tips: Ball, moved: Ball, sphere: Ball) -> _Bending:
+    points, rho, curvature = geometry.points, geometry.tips[:, None], geometry.curvature
+    straighter, tips = curvature * curvature * -sphere, tips[:, None]  # d(1/R), drho
+    share = geometry.share * geometry.share
+    flatter = straighter - curvature * curvature * tips if geometry.closest else straighter
+    sunk = points * moved * geometry.bend + points * points * (share * flatter) * 0.5
+    local = (
+        geometry.relative * (straighter.sum() * 0.5 - tips[:, 0] / (rho[:, 0] * rho[:, 0])) / 3.0
+    )
+    if geometry.closest:
+        moved = moved * geometry.share - points * (share * (straighter * rho + curvature * tips))
+    sunk = sunk.sum()
+    return _Bending(heights - sunk, local, moved)
 
 
 def _moved(positions: ArrayLike, n: int) -> Array:

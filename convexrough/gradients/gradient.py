@@ -1,39 +1,92 @@
-"""The result: derivatives with respect to everything in a scene, in its units.
+"""The result: derivatives with respect to everything in a scene, each with a proved bound.
 
-A derivative comes as dJ = offsets'dd + local'd log k + sum over pairs left'dA right + ...
-(`gradients.adjoint`); here dd, dk and dA become changes of heights, tip radii, positions, the
-sphere's radius and the modulus (docs/theory/scene-derivatives.md, "To the scene").
+Every number that can be differentiated is a sum over load levels of weights on V, D0, loads and
+indentations there (`gradients.pulled`), whose levels follow the loads, the forces and friction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from convexrough import checks
 from convexrough.arrays import Array, among_zeros, frozen
-from convexrough.contact import Contact
+from convexrough.contact import Contact, levels_of
 from convexrough.drawn import Drawn
 from convexrough.errors import InputError
-from convexrough.gradients.adjoint import Holding, Pulled, through_pressing
-from convexrough.gradients.bounds import FEW
-from convexrough.gradients.doubts import LossDoubt, height_errors
-from convexrough.gradients.origin import Origin, far_radii, pressed
-from convexrough.gradients.refined import refined_errors
-from convexrough.gradients.system import TOLERANCE
+from convexrough.gradients.pulled import ZERO, Moves, Part, Pulled, value_of
+from convexrough.gradients.scene import Derivatives
+from convexrough.normal.level import Level, Levels
+from convexrough.normal.problem import NormalProblem
+from convexrough.numbers.balls import Ball
 from convexrough.record import Along, Table
-from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.cycle import cycle
-from convexrough.sphere.smooth import smooth
+from convexrough.scene.base import named
+from convexrough.sphere.smooth import smooth_reference
 
-#: What a derivative may be by, one number or one for each asperity, but for positions.
-PARAMETERS = (
-    *("heights", "tip_radii", "sphere_radius", "contact_modulus", "poisson_ratio"),
-    *("load", "approach", "friction", "force", "maximum", "minimum", "forces"),
-)
+Holding = Literal["load", "approach"]
+
+#: Derivatives by numbers of the whole, and by what there are several of, which need not be there.
+WHOLE = ("friction", "load", "approach", "force", "maximum", "minimum")
+SEVERAL = ("loads", "forces")
+
+
+class Number(NamedTuple):
+    """A number of a contact and its derivatives, forces and load held.
+
+    value    : J;  scaled : the part of it that scales with forces where weights are held
+    pulled   : what each level has a part in;  problem : whose candidates they are of
+    slopes   : dJ by parameters that are no numbers of the scene's geometry
+    steep    : what those are infinite times: of numbers that hang on D0 at no load
+    """
+
+    contact: Contact
+    problem: NormalProblem
+    top: Level
+    value: Ball
+    scaled: Ball
+    pulled: Sequence[Pulled]
+    slopes: Mapping[str, Ball]
+    steep: Mapping[str, Ball]
+    sides: Mapping[str, Array] = {}  # (m, 2) from below and from above
+
+    @classmethod
+    def of(cls, contact: Contact, top: Level, parts: Sequence[Part], explicit: Moves) -> Number:
+        """The sum of these parts.
+
+        explicit : derivatives by parameters at fixed levels
+        """
+        pulled, slopes = [Pulled.of(part) for part in parts], dict(explicit)
+        steep: dict[str, Ball] = {}
+        for part, each in zip(parts, pulled, strict=True):
+            for name, rate in part.moves.items():
+                slopes[name] = slopes.get(name, ZERO) + each.load * rate
+                if each.steep.size > 0.0:
+                    steep[name] = steep.get(name, ZERO) + each.steep * rate
+        value = value_of(parts)
+        scaled = value - sum((part.length for part in parts), start=ZERO)
+        return cls(contact, top.problem, top, value, scaled, pulled, slopes, steep)
+
+    def times(self, factor: Ball, slopes: Mapping[str, Ball]) -> Number:
+        """The number times another, of which these are the derivatives times this number."""
+        names = {*self.slopes, *slopes}
+        pulled = [each.times(factor) for each in self.pulled]
+        both = {
+            name: self.slopes.get(name, ZERO) * factor + slopes.get(name, ZERO) for name in names
+        }
+        value, scaled = self.value * factor, self.scaled * factor
+        return self._replace(value=value, scaled=scaled, pulled=pulled, slopes=both)
+
+    def holding_the_approach(self) -> Number:
+        """The load follows: dJ|D0 = dJ|P - (J_P / S) dD0|P."""
+        slopes, units = dict(self.slopes), self.problem.units
+        by_approach = slopes.pop("load", ZERO) * units.force / self.top.tangent.approach
+        slopes["approach"] = by_approach / units.length
+        follows = Pulled.of(Part(self.top, approach=-by_approach))
+        return self._replace(pulled=[*self.pulled, follows], slopes=slopes)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,14 +100,23 @@ class Gradient(Table, Drawn):
     displacement X a loss W changes by dW|X = dW|Q - (W_Q / X_Q) dX|Q, with X_Q the derivative by
     the force of the state at the amplitude of the cycle, and W_Q that by `maximum`, twice.
 
+    What ends in `_error` or `_errors` is a proved bound on how far the derivative of that name is
+    from that of the true solution, for the scene whose data are the given float64 numbers: all
+    rounding is counted. Infinite where nothing is proved of the contact at a load that the number
+    depends on; and, where more than a thousand asperities touch that are not coupled by a matrix,
+    for positions and, in the geometry "closest", for all radii. An infinite derivative, in gross
+    sliding, has the error 0.
+
     value           : the number itself
     holding         : "load" or "approach": which of the two is held
-    heights, tip_radii : (n,)
+    heights, tip_radii : (n,);  positions : (n, 2) of x and y of each summit
+    sphere_radius   : None of other bases than a sphere
     contact_modulus : of E* at fixed Poisson's ratio;  poisson_ratio : at fixed E*
     load, approach  : of the one that is held; None of the other
     friction        : None where there is none
     force           : the shear force of a friction state;  maximum, minimum : those of a cycle
-    forces          : (m,) those of a history; None each where there is none
+    forces, loads   : (m,) those of a history or path, nan where the two sides differ, as at a
+        point that is repeated;  force_sides, load_sides : (m, 2) from below and from above
     balance_defect  : how far the modulus by its own sum is from what scaling all forces says,
         over the largest term of both
 
@@ -63,176 +125,178 @@ class Gradient(Table, Drawn):
     5.907e-10 2.717e-06
     """
 
-    _along: ClassVar[Along] = {("asperity",): ("heights", "tip_radii", "height_errors")}
+    _along: ClassVar[Along] = {
+        ("asperity",): ("heights", "height_errors", "tip_radii", "tip_radius_errors")
+    }
 
     contact: Contact
     holding: Holding
     value: float
+    value_error: float
     heights: Array
+    height_errors: Array
     tip_radii: Array
-    sphere_radius: float
+    tip_radius_errors: Array
+    sphere_radius: float | None
+    sphere_radius_error: float | None
     contact_modulus: float
+    contact_modulus_error: float
     poisson_ratio: float
-    load: float | None
-    approach: float | None
-    friction: float | None
+    poisson_ratio_error: float
     balance_defect: float
-    origin: Origin
+    number: Number
+    derivatives: Derivatives
+    load: float | None = None
+    load_error: float | None = None
+    approach: float | None = None
+    approach_error: float | None = None
+    friction: float | None = None
+    friction_error: float | None = None
     force: float | None = None
+    force_error: float | None = None
     maximum: float | None = None
+    maximum_error: float | None = None
     minimum: float | None = None
+    minimum_error: float | None = None
     forces: Array | None = None
+    force_errors: Array | None = None
+    force_sides: Array | None = None
+    loads: Array | None = None
+    load_errors: Array | None = None
+    load_sides: Array | None = None
+
+    @classmethod
+    def of(cls, number: Number, holding: Holding) -> Gradient:
+        """All of it in the scene's units."""
+        shown = number.holding_the_approach() if holding == "approach" else number
+        contact, problem, slopes = shown.contact, shown.problem, shown.slopes
+        found = Derivatives.of(problem, shown.pulled)
+        zero = Ball.exact(0.0)
+        modulus = found.contact_modulus + slopes.get("contact_modulus", zero)
+        sphere = found.sphere_radius
+        named: dict[str, Any] = {}
+        for name in WHOLE:
+            if name in slopes:
+                named[name], named[f"{name}_error"] = _number(slopes[name])
+            if name in shown.steep:
+                named[name] = float(np.copysign(np.inf, shown.steep[name].value))
+                named[f"{name}_error"] = 0.0
+        for name in SEVERAL:
+            if name in slopes:
+                error = f"{name[:-1]}_errors"
+                named[name] = frozen(slopes[name].value.copy())
+                named[f"{name[:-1]}_sides"] = frozen(shown.sides[name])
+                named[error] = frozen(slopes[name].error.copy())
+        for each, name in (
+            (number.value, "value"),
+            (modulus, "contact_modulus"),
+            (slopes.get("poisson_ratio", zero), "poisson_ratio"),
+        ):
+            named[name], named[f"{name}_error"] = _number(each)
+        named["sphere_radius"] = named["sphere_radius_error"] = None
+        if sphere is not None:
+            sphere = sphere + slopes.get("sphere_radius", zero)
+            named["sphere_radius"], named["sphere_radius_error"] = _number(sphere)
+
+        def in_scene(values: Array) -> Array:
+            return frozen(problem.to_scene(values))
+
+        tips = found.tip_radii
+        return cls(
+            contact=contact,
+            holding=holding,
+            heights=in_scene(found.offsets.value),
+            height_errors=in_scene(found.offsets.error),
+            tip_radii=in_scene(tips.value),
+            tip_radius_errors=in_scene(tips.error),
+            balance_defect=_balance_defect(shown, found),
+            number=number,
+            derivatives=found,
+            **named,
+        )
 
     @cached_property
     def positions(self) -> Array:
-        """(n, 2) of x and y of each summit."""
-        scene, origin = self.contact.scene, self.origin
-        points = scene.asperities.positions[origin.places]
-        far, moved = far_radii(self.contact, origin.places)[:, None], origin.turning
-        if scene.geometry == "closest":
-            moved = moved * (scene.sphere_radius / far)
-        moved = moved - origin.offsets[:, None] * points / far
-        return frozen(among_zeros(moved, origin.places, len(scene)))
+        return frozen(self._in_scene(self.derivatives.positions.value))
 
     @cached_property
-    def height_errors(self) -> Array:
-        """(n,) proved bounds on |heights - those of the true state|.
+    def position_errors(self) -> Array:
+        return frozen(self._in_scene(self.derivatives.positions.error))
 
-        Where all asperities are decided, mostly what these derivatives miss of those computed to
-        twice the digits; in gross sliding of the derivatives from below. Infinite where nothing is
-        proved of the state, and for onsets: there one asperity is at its ceiling, no proof can say
-        whether it slides, and the slope of its law has no bound but the root of a doubt. They are
-        for the scene whose data are the given float64 numbers, and count all rounding.
-        """
-        origin = self.origin
-        problem = pressed(self.contact)
-        errors = height_errors(problem, origin.doubts, origin.pressing, origin.total)
-        if origin.doubts is not None and not origin.mixed:
-            finer = refined_errors(self.contact, origin.doubts, origin.pressing, origin.total)
-            errors = np.minimum(errors, finer)
-        off = among_zeros(
-            origin.rounding + np.zeros(len(origin.places)), origin.places, len(errors)
-        )
-        return frozen(errors / problem.units.length + off)
+    def _in_scene(self, values: Array) -> Array:
+        problem = self.number.problem
+        return among_zeros(values, problem.candidates, len(problem.scene))
 
     @cached_property
     def normalised(self) -> Gradient:
-        """That of `Cycle.energy_normalised` = W / W0, for the gradient of a cycle's energy.
+        """That of `Cycle.loss_normalised` = W / W0, for the gradient of a cycle's loss.
 
-        W0 is in proportion to c_t f^2 P^(5/3) E*^(-2/3) R^(-1/3), P the total load, which follows
-        where the approach is held.
+        W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) goes with c_t f^2 P^(5/3) E*^(-2/3) R^(-1/3), P the
+        total load, which follows where the approach is held. InputError for other bases than a
+        sphere.
         """
-        contact, scene = self.contact, self.contact.scene
-        if self.maximum is None or self.minimum is None or self.friction is None:
-            expected = "the gradient of a cycle, whose energy a smooth sphere's stands beside"
+        if self.maximum is None:
+            expected = "the gradient of a cycle, whose loss a smooth sphere's stands beside"
             raise InputError("normalised", found="another number", expected=expected)
-        assert scene.friction is not None  # there is a cycle
-        W0, nu = smooth(scene, load=contact.load).energy_scale, scene.material.poisson_ratio
-        value = self.value / W0
-        by_load = -5.0 / 3.0 * value / contact.load
-        explicit = {
-            "sphere_radius": value / 3.0 / scene.sphere_radius,
-            "contact_modulus": 2.0 / 3.0 * value / scene.material.contact_modulus,
+        number, scene = self.number, self.contact.scene
+        reference = smooth_reference(scene, self.contact.load)
+        if reference is None:
+            expected = "a base with a smooth reference: a sphere or an ellipsoid"
+            raise InputError("normalised", found=named(scene.sphere_radius), expected=expected)
+        R = Ball.exact(scene.mean_radius)
+        E = Ball.exact(scene.material.contact_modulus)
+        nu, f = (
+            Ball.exact(scene.material.poisson_ratio),
+            Ball.exact(checks.friction(scene.friction)),
+        )
+        P = number.top.load * number.problem.units.force
+        radius = (P * R * 0.75 / E).cbrt()  # a_H
+        factor = (1.0 - nu) * E * radius * 5.0 / ((2.0 - nu) * f * f * P * P * 9.0)  # 1 / W0
+        if named(scene.sphere_radius) != "a sphere":  # of which float64 knows W0
+            whole = 1.0 / reference.energy_scale
+            factor = Ball.around(whole, 1e-13 * whole)
+        value = number.value * factor
+        slopes = {
+            "sphere_radius": value / (R * 3.0),
+            "contact_modulus": value * 2.0 / (E * 3.0),
             "poisson_ratio": -value / ((1.0 - nu) * (2.0 - nu)),
-            "friction": -2.0 * value / scene.friction,
-            "load": by_load,
+            "friction": value * -2.0 / f,
+            "load": value * -5.0 / (P * 3.0),
         }
-        following = total_load(contact) if self.holding == "approach" else None
-        factor, other = (0.0, None) if following is None else (by_load, following.origin)
-        doubt = self._doubt_about_smooth(lossy=following is not None)
-        found: dict[str, Any] = {"value": value}
-        found["origin"] = self.origin.combined(1.0 / W0, doubt, factor, other)
-        for name in PARAMETERS:
-            if (slope := getattr(self, name)) is not None:
-                found[name] = slope / W0 + explicit.get(name, 0.0)
-                if following is not None and (follows := getattr(following, name)) is not None:
-                    found[name] = found[name] + by_load * follows
-        return replace(self, **found)
-
-    def _doubt_about_smooth(self, *, lossy: bool) -> float:
-        """Bound on what 1 / W0, or W / (W0 P), is off, over it: W0 goes with P^(5/3)."""
-        contact, rounding = self.contact, FEW * ROUNDOFF
-        if contact.prescribed_load is None:
-            off = float(contact.certificate.load_errors.sum())
-        else:
-            off = abs(contact.load - contact.prescribed_load)
-        carried = (8.0 if lossy else 5.0) / 3.0 * off / contact.load
-        if lossy and self.value and self.origin.doubts:
-            half = [each.force for each in self.origin.doubts if isinstance(each, LossDoubt)]
-            carried += cycle(contact, maximum=float(half[0])).energy_error / self.value
-        return (1 + SAFETY) * (carried + rounding)
+        return Gradient.of(number.times(factor, slopes), self.holding)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         """But for what it was made from, and for parameters that it has not."""
-        return (row for row in super()._rows() if row[0] != "origin" and row[1] != "None")
+        hidden = ("number", "derivatives")
+        return (row for row in super()._rows() if row[0] not in hidden and row[1] != "None")
 
 
-def to_scene(
-    origin: Origin,
-    holding: Holding,
-    *,
-    value: float,
-    scaled: tuple[float, ...],
-    cancels: bool,
-    poisson_ratio: float = 0.0,
-    friction: float | None = None,
-    load: float | None = None,
-    force: float | None = None,
-    maximum: float | None = None,
-    minimum: float | None = None,
-    forces: Array | None = None,
-) -> Gradient:
-    """The gradient that an origin is.
-
-    scaled  : terms whose sum, less P dJ/dP under load control, is E* dJ/dE* by scaling all forces
-    cancels : whether the modulus' own sum does, so that the other is reported
-    load    : dJ/dP where it is not that of the origin
-    """
-    contact, places = origin.contact, origin.places
-    scene = contact.scene
-    R, rho = scene.sphere_radius, scene.asperities.tip_radii[places]
-    radii, points = scene.relative_radii[places], scene.asperities.positions[places]
-    offsets, local, far = origin.offsets, origin.local, far_radii(contact, places)
-    tips, sphere = -local / 3.0 * radii / rho**2, -local / 3.0 * radii / R**2
-    sunk = offsets * (points**2).sum(axis=1) / (2.0 * far**2)
-    sphere += sunk
-    if scene.geometry == "closest":
-        outwards = (origin.turning * points).sum(axis=1) / far**2
-        tips += sunk - outwards * R
-        sphere += outwards * rho
-
-    by_load = holding == "load"
-    prescribed = origin.prescribed
-    terms = (*scaled, -contact.load * prescribed) if by_load else scaled
-    coupled, sizes = origin.coupled
-    own, by_scaling = -2.0 / 3.0 * float(local.sum()) - coupled, sum(terms)
-    size = max(2.0 / 3.0 * float(np.abs(local).sum()), sizes, *map(abs, terms))
-    return Gradient(
-        contact=contact,
-        holding=holding,
-        value=value,
-        heights=frozen(among_zeros(offsets, places, len(scene))),
-        tip_radii=frozen(among_zeros(tips, places, len(scene))),
-        sphere_radius=float(sphere.sum()),
-        contact_modulus=(by_scaling if cancels else own) / scene.material.contact_modulus,
-        poisson_ratio=poisson_ratio,
-        load=(prescribed if load is None else load) if by_load else None,
-        approach=None if by_load else prescribed,
-        friction=friction,
-        balance_defect=abs(own - by_scaling) / size if size > 0 else 0.0,
-        origin=origin,
-        force=force,
-        maximum=maximum,
-        minimum=minimum,
-        forces=forces,
-    )
+def _number(ball: Ball) -> tuple[float, float]:
+    return float(ball.value), float(ball.error)
 
 
-def total_load(contact: Contact, tolerance: float = TOLERANCE) -> Gradient:
-    """That of the total load, the approach held."""
-    problem = pressed(contact)
-    ones = np.full(len(problem), problem.units.force)
-    weights = Pulled(ones, np.zeros(len(problem)), [])
-    adjoint = through_pressing(problem, weights, "approach", tolerance)
-    origin = Origin.of(contact, adjoint, "approach")
-    return to_scene(origin, "approach", value=contact.load, scaled=(contact.load,), cancels=False)
+def _balance_defect(number: Number, found: Derivatives) -> float:
+    """E* J_E* + sum over levels of J_L L = the part of J that scales with forces; else a defect."""
+    bent, felt = found.local.sum() * -2.0 / 3.0, -found.coupled
+    terms = [bent, felt, -number.scaled, *(each.load * each.total for each in number.pulled)]
+    defect = float(sum(terms, start=ZERO).value)
+    size = max(float(np.abs(term.value)) for term in terms)
+    return abs(defect) / size if size > 0 else 0.0
+
+
+def held(contact: Contact, holding: Holding | None) -> Holding:
+    """What is held, checked; default what was prescribed."""
+    checks.instance("contact", contact, Contact)
+    if holding is None:
+        return "approach" if contact.prescribed_load is None else "load"
+    if holding not in ("load", "approach"):
+        raise InputError("holding", found=repr(holding), expected='"load" or "approach"')
+    return holding
+
+
+def levels(contact: Contact) -> Levels:
+    """The normal solutions of a contact's scene, which must carry some load."""
+    if contact.load == 0.0:
+        expected = "a contact that carries some load: without, nothing has a derivative"
+        raise InputError("contact", found="no load", expected=expected)
+    return contact.keep(levels_of)

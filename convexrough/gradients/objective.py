@@ -13,14 +13,14 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
+from convexrough.friction.cycle import cycle
+from convexrough.friction.shear import shear
 from convexrough.gradients.gradient import Gradient
 from convexrough.influence import Kind
 from convexrough.record import Record
 from convexrough.scene.asperities import Asperities
-from convexrough.scene.material import Material
+from convexrough.scene.base import sphere_radius
 from convexrough.scene.scene import Scene
-from convexrough.shearing.cycle import cycle
-from convexrough.shearing.state import shear
 
 #: What it can be a number of, and what must be prescribed for it besides a load or an approach.
 NUMBERS = {"loss": "force", "displacement": "force", "approach": "load", "load": "approach"}
@@ -75,6 +75,8 @@ class Objective(Record):
                 object.__setattr__(self, name, checks.finite(name, given))
         by = (self.by,) if isinstance(self.by, str) else self._listed()
         object.__setattr__(self, "by", by)
+        if "sphere_radius" in by:
+            sphere_radius(self.scene.sphere_radius, "by sphere_radius")
         able = self._able()
         for name in by:
             if name not in able:
@@ -181,9 +183,10 @@ class Objective(Record):
         scene = replace(
             self.scene,
             asperities=Asperities(**each),
-            material=Material(modulus, ratio, material.hardness),
-            sphere_radius=float(given.get("sphere_radius", self.scene.sphere_radius)),
+            material=replace(material, contact_modulus=modulus, poisson_ratio=ratio),
         )
+        if "sphere_radius" in given:
+            scene = replace(scene, sphere_radius=float(given["sphere_radius"]))
         if "friction" in given:
             scene = replace(scene, friction=float(given["friction"]))
         return scene

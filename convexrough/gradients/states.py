@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
 from fractions import Fraction
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,29 +12,89 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
-from convexrough.errors import InputError
-from convexrough.gradients.adjoint import (
-    Adjoint,
-    Friction,
-    Holding,
-    Pair,
-    Pulled,
-    excess,
-    through_friction,
-    through_pressing,
-)
-from convexrough.gradients.doubts import Doubt, GivenDoubt, StateDoubt
-from convexrough.gradients.gradient import Gradient, to_scene
-from convexrough.gradients.gross import (
-    GrossDoubt,
-    last_to_slide,
-    slides_last,
-    through_gross_sliding,
-)
-from convexrough.gradients.origin import Origin, felt, held, pressed
-from convexrough.gradients.system import TOLERANCE, System
-from convexrough.influence.choice import couple
-from convexrough.shearing.state import ShearState, indices, onset_of_sliding
+from convexrough.errors import InputError, ProofError
+from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.onset import indices
+from convexrough.friction.order import Order
+from convexrough.friction.shear import ShearState, limited
+from convexrough.gradients.gradient import Gradient, Holding, Number, held, levels
+from convexrough.gradients.pulled import ZERO, Moves, Part, product
+from convexrough.normal.level import Level, Levels
+from convexrough.normal.proved import Obstacle, proved
+from convexrough.normal.refine import refined_loads
+from convexrough.numbers import balls
+from convexrough.numbers.balls import Ball
+
+#: Newton steps to the level at which an asperity starts to slide, each of order 3/2 from 1e-15.
+NEWTON = 3
+
+
+class Result(Protocol):
+    """What friction makes of a contact."""
+
+    @property
+    def contact(self) -> Contact: ...
+    @property
+    def order(self) -> Order: ...
+
+
+@dataclass(frozen=True)
+class Frictional:
+    """A contact with friction, and its levels by their names."""
+
+    contact: Contact
+    known: FrictionLevels
+
+    @classmethod
+    def of(cls, result: Result) -> Frictional:
+        """Of a result that is a sum of levels; InputError for one of general steps."""
+        if result.order == "fails":
+            expected = "indentations that do not fall with the load: no sum of levels else"
+            raise InputError("order", found='"fails"', expected=expected)
+        return cls.pressed(result.contact)
+
+    @classmethod
+    def pressed(cls, contact: Contact) -> Frictional:
+        levels(contact)
+        return cls(contact, contact.keep(FrictionLevels))
+
+    @property
+    def f(self) -> Ball:
+        return self.known.coefficient
+
+    @property
+    def by_ratio(self) -> Ball:
+        """d log c_t / d nu."""
+        nu = Ball.exact(self.contact.scene.material.poisson_ratio)
+        return 1.0 / ((1.0 - nu) * (2.0 - nu))
+
+    @property
+    def unit(self) -> float:
+        """[force] of levels."""
+        return self.known.units.force
+
+    def height(self, force: float | Fraction) -> Fraction:
+        """T = |Q| / f, or P where it is that to rounding: then all slide."""
+        f = Fraction(checks.friction(self.contact.scene.friction))
+        return limited(self.known.load, abs(Fraction(force)) / f)
+
+    def below(self, what: str, force: float | Fraction, holding: Holding) -> Level:
+        """The level L = P - |Q| / f."""
+        height = self.height(force)
+        if height == self.known.load and holding == "approach":
+            expected = "a force below f P: with the approach held f P may fall below the force"
+            raise InputError(what, found=f"{float(force)}: gross sliding", expected=expected)
+        return self.known.at(self.known.load - height)
+
+    def moves(self, height: Ball, /, **shares: float) -> Moves:
+        """Of L = P - T by the load, by friction, and by forces of which Q has these shares."""
+        by_force = -1.0 / self.known.force_unit
+        rates = {name: by_force * share for name, share in shares.items()}
+        return {"load": self.top_moves["load"], "friction": height / self.f, **rates}
+
+    @property
+    def top_moves(self) -> Moves:
+        return {"load": Ball.exact(1.0) / self.unit}
 
 
 def contact_gradient(
@@ -44,64 +105,29 @@ def contact_gradient(
     approach: float | None = None,
     load: float | None = None,
     holding: Holding | None = None,
-    tolerance: float = TOLERANCE,
 ) -> Gradient:
     """As `Contact.gradient`."""
-    holding, problem = held(contact, holding), pressed(contact)
+    holding = held(contact, holding)
+    top = levels(contact).top
     P, D = _number("load", load), _number("approach", approach)
     on_loads = _weights("loads", loads, contact) + P
-    on_gaps = np.where(contact.loads > 0, 0.0, _weights("gaps", gaps, contact))
+    on_gaps = _weights("gaps", gaps, contact)
     _something(loads=loads, gaps=gaps, approach=approach, load=load)
-
-    touching, units = problem.touching, problem.units
-    far = np.flatnonzero(on_gaps)
-    pulled = Pulled(on_loads[touching] * units.force, np.zeros(len(problem)), [])
-    whole = (D - float(on_gaps.sum())) * units.length
-    off = np.where(contact.loads > 0, 0.0, np.abs(on_loads)) * units.force
+    units = top.problem.units
+    far = np.setdiff1d(np.flatnonzero(on_gaps), top.problem.candidates)
     if len(far):
-        away = couple(contact.scene, far, problem.influence.scale, contact.influence)
-        onto = away.onto(contact.scene.contact_points[touching])
-        pulled = pulled._replace(loads=pulled.loads + onto.apply(on_gaps[far]) * units.length)
-        sizes = np.abs(on_gaps[far])
-        off[touching] += onto.rounding(sizes).of(onto.apply(sizes)) * units.length
-    doubts: list[Doubt] | None = [GivenDoubt(1.0, pulled.loads, off)]
-    if len(far) and (contact.status == "undecided").any():  # whose gap may not be there
-        doubts = None
-    adjoint = through_pressing(problem, pulled, holding, tolerance, whole)
-    origin = Origin.of(contact, adjoint, holding, doubts=doubts, approach=whole)
-    if len(far):
-        origin = _with_gaps(origin, adjoint, holding, far, on_gaps[far] * units.length)
-    carried = float(on_loads @ contact.loads)
-    return to_scene(
-        origin,
-        holding,
-        value=carried + float(on_gaps @ contact.gaps) + D * contact.approach,
-        scaled=(carried,),
-        cancels=False,
-        friction=None if contact.scene.friction is None else 0.0,
+        top = _wider(top, np.union1d(top.problem.candidates, far))
+    which, length = top.problem.candidates, units.length
+    gap_weights = _where_open(top, -on_gaps[which]) * length if on_gaps.any() else None
+    part = Part(
+        top,
+        approach=Ball.exact(D) * length,
+        loads=Ball.exact(on_loads[which]) * units.force if on_loads.any() else None,
+        indentations=gap_weights,
+        moves={"load": Ball.exact(1.0) / units.force},
     )
-
-
-def _with_gaps(
-    origin: Origin, adjoint: Adjoint, holding: Holding, far: Indices, weights: Array
-) -> Origin:
-    """Weights on gaps besides: dg = A dP + dA P - dd - dD0 at each open asperity."""
-    problem = pressed(origin.contact)
-    places = np.union1d(problem.touching, far)
-    here, there = np.searchsorted(places, problem.touching), np.searchsorted(places, far)
-
-    def spread(values: Array, at: Indices) -> Array:
-        return among_zeros(values, at, len(places))
-
-    pairs = [Pair(spread(pair.left, here), spread(pair.right, here)) for pair in adjoint.pairs]
-    pairs.append(Pair(spread(weights, there), spread(problem.loads, here)))
-    whole = adjoint._replace(
-        offsets=spread(adjoint.offsets, here) - spread(weights, there),
-        local=spread(adjoint.local, here),
-        pairs=pairs,
-    )
-    both = Origin.of(origin.contact, whole, holding, doubts=origin.doubts, places=places)
-    return replace(both, total=origin.total)
+    explicit = {} if contact.scene.friction is None else {"friction": ZERO}
+    return Gradient.of(Number.of(contact, top, [part], explicit), holding)
 
 
 def state_gradient(
@@ -111,114 +137,118 @@ def state_gradient(
     forces: ArrayLike | None = None,
     slips: ArrayLike | None = None,
     holding: Holding | None = None,
-    tolerance: float = TOLERANCE,
 ) -> Gradient:
     """As `ShearState.gradient`."""
-    contact = state.contact
-    holding, problem = held(contact, holding), pressed(contact)
+    contact, sheared = state.contact, Frictional.of(state)
+    holding = held(contact, holding)
     X = _number("displacement", displacement)
     on_forces, on_slips = _weights("forces", forces, contact), _weights("slips", slips, contact)
     _something(displacement=displacement, forces=forces, slips=slips)
     sign = -1.0 if state.force < 0 else 1.0
-    touching, force_unit, travel = problem.touching, problem.force_unit, problem.travel_unit
-    increments = sign * force_unit * on_forces[touching]
-    moved, rise = sign * travel * on_slips[touching], sign * travel * X
-
-    there = Friction.of_state(problem, state)
-    felt(problem, "force", np.array([there.total]))
-    doubts: list[Doubt] | None = None
-    if limit := bool(problem.at_limit(np.array([there.total]))[0]):
-        last = last_to_slide(problem, holding, "force", state.force)
-        pulled, by_force, by_friction = through_gross_sliding(
-            problem, last, increments=increments, slips=moved, rise=rise
-        )
-        doubts = [GrossDoubt(1.0, last, increments, moved, rise)]
-    else:
-        system = System(problem, there.slopes, tolerance)
-        pulled = through_friction(
-            problem, there, system, increments=increments, slips=moved, rise=rise
-        )
-        assert pulled.solution is not None
-        total = -rise - float(moved[there.slides].sum())
-        force = abs(Fraction(state.force))
-        doubts = [StateDoubt(1.0, there, pulled.solution, increments, moved, total, force)]
-        beyond, slides = excess(problem, there, system), there.slides
-        by_force = pulled.total
-        by_friction = rise * beyond.rise + float(increments @ beyond.increments)
-        slid = beyond.deflections - there.signs * problem.ceilings
-        by_friction += float(moved @ np.where(slides, slid, 0.0))
-    adjoint = through_pressing(problem, pulled, holding, tolerance)
-    carried = float(on_forces @ state.forces)
-    length = X * state.displacement + float(on_slips @ state.slips)
-    nu = contact.scene.material.poisson_ratio
-    return to_scene(
-        Origin.of(contact, adjoint, holding, doubts=doubts),
-        holding,
-        value=carried + length,
-        scaled=(carried,) if limit else (by_friction, -length),
-        cancels=not limit,
-        poisson_ratio=length / ((1.0 - nu) * (2.0 - nu)),
-        friction=by_friction / problem.friction,
-        load=-by_force * np.inf if limit and np.isinf(by_force) else None,
-        force=sign * by_force / force_unit,
-    )
+    top, low = sheared.known.top, sheared.below("force", state.force, holding)
+    which, f, travel = top.problem.candidates, sheared.f, sheared.known.travel_unit
+    rise = travel * (sign * X)
+    # Q_i = f (P_i(P) - P_i(L));  X = c_t f (D0(P) - D0(L));  slips are c_t f times gaps at L
+    carried = sheared.known.force_unit * Ball.exact(sign * on_forces[which])
+    slid = _where_open(low, -sign * on_slips[which]) * travel
+    slid = balls.where(~top.open, slid, 0.0 * slid)
+    moved = sheared.moves(top.load - low.load, force=sign)
+    parts = [
+        Part(top, approach=rise, loads=carried, moves=sheared.top_moves),
+        Part(low, approach=-rise, loads=-carried, indentations=slid, moves=moved),
+    ]
+    far = rise * (top.approach - low.approach) + slid.dot(low.indentation)
+    near = carried.dot(top.loads - low.loads)
+    explicit = {"friction": (far + near) / f, "poisson_ratio": far * sheared.by_ratio}
+    return Gradient.of(Number.of(contact, top, parts, explicit), holding)
 
 
-def onset_gradient(
-    contact: Contact,
-    asperity: int,
-    *,
-    holding: Holding | None = None,
-    tolerance: float = TOLERANCE,
-) -> Gradient:
+def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None = None) -> Gradient:
     """Of the shear force at which one asperity starts to slide on first loading.
 
-    asperity : its index in the scene
-    holding, tolerance : as in `Contact.gradient`
+    asperity : its index in the scene;  holding : as in `Contact.gradient`
 
     Raises InputError where the asperity carries no load, or slides last and not alone: then there
-    is no derivative.
+    is no derivative; ProofError where it is not proved that its indentation rises with the load.
 
     >>> gradient = cr.onset_gradient(contact, 36)
     >>> print(f"{gradient.value / contact.load:.3f}", f"{gradient.friction / contact.load:.3f}")
     0.176 0.352
     """
-    holding, problem = held(contact, holding), pressed(contact)
-    checks.friction(contact.scene.friction)
-    which = indices("asperity", [asperity], len(contact.scene))
-    onset = float(onset_of_sliding(contact, which=which)[0])
-    if np.isnan(onset):
+    holding, sheared = held(contact, holding), Frictional.pressed(contact)
+    top, f, unit = sheared.known.top, sheared.f, sheared.unit
+    which = indices("asperity", [asperity], len(contact.scene))[0]
+    if contact.loads[which] == 0.0:
         expected = "an asperity that carries a load: others never slide"
         raise InputError("asperity", found=asperity, expected=expected)
-    place = int(np.searchsorted(problem.touching, which[0]))
-    total = problem.limited(np.array([onset / problem.force_unit]))
-    only = among_zeros(np.ones(1), np.array([place]), len(problem))
-    if problem.at_limit(total)[0]:  # all slide at f P, the last one whatever the heights are
-        if not slides_last(problem)[1]:
-            expected = "one that slides before others do, or last and alone"
-            found = f"{asperity}, which slides last, together with others"
-            raise InputError("asperity", found=found, expected=expected)
-        pulled = Pulled(np.full(len(problem), problem.force_unit), 0.0 * only, [])
-    else:
-        state = Friction.among(problem, problem.solve(total), 0)
-        margin = through_friction(
-            problem,
-            state,
-            System(problem, state.slopes, tolerance),
-            increments=0.0 * only,
-            slips=state.signs * only,
-            rise=0.0,
-        )
-        pulled = margin.scaled(-problem.force_unit / margin.total)
-    adjoint = through_pressing(problem, pulled, holding, tolerance)
-    return to_scene(
-        Origin.of(contact, adjoint, holding, doubts=None),
-        holding,
-        value=onset,
-        scaled=(onset,),
-        cancels=False,
-        friction=onset / problem.friction,
-    )
+    place = int(np.searchsorted(top.problem.candidates, which))
+    offsets, parts = top.problem.exact.offsets, []
+    first = offsets.upper >= offsets.lower.max()
+    total = top.load * f * unit
+    if not first[place]:
+        low, slope = _just_touching(levels(contact), place)
+        only = Ball.exact(among_zeros(np.ones(1), np.array([place]), len(offsets)))
+        # n(L) = 0, so that -f dL = f dn / (dn/dL)
+        parts = [Part(low, indentations=only * (f * unit / slope))]
+        total = (top.load - low.load) * f * unit
+    elif np.count_nonzero(first) > 1:  # all slide at f P, the last one whatever the heights are
+        expected = "one that slides before others do, or last and alone"
+        found = f"{asperity}, which slides last, together with others"
+        raise InputError("asperity", found=found, expected=expected)
+    number = Number.of(contact, top, parts, {"load": f, "friction": total / f})
+    return Gradient.of(number._replace(value=total), holding)
+
+
+def _just_touching(known: Levels, place: int) -> tuple[Level, Ball]:
+    """The level at which a candidate touches and carries nothing, and dn/dL of it there.
+
+    As a ball of loads that holds the root of n: its indentation rises at all of them.
+    """
+    from scipy.optimize import brentq  # 0.1 s to import: only when asked
+
+    def at(load: Ball) -> tuple[Level, Ball]:
+        level = known.at(load)
+        felt = product(level, level.tangent.loads)[place]
+        return level, level.tangent.approach - felt
+
+    def depth(load: float) -> float:
+        return float(known.at(Ball.exact(load)).indentation.value[place])
+
+    most = float(known.top.load.value)
+    load = Ball.exact(brentq(depth, 0.0, most, xtol=1e-15 * most, rtol=1e-15))
+    for _ in range(NEWTON):
+        level, slope = at(load)
+        load = Ball.exact((load - level.indentation[place] / slope).mid)
+    level, slope = at(load)
+    left = float(level.indentation[place].size)
+    reach = 2.0 * left / float(slope.lower) if slope.positive else np.inf
+    level, slope = at(Ball.around(load.mid, reach))
+    if not left <= float(slope.lower) * reach:
+        raise ProofError("where the asperity starts to slide is not proved: its order is in doubt")
+    return level, slope
+
+
+def _where_open(level: Level, weights: Array) -> Ball:
+    """Weights on gaps, of those of the candidates that are open; in doubt anything between."""
+    if level.solution is None:
+        shut = level.springs.touching if level.trial is not None else ~level.open
+        return Ball.exact(np.where(shut, 0.0, weights))
+    low, high = np.minimum(weights, 0.0), np.maximum(weights, 0.0)
+    doubtful = ~level.touching & ~level.open
+    known = Ball.exact(np.where(level.open, weights, 0.0))
+    return balls.where(doubtful, Ball.between(low, high), known) if doubtful.any() else known
+
+
+def _wider(level: Level, which: Indices) -> Level:
+    """The same level, with more asperities among its candidates: they are open."""
+    problem = level.problem.widened(which)
+    assert level.trial is not None
+    places = np.searchsorted(which, level.problem.candidates)
+    state = refined_loads(problem, among_zeros(level.trial.loads.high, places, len(which)))
+    found = proved(problem, state)
+    if isinstance(found, Obstacle):
+        return Level.unproved(problem, state, level.load)
+    return Level.of(found, level.load)
 
 
 def _weights(what: str, values: ArrayLike | None, contact: Contact) -> Array:

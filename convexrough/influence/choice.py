@@ -10,6 +10,8 @@ from convexrough.influence.coupling import Influence, Kind, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.scattered import ScatteredInfluence
+from convexrough.influence.sliced_matrix import MatrixSums
+from convexrough.numbers.pairs import Pair
 from convexrough.scene.layout import Layout
 from convexrough.scene.scene import Scene
 
@@ -34,29 +36,34 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     if kind is not None and kind not in KINDS:
         raise InputError("influence", found=repr(kind), expected=f"one of {', '.join(KINDS)}")
     points, error = scene.contact_points[which], scene.point_error
+    tails = None if scene.contact_tails is None else scene.contact_tails[which]
     n = len(which)
     if kind == "dense" or (kind is None and n <= FEW_ASPERITIES):
         if scene.geometry == "summit" and len(scene) <= FEW_ASPERITIES:
-            inverse = _among(scene.asperities.layout.keep(_inverse), which)
-            return DenseInfluence.of(points, scale, scale * inverse, error)
-        return DenseInfluence.assemble(points, scale, error)
+            layout = scene.asperities.layout
+            inverse, sums = _among(layout.keep(_inverse), which), layout.keep(_sums)
+            return DenseInfluence.of(points, scale, scale * inverse, sums.among(which))
+        return DenseInfluence.assemble(points, scale, error, tails)
     if kind != "scattered" and scene.lattice is not None:
-        if scene.geometry == "summit" and (sites := scene.asperities.layout.sites) is not None:
-            all_points = scene.contact_points
-            return LatticeInfluence.of(all_points, which, scene.lattice, sites[which], scale, error)
-        return LatticeInfluence.assemble(points, scene.lattice, scale, error)
+        layout, lattice = scene.asperities.layout, scene.lattice
+        return LatticeInfluence.of(scene.contact_points, which, layout, lattice, scale, error)
     if kind == "lattice":
         raise InputError(
             "influence", found="lattice", expected="asperities on a two-dimensional lattice"
         )
     if kind is None and n <= FEW_SCATTERED:
-        return DenseInfluence.assemble(points, scale, error)
-    return ScatteredInfluence(points, scale, error)
+        return DenseInfluence.assemble(points, scale, error, tails)
+    return ScatteredInfluence(points, scale, error, tails)
 
 
 def _inverse(layout: Layout) -> Array:
     """(n, n) 1 / r_ij of a small layout, which all its scenes share."""
     return frozen(inverse_distances(layout.points, layout.points))
+
+
+def _sums(layout: Layout) -> MatrixSums:
+    """Sums over all points of a layout, of which scenes take what they need."""
+    return MatrixSums(Pair.exact(layout.points))
 
 
 def _among(matrix: Array, which: Indices) -> Array:

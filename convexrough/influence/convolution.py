@@ -22,9 +22,16 @@ PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 #: Columns are transformed some at a time: so many bytes of each row, what a cache holds.
 ROW = 512
 
+#: Rows of a kernel that are laid out together hold about so many numbers: what a cache holds.
+LAID_OUT = 2**17
 
-#: What a kernel is at differences of sites, of rows i and columns j: arrays (len(i), len(j)).
-Values = Callable[[Indices, Indices], tuple[Array, ...]]
+
+#: What kernels are at differences of sites, of rows i and columns j, and of known squared lengths
+#: [spacing^2]: arrays (len(i), len(j)).
+Values = Callable[[Indices, Indices, Array], Sequence[Array]]
+
+#: From the waves of some fields, in some columns, to those of as many fields; both in place or not.
+Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,49 +83,25 @@ class Box:
     def kernel(self, power: int, dtype: Any) -> Kernel:
         """1 / |i b1 + j b2|^power for every difference of sites that matter, 0 for none."""
 
-        def values(taken: slice) -> tuple[Array]:
-            found = self._squares(taken)
-            found[found > self.extent**2] = np.inf
-            np.sqrt(found, out=found)
-            np.divide(1.0, found, out=found)
-            nearest = found.copy() if power > 1 else found
+        def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
+            with np.errstate(divide="ignore"):
+                nearest = np.sqrt(np.divide(1.0, squares))
+            nearest[squares == 0] = 0.0
+            found = nearest
             for _ in range(power - 1):
-                found *= nearest
-            return (found,)
+                found = found * nearest
+            return [found]
 
-        return self._transformed(values, dtype)[0]
+        return self.kernels(values, dtype)[0]
 
-    def kernels(self, values: Values, dtype: Any) -> list[Kernel]:
-        """Even kernels from their values at differences of sites; 0 for none."""
-        return self._transformed(lambda taken: self.laid_out(values, taken), dtype)
-
-    def laid_out(self, values: Values, taken: slice) -> list[Array]:
-        """Values at differences of sites, in some rows of the padded box; placed as `_squares`."""
-        squares = np.full((taken.stop - taken.start, self.padded[1]), np.inf)
-        found: list[Array] = []
-        for within, places, i, j in self._images(taken):
-            shorter = self._lengths(i, j)
-            nearer = shorter < squares[within, places]
-            np.copyto(squares[within, places], shorter, where=nearer)
-            each = values(i, j)
-            found = found or [np.zeros(squares.shape) for _ in each]
-            for whole, part in zip(found, each, strict=True):
-                np.copyto(whole[within, places], part, where=nearer)
-        if not found:  # no difference falls on these rows
-            nowhere = np.zeros(0, dtype=np.intp)
-            found = [np.zeros(squares.shape) for _ in values(nowhere, nowhere)]
-        for whole in found:
-            whole[squares > self.extent**2] = 0.0
-        return found
-
-    def _transformed(self, values: Callable[[slice], Sequence[Array]], dtype: Any) -> list[Kernel]:
-        """Even kernels from their values in rows of the padded box."""
+    def kernels(self, values: Values, dtype: Any, *, odd: bool = False) -> list[Kernel]:
+        """Kernels K(-d) = K(d), or -K(d) if odd, from their values at differences of sites."""
         from scipy import fft
 
         rows, columns = self.padded
         shape, whole = (rows, columns // 2 + 1), np.result_type(dtype, np.complex64)
         last = rows // 2 + 1
-        block = max(1, 2**17 // columns)
+        block = max(1, LAID_OUT // columns)
         blocks = [slice(start, min(start + block, last)) for start in range(0, last, block)]
         halves: list[NDArray[Any]] = []
         sums: dict[int, list[Array]] = {}  # by block, of each kernel and of its squares
@@ -127,7 +110,7 @@ class Box:
             i = np.arange(taken.start, taken.stop)
             weights = np.where((i > 0) & (2 * i < rows), 2.0, 1.0)  # i and -i
             sums[taken.start] = []
-            for k, each in enumerate(values(taken)):
+            for k, each in enumerate(self._laid_out(values, taken)):
                 if k == len(halves):
                     halves.append(np.zeros(shape, dtype=whole))
                 squares = np.einsum("ij,ij->i", each, each)
@@ -137,38 +120,54 @@ class Box:
         transform(blocks[0])  # says how many kernels there are
         threads.each(transform, blocks[1:], self.workers)
         whole_sums = np.sum([sums[taken.start] for taken in blocks], axis=0)
-        return [
-            Kernel(self._spectrum(half, dtype), float(total), float(np.sqrt(square)))
-            for half, (total, square) in zip(halves, whole_sums, strict=True)
-        ]
+        found = []
+        for total, square in whole_sums[::-1]:
+            spectrum = self._spectrum(halves.pop(), dtype, odd)
+            found.append(Kernel(spectrum, float(total), float(np.sqrt(square))))
+        return found[::-1]
 
-    def _spectrum(self, half: NDArray[Any], dtype: Any) -> NDArray[Any]:
-        """The real transform of an even kernel from the transforms of its first rows."""
-        from scipy import fft
-
-        last = (self.padded[0] - 1) // 2
-        if last:
-            np.conj(half[last:0:-1], out=half[-last:])  # row -i is row i read backwards
-        spectrum = np.empty(half.shape, dtype=dtype)
-
-        def transform(each: slice) -> None:
-            spectrum[:, each] = fft.fft(half[:, each], axis=0).real
-
-        threads.each(transform, in_blocks(half), self.workers)
-        return spectrum
-
-    def _squares(self, taken: slice) -> Array:
-        """|i b1 + j b2|^2 in some rows of the padded box, infinite for no difference.
+    def _laid_out(self, values: Values, taken: slice) -> list[Array]:
+        """Values at differences of sites, in some rows of the padded box; 0 for none.
 
         In each place stands the shortest difference of two sites of the box that falls on it.
         """
-        squares = np.full((taken.stop - taken.start, self.padded[1]), np.inf)
+        shape = taken.stop - taken.start, self.padded[1]
+        squares = np.full(shape, np.inf)
+        found: list[Array] = []
         for within, places, i, j in self._images(taken):
-            lengths = self._lengths(i, j)
-            np.minimum(squares[within, places], lengths, out=squares[within, places])
-        if taken.start == 0:
-            squares[0, 0] = np.inf
-        return squares
+            shorter = self._lengths(i, j)
+            nearer = shorter < squares[within, places]
+            np.copyto(squares[within, places], shorter, where=nearer)
+            each = values(i, j, shorter)
+            found = found or [np.zeros(shape) for _ in each]
+            for whole, part in zip(found, each, strict=True):
+                np.copyto(whole[within, places], part, where=nearer)
+        if not found:  # no difference falls on these rows
+            nowhere = np.zeros(0, dtype=np.intp)
+            found = [np.zeros(shape) for _ in values(nowhere, nowhere, np.zeros((0, 0)))]
+        if self.extent < np.inf:
+            beyond = squares > self.extent**2
+            for whole in found:
+                whole[beyond] = 0.0
+        return found
+
+    def _spectrum(self, half: NDArray[Any], dtype: Any, odd: bool) -> NDArray[Any]:
+        """The transform of a kernel, or its imaginary part, from those of its first rows."""
+        from scipy import fft
+
+        last = (self.padded[0] - 1) // 2
+        if last:  # row -i is row i read backwards
+            np.conj(half[last:0:-1], out=half[-last:])
+            if odd:
+                np.negative(half[-last:], out=half[-last:])
+        spectrum = np.empty(half.shape, dtype=dtype)
+
+        def transform(each: slice) -> None:
+            waves = fft.fft(half[:, each], axis=0)
+            spectrum[:, each] = waves.imag if odd else waves.real
+
+        threads.each(transform, in_blocks(half), self.workers)
+        return spectrum
 
     def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
         """Differences i, j of two sites of the box, and the rows and columns that they fall on."""
@@ -198,22 +197,12 @@ class Box:
         The field may be filled up with columns of zeros, to the padded width at most: then nothing
         is copied, and those columns of the result mean nothing.
         """
-        from scipy import fft
 
-        rows, columns = self.padded
-        half = fft.rfft(field, columns, axis=1, workers=self.workers)
+        def multiply(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
+            waves[0] *= spectrum[:, each]
+            return waves
 
-        def multiply(each: slice) -> None:
-            full = fft.fft(half[:, each], rows, axis=0)
-            full *= spectrum[:, each]
-            full = fft.ifft(full, axis=0, overwrite_x=True)
-            half[:, each] = full[: self.shape[0]]
-
-        threads.each(multiply, in_blocks(half), self.workers)
-        result: NDArray[Any] = fft.irfft(
-            half, columns, axis=1, overwrite_x=True, workers=self.workers
-        )
-        return result[:, : field.shape[1]]
+        return through_waves([field], self.padded, self.workers, multiply)[0][:, : field.shape[1]]
 
     def bound(self, kernel: Kernel, roundoff: float) -> float:
         """Bound on the 2-norm of the error of `convolve`, relative to that of the field.
@@ -237,11 +226,40 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """spectrum : of its transform, real as the kernel is even; total, norm : its sum and 2-norm."""
+    """A kernel that is even, so that its transform is real, or odd, so that it is imaginary.
+
+    spectrum : the transform, or its imaginary part;  total, norm : the kernel's sum and 2-norm
+    """
 
     spectrum: NDArray[Any]
     total: float
     norm: float
+
+
+def through_waves(
+    fields: Sequence[NDArray[Any]], padded: tuple[int, int], workers: int, mix: Mix
+) -> list[NDArray[Any]]:
+    """Fields of which the waves are what `mix` makes of the waves of some fields.
+
+    Fields (rows, columns) are filled up with zeros to the padded size; of what comes of it these
+    rows are returned, in all columns.
+    """
+    from scipy import fft
+
+    rows, (height, width) = len(fields[0]), padded
+    halves = [fft.rfft(field, width, axis=1, workers=workers) for field in fields]
+
+    def work(each: slice) -> None:
+        waves = mix([fft.fft(half[:, each], height, axis=0) for half in halves], each)
+        for half, full in zip(halves, waves, strict=True):
+            half[:, each] = fft.ifft(full, axis=0, overwrite_x=True)[:rows]
+
+    threads.each(work, in_blocks(halves[0]), workers)
+    found: list[NDArray[Any]] = []
+    while halves:
+        half = halves.pop(0)
+        found.append(fft.irfft(half, width, axis=1, overwrite_x=True, workers=workers))
+    return found
 
 
 def in_blocks(half: NDArray[Any]) -> Iterator[slice]:

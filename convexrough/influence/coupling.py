@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair
 
 #: Relative error of one computed 1 / (pi E* r), in roundoffs, for exact points: differences 1,
 #: squares 3, their sum 4, its root 3, then a product with pi and a division.
@@ -36,12 +38,12 @@ class Rounding(NamedTuple):
 
     relative: float
     norm: float
-    each: float = np.inf
+    each: float
     most: float = np.inf
 
     def of(self, displacement: Array) -> Array:
         """A bound for each component; `displacement` is A |P| as computed."""
-        return self.relative * np.maximum(displacement, 0.0) + self.component
+        return self.relative * np.maximum(displacement, 0.0) + 1.01 * self.each
 
     def negligible(self, displacement: Array) -> float:
         """2-norm of a residual that solvers need not reduce: small beside these bounds.
@@ -51,24 +53,6 @@ class Rounding(NamedTuple):
         """
         size = math.sqrt(np.vdot(displacement, displacement))
         return 0.1 * self.relative * size + 0.02 * self.norm
-
-    @property
-    def component(self) -> float:
-        """Bound on each |r_i|, and on what it adds to the relative part."""
-        return 1.01 * min(self.each, self.norm)
-
-
-class Sums(NamedTuple):
-    """sum_j P_j / r_ij as  (whole + rest) unit, off by at most  error unit  in each component.
-
-    And by  norm unit  in the 2-norm.
-    """
-
-    whole: Array  # whole numbers
-    rest: Array
-    unit: float  # a power of two [force / length]
-    error: float
-    norm: float
 
 
 class Coupling(Protocol):
@@ -91,21 +75,14 @@ class Coupling(Protocol):
         """
         ...
 
-    def clearances(self) -> Array:
-        """(m,) [length] lower bounds on the distance of each point to the nearest asperity.
-
-        Of an asperity itself, to the nearest of the others.
-        """
-        ...
-
 
 class Influence(Coupling, Protocol):
     """The coupling A among asperities.
 
     name   : "dense", "lattice" or "scattered"
     points : (n, 2) [length];  scale : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
-    at_hand : the matrix is stored, so that to use it, or a part of it, costs nothing
-    prefers_single : products of float32 loads are cheaper than those of float64 loads
+    at_hand : the matrix is stored, so that to use it, or a part of it, costs nothing; else products
+        of float32 loads are cheaper than those of float64 loads
     sharp : `sums` cost few products, so that Newton's last step starts from them
     """
 
@@ -117,8 +94,6 @@ class Influence(Coupling, Protocol):
     def scale(self) -> float: ...
     @property
     def at_hand(self) -> bool: ...
-    @property
-    def prefers_single(self) -> bool: ...
     @property
     def sharp(self) -> bool: ...
 
@@ -161,13 +136,6 @@ class Influence(Coupling, Protocol):
         """The largest (a_i + a_j) / r_ij over all pairs, for contact radii a (n,), 0 where open."""
         ...
 
-    def packing(self, radii: Array) -> float:
-        """At least the largest t_i / (r_ij - t_j) over pairs with radii t (n,) that are not 0.
-
-        Infinite where that is not below 1: where two such spheres meet.
-        """
-        ...
-
     def semidefinite_with(self, radius: float) -> bool:
         """Whether A + (scale / radius) I >= 0 is known, shells of that radius may well overlap.
 
@@ -175,10 +143,10 @@ class Influence(Coupling, Protocol):
         """
         ...
 
-    def sums(self, loads: Array) -> Sums | None:
-        """sum_j P_j / r_ij [force / length] to some thirty digits; None where that is not known.
+    def sums(self, loads: Pair) -> Ball:
+        """(n,) sum_j P_j / r_ij [force / length], with many more digits than `apply`.
 
-        For exact points, or as near as `entry_error` says.
+        Of the points where they are, as far as that is known.
         """
         ...
 
@@ -196,9 +164,21 @@ def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
     return scale * np.sqrt(coupling.falloff(variances, 2))
 
 
-def squared_distances(points: Array, others: Array) -> Array:
-    """(n, m) [length^2] r_ij^2."""
+def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair, float]:
+    """(n, 2) the points, with what they lack if that is given; and a bound on their error."""
+    if tails is None:
+        return Pair.exact(points), point_error
+    return Pair(points, tails), 2.0**-96 * float(np.abs(points).max(initial=0.0))
+
+
+def squared_distances(
+    points: Array, others: Array, tails: tuple[Array, Array] | None = None
+) -> Array:
+    """(n, m) [length^2] r_ij^2; with what the points and the others lack."""
     squares, y = (np.subtract.outer(points[:, k], others[:, k]) for k in (0, 1))
+    if tails is not None:
+        squares += np.subtract.outer(tails[0][:, 0], tails[1][:, 0])
+        y += np.subtract.outer(tails[0][:, 1], tails[1][:, 1])
     squares *= squares
     y *= y
     squares += y

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -16,12 +16,12 @@ from convexrough.influence.coupling import (
     Kind,
     Rounding,
     Smoother,
-    Sums,
     cubed,
     inverse_distances,
+    known,
     squared_distances,
 )
-from convexrough.influence.packing import clearances, matrix_packing
+from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
 
@@ -69,6 +69,7 @@ class DenseInfluence:
     scale       : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
     point_error : [length] bound on the error of each coordinate of the points
     entry_error : bound on the relative error of each A_ij
+    sums        : P -> sum_j P_j / r_ij with many more digits, of the points as pairs
     """
 
     points: Array
@@ -76,24 +77,32 @@ class DenseInfluence:
     matrix: Array
     point_error: float
     entry_error: float
+    sums: MatrixSums
 
     name: ClassVar[Kind] = "dense"
     at_hand: ClassVar[bool] = True
-    prefers_single: ClassVar[bool] = False
     sharp: ClassVar[bool] = False
 
     @classmethod
-    def assemble(cls, points: Array, scale: float, point_error: float = 0.0) -> DenseInfluence:
-        return cls.of(points, scale, dense_matrix(points, scale), point_error)
+    def assemble(
+        cls, points: Array, scale: float, point_error: float = 0.0, tails: Array | None = None
+    ) -> DenseInfluence:
+        sums = MatrixSums(*known(points, tails, point_error))
+        return cls.of(points, scale, dense_matrix(points, scale), sums, point_error)
 
     @classmethod
     def of(
-        cls, points: Array, scale: float, matrix: Array, point_error: float = 0.0
+        cls,
+        points: Array,
+        scale: float,
+        matrix: Array,
+        sums: MatrixSums,
+        point_error: float = 0.0,
     ) -> DenseInfluence:
         """Where the matrix (n, n) is known."""
         largest = float(matrix.max(initial=0.0))
         nearest = scale / largest if largest > 0 else np.inf
-        return cls(points, scale, matrix, point_error, entry_error(point_error, nearest))
+        return cls(points, scale, matrix, point_error, entry_error(point_error, nearest), sums)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -114,7 +123,7 @@ class DenseInfluence:
         (Higham, Accuracy and Stability of Numerical Algorithms, section 4.2.)
         """
         terms = self._block + -(-len(self) // self._block) + 1
-        return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0)
+        return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0, 0.0)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         inverse = self.matrix / self.scale  # 1 / r: powers of the scale may be too small
@@ -128,9 +137,11 @@ class DenseInfluence:
         return self.matrix.take(which, axis=0).take(which, axis=1)
 
     def among(self, which: Indices) -> DenseInfluence:
-        matrix = self.submatrix(which)
-        return DenseInfluence(
-            self.points[which], self.scale, matrix, self.point_error, self.entry_error
+        return replace(
+            self,
+            points=self.points[which],
+            matrix=self.submatrix(which),
+            sums=self.sums.among(which),
         )
 
     def onto(self, points: Array) -> DenseCoupling:
@@ -150,17 +161,8 @@ class DenseInfluence:
             return 0.0
         return float((np.add.outer(radii, radii) * self.matrix).max()) / self.scale
 
-    def packing(self, radii: Array) -> float:
-        return matrix_packing(self.matrix, radii * ((1.0 + 2.0 * self.entry_error) / self.scale))
-
-    def clearances(self) -> Array:
-        return self.separations()
-
     def semidefinite_with(self, radius: float) -> bool:
         return False
-
-    def sums(self, loads: Array) -> Sums | None:
-        return None
 
     def smoother(self, root: Array) -> Smoother | None:
         return None
@@ -195,7 +197,7 @@ class DenseCoupling:
 
     def rounding(self, loads: Array) -> Rounding:
         terms = len(self.points) + 1
-        return Rounding(1.01 * (terms * ROUNDOFF + self._entry_error), 0.0)
+        return Rounding(1.01 * (terms * ROUNDOFF + self._entry_error), 0.0, 0.0)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         total = np.empty(len(self.targets))
@@ -203,9 +205,6 @@ class DenseCoupling:
             total[block] = inverse**power @ strengths
         loss = (len(self.points) + 3) * ROUNDOFF + power * self._entry_error
         return total * (1.0 + 1.01 * loss)
-
-    def clearances(self) -> Array:
-        return clearances(self.points, self.targets, self.point_error)
 
     def _rows(self) -> Iterator[tuple[slice, Array]]:
         """1 / r in blocks of rows."""

@@ -9,27 +9,32 @@ docs/theory/operators-lattice.md, "On a lattice: Fourier transforms".
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arrays import Array, Indices, even
-from convexrough.influence.convolution import Box, Kernel, neighbours
-from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, Sums, cubed
+from convexrough.influence.convolution import Box, Kernel, neighbours, through_waves
+from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
 from convexrough.influence.lattice_symbol import least_symbol
-from convexrough.influence.off_sites import first_order, off_sites
-from convexrough.influence.packing import largest, lattice_packing, point_packing
-from convexrough.influence.sliced import Distances, sliced_sums
-from convexrough.influence.slopes import Spectra, odd_spectra
+from convexrough.influence.sliced import SLICES, Distances, Sliced, each_loss
+from convexrough.influence.slopes import pulls
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair, two_product, two_sum
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice, Sites
+from convexrough.scene.layout import Layout
 from convexrough.scene.neighbours import crowding, separations
+
+Made = TypeVar("Made")
 
 #: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
 ENTRY_ROUNDOFFS = 24
@@ -40,6 +45,9 @@ CHUNK = 2**14
 #: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree:
 #: a heuristic, which decides speed and how sharp shells are.
 FILLED = 0.2
+
+#: Of more asperities than this, spectra that few products need are made again for each.
+MOST_KEPT = 2**21
 
 #: The symbol of any lattice goes as low as that of a row, -2 log 2. Decides speed only.
 LEAST_NEGATIVE = 1.386
@@ -88,10 +96,6 @@ class LatticeCoupling:
         stretched = (1.0 + 1e-6) / (self._least * self.spacing) ** power
         return np.maximum(total, 0.0) * (largest * stretched)
 
-    def clearances(self) -> Array:
-        """Of points that are none of the asperities: any two sites are the spacing apart."""
-        return np.full(len(self.targets), self.spacing * self._least * (1.0 - 8 * ROUNDOFF))
-
     @property
     def _unit(self) -> float:
         """A_ij of nearest neighbours."""
@@ -119,10 +123,13 @@ class LatticeCoupling:
         return self._single if dtype == np.float32 else self._kernel.spectrum
 
     def _convolve(self, values: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
+        return self.box.convolve(self._laid_out(values), spectrum).ravel()[self._padded[1]]
+
+    def _laid_out(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Among zeros, in the box as wide as the transforms."""
         field = np.zeros((self.box.shape[0], self.box.padded[1]), dtype=values.dtype)
-        sources, targets = self._padded
-        field.ravel()[sources] = values
-        return self.box.convolve(field, spectrum).ravel()[targets]
+        field.ravel()[self._padded[0]] = values
+        return field
 
     @cached_property
     def _padded(self) -> tuple[Indices, Indices]:
@@ -138,47 +145,47 @@ class LatticeCoupling:
 class LatticeInfluence(LatticeCoupling):
     """The coupling among asperities on a lattice.
 
-    array  : (N, 2) [length] points;  members : (n,) of which these asperities are some
-    places : (n, 2) i and j of each
+    array  : (N, 2) [length] points, off by `point_error` at most;  members : (n,) which of them
+    layout : where they are exactly, but for a factor by which `lattice` is smaller than its own
     """
 
     array: Array
     members: Indices
+    layout: Layout
     lattice: Lattice
-    places: Sites
     point_error: float
 
     name: ClassVar[Kind] = "lattice"
     at_hand: ClassVar[bool] = False
-    prefers_single: ClassVar[bool] = True
     sharp: ClassVar[bool] = True
 
     @classmethod
-    def assemble(
-        cls, points: Array, lattice: Lattice, scale: float, point_error: float = 0.0
-    ) -> LatticeInfluence:
+    def assemble(cls, points: Array, lattice: Lattice, scale: float) -> LatticeInfluence:
         """Raises ValueError where the points are not on the lattice."""
         places = lattice.sites(points)
         if places is None:
             raise ValueError("points off the lattice")
-        return cls.of(points, np.arange(len(points)), lattice, places, scale, point_error)
+        layout = Layout(points, (lattice, places))
+        return cls.of(points, np.arange(len(points)), layout, lattice, scale)
 
     @classmethod
     def of(
         cls,
         array: Array,
         members: Indices,
+        layout: Layout,
         lattice: Lattice,
-        places: Sites,
         scale: float,
-        point_error: float,
+        point_error: float = 0.0,
     ) -> LatticeInfluence:
         """Where the places are known."""
-        box, index = _boxed(lattice, places)
-        off = 2.0 * float(np.sqrt(2.0)) * (lattice.blur + point_error)
+        assert layout.sites is not None
+        box, index = _boxed(lattice, layout.sites[members])
         spacing = lattice.spacing
-        both = scale, spacing, off / spacing
-        return cls(box, index, index, *both, array, members, lattice, places, point_error)
+        blur = 2.0 * float(np.sqrt(2.0)) * lattice.blur / spacing
+        return cls(
+            box, index, index, scale, spacing, blur, array, members, layout, lattice, point_error
+        )
 
     def __len__(self) -> int:
         return len(self.members)
@@ -199,9 +206,15 @@ class LatticeInfluence(LatticeCoupling):
     def entry_error(self) -> float:
         return entry_error(self.point_error, self.spacing * self._least)
 
+    @property
+    def places(self) -> Sites:
+        """(n, 2) i and j of each."""
+        assert self.layout.sites is not None
+        return self.layout.sites[self.members]
+
     def among(self, which: Indices) -> LatticeInfluence:
-        members, places = self.members[which], self.places[which]
-        return self.of(self.array, members, self.lattice, places, self.scale, self.point_error)
+        given = self.layout, self.lattice, self.scale, self.point_error
+        return self.of(self.array, self.members[which], *given)
 
     def onto(self, points: Array) -> Coupling:
         places = self.lattice.sites(points)
@@ -217,12 +230,13 @@ class LatticeInfluence(LatticeCoupling):
         return len(self) > FILLED * self.box.shape[0] * self.box.shape[1]
 
     def slopes(self, loads: Array) -> Array:
-        each = [self._convolve(loads, spectrum) for spectrum in self._odd]
+        each = [self._convolve(loads, 1j * pull.spectrum) for pull in self._pulls]
         return -self.scale / self.spacing**2 * np.stack(each, axis=1)
 
-    @cached_property
-    def _odd(self) -> Spectra:
-        return odd_spectra(self.box, cubed)
+    @property
+    def _pulls(self) -> list[Kernel]:
+        """d / |d|^3 in both directions, in units of the spacing."""
+        return self._kept("pulls", lambda: pulls(self.box, cubed))
 
     def separations(self) -> Array:
         if not self._filled:
@@ -240,18 +254,8 @@ class LatticeInfluence(LatticeCoupling):
         for distance, i, j in self._pairs():
             if most <= worst * distance:
                 break
-            worst = max(worst, largest(_sum, field, i, j) / distance)
+            worst = max(worst, _largest_sum(field, i, j) / distance)
         return worst
-
-    def packing(self, radii: Array) -> float:
-        if not self._filled:
-            return point_packing(self.points, radii, 3.0 * self.point_error)
-        field = np.zeros(self.box.shape)
-        field.ravel()[self.sources] = radii
-        return lattice_packing(field, self._pairs())
-
-    def clearances(self) -> Array:
-        return self.separations()
 
     def _pairs(self) -> Iterator[tuple[float, int, int]]:
         """`neighbours`, and no more than the distance of points that far apart."""
@@ -265,53 +269,114 @@ class LatticeInfluence(LatticeCoupling):
         least = self.lattice.keep(_least_symbol) - self._displaced
         return -least * radius * (1.0 + SAFETY) <= self.spacing
 
-    def sums(self, loads: Array) -> Sums | None:
-        """sum_j P_j / r_ij to many more digits than `apply`, with the points where they are."""
-        unit = 2.0 ** np.floor(np.log2(self.spacing))
-        field = np.zeros(self.box.shape)
-        field.ravel()[self.sources] = loads
-        distances = Distances.of(self.lattice.basis, unit, max(self.box.shape))
-        found = sliced_sums(self.box, distances, unit, field)
-        if found is None:
-            return None
-        off, error = self._off_sites(loads, found.error * found.unit)
-        at = self.sources
-        rest = found.rest.ravel()[at] + off / found.unit
-        more = error / found.unit + 2 * ROUNDOFF * float(np.abs(rest).max(initial=0.0))
-        bounds = found.error + more, found.norm + more * math.sqrt(len(self))
-        return Sums(found.whole.ravel()[at], rest, found.unit, *bounds)
+    def sums(self, loads: Pair, slices: int = SLICES) -> Ball:
+        """slices : of loads and of the kernel, of 10 to 18 bits each: docs/theory/sliced.md."""
+        off_sites = self._off_sites(np.asarray(loads.high))
+        sliced = self._kept(slices, lambda: self._slice(slices))
+        return sliced.sums(loads, self._padded[0], *off_sites)
 
-    def _off_sites(self, loads: Array, little: float) -> tuple[Array, float]:
-        """What points off their sites change in sum_j P_j / r_ij, and a bound on each one's error.
-
-        little : [force / length] an error that does not matter
-        """
-        x, y, rounded = self._away
-        furthest = float(np.hypot(x, y).max(initial=0.0)) * (1 + 1e-9)
-        top, spacing = float(np.abs(loads).max(initial=0.0)), self.spacing * self._least
-        # By |P| at most, |r| times 1 / r^2 and for the second order 1 / r^3, as in `rounding`.
-        each = top / spacing**2 * self._kernel.norm**2
-        unknown = 2.0 * (rounded + math.sqrt(2.0) * self.point_error) * each
-        if 2.0 * furthest * each <= little:
-            return np.zeros(len(self)), 1.01 * (unknown + 2.0 * furthest * each)
-        units = top / self.spacing**2 * furthest
-        change, error = first_order(
-            self.box, self.sources, loads / top, (x / furthest, y / furthest)
-        )
-        second = (2.0 * furthest) ** 2 / spacing * each
-        return change * units, 1.01 * (unknown + error * units + 1.01 * second)
+    def _kept(self, name: object, make: Callable[[], Made]) -> Made:
+        """Spectra for other products, too, unless they are so large that memory matters more."""
+        found: Made = self._spectra[name] if name in self._spectra else make()
+        if len(self) <= MOST_KEPT:
+            self._spectra[name] = found
+        return found
 
     @cached_property
-    def _away(self) -> tuple[Array, Array, float]:
-        return off_sites(self.lattice, self.array, self.members, self.places)
+    def _spectra(self) -> dict[object, Any]:
+        return {}
+
+    def _slice(self, count: int) -> Sliced:
+        unit = float(2.0 ** np.floor(np.log2(self.spacing)))
+        basis = [[x / Fraction(unit) for x in vector] for vector in self.lattice.exactly]
+        distances = Distances.of(basis, max(self.box.shape))
+        norm = self._kernel.norm * unit / self.spacing
+        return Sliced.of(self.box, distances, norm, unit, count)
+
+    def _off_sites(self, loads: Array) -> tuple[Array, float]:
+        """What points off their sites change in sum_j P_j / r_ij, and how far that is off at most.
+
+        With eps_i how far a point is off, and eta no less than any |eps_i - eps_j|,
+
+            1 / |d + eps_i - eps_j|  =  1 / |d| - (eps_i - eps_j) d / |d|^3,  but for
+            eta^2 / (|d| - eta)^3:  docs/theory/sliced-points.md, "Points off their sites".
+        """
+        x, y, unknown = self.layout.keep(off_sites)
+        shrunk = float(self.lattice.shrink)
+        x, y = (shrunk / self.spacing * each[self.members] for each in (x, y))
+        most = float(np.hypot(x, y).max(initial=0.0)) * (1 + 1e-9)
+        unknown = shrunk / self.spacing * unknown + 4 * ROUNDOFF * most
+        top = float(np.abs(loads).max(initial=0.0))
+        if most + unknown == 0.0 or top == 0.0:
+            return np.zeros(len(self)), 0.0
+        shares, pulls = loads / top, self._pulls
+        targets = self._padded[1]
+
+        def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
+            along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)
+            whole, *moments = waves
+            return [along * whole, across * whole, along * moments[0] + across * moments[1]]
+
+        fields = [self._laid_out(values) for values in (shares, x * shares, y * shares)]
+        fields = through_waves(fields, self.box.padded, self.box.workers, pull)
+        change = fields[2].ravel()[targets]
+        change -= x * fields[0].ravel()[targets]
+        change -= y * fields[1].ravel()[targets]
+        # By |P| at most, |r| times 1 / r^2 and for the second order 1 / r^3, as in `rounding`.
+        whole = self._kernel.norm**2 / self._least**2
+        norm = math.hypot(*(kernel.norm for kernel in pulls))
+        error = 2.0 * each_loss(self.box, 2) * norm * most * float(np.linalg.norm(shares))
+        error += 2.0 * unknown * whole + (2.0 * most) ** 2 / self._least * whole
+        error += 4 * ROUNDOFF * float(np.abs(change).max())
+        unit = top / self.spacing
+        return change * unit, 1.01 * error * unit
 
     def smoother(self, root: Array) -> Smoother:
         box = self.box
         return block_smoother(box.shape, box.basis, self.sources, self._unit, root, box.workers)
 
 
-def _sum(radii: Array, others: Array) -> float:
-    return float((radii + others).max(initial=0.0))
+def _largest_sum(field: Array, i: int, j: int) -> float:
+    """Of all pairs of sites that are i rows and j columns apart, some rows at a time; or 0."""
+    here, there = field[i:], field[: len(field) - i]
+    if j >= 0:
+        here, there = here[:, j:], there[:, : there.shape[1] - j]
+    else:
+        here, there = here[:, :j], there[:, -j:]
+    found = [0.0]
+
+    def look(rows: slice) -> None:
+        found.append(float((here[rows] + there[rows]).max(initial=0.0)))
+
+    rows = max(1, CHUNK // max(here.shape[1], 1))
+    threads.each(look, threads.chunks(len(here), rows), threads.worthwhile(here.size))
+    return max(found)
+
+
+def off_sites(layout: Layout) -> tuple[Array, Array, float]:
+    """(N,) and (N,) [length] how far points are off, but for a common shift; and its error.
+
+    x - o - i b1 - j b2: sums and products are exact, but for what is left of them.
+    """
+    assert layout.lattice is not None
+    assert layout.sites is not None
+    lattice, sites, points = layout.lattice, layout.sites, layout.points
+    away = np.empty((2, len(points)))
+
+    def look(some: slice) -> None:
+        steps = sites[some].astype(np.float64)
+        for k in (0, 1):
+            high, low = two_sum(points[some, k], -lattice.origin[k])
+            for n in (0, 1):
+                step, rest = two_product(steps[:, n], lattice.basis[n, k])
+                high, left = two_sum(high, -step)
+                low = low + (left - rest)
+            away[k, some] = high + low
+
+    threads.each(look, threads.chunks(len(points), CHUNK), threads.worthwhile(len(points)))
+    most = float(np.abs(sites).max(initial=0))
+    reach = float(np.abs(lattice.origin).max() + most * np.abs(lattice.basis).sum())
+    return away[0], away[1], 96 * ROUNDOFF**2 * reach
 
 
 def _least_symbol(lattice: Lattice) -> float:

@@ -8,8 +8,8 @@ G^2 w^2 = 1 about, and
 
 with the median for d and A by Fourier transforms, cut to those that touch: on long waves
 (1 + d A)^-1, on short ones 1, which the matrix is taken to be there; symmetric, and positive
-definite as  w G^2 w  is not above 1. All of it on blocks of m x m sites, small beside the Gaussian,
-with A the mean over pairs of blocks. Where W is smooth, there is no G, and m is 1.
+definite as  w G^2 w  is not above 1. All of it on blocks of m x m sites, m at least 2, small beside
+the Gaussian, with A the mean over pairs of blocks.
 (docs/theory/newton.md, "Many".) The constants are heuristics: conjugate gradients take more steps
 where they are off, and end at the same answer.
 """
@@ -22,9 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import threads
 from convexrough.arrays import Array, Indices
-from convexrough.influence.convolution import in_blocks
+from convexrough.influence.convolution import through_waves
 from convexrough.influence.coupling import Smoother
 
 Single = NDArray[np.float32]
@@ -37,6 +36,9 @@ WIDTH = 1.0 / np.sqrt(8.0 * np.pi)
 
 #: Blocks are so many times smaller than windows: what a Gaussian passes, they hold.
 FINE = 3.5
+
+#: Windows of smooth W: so large that blocks have 2 x 2 sites, which costs a third of single ones.
+LEAST_WINDOW = 2 * FINE
 
 #: How large the blocks are on which the scatter of W^2 is looked at.
 WINDOW = 8
@@ -62,8 +64,6 @@ class _Blocks:
     @classmethod
     def of(cls, shape: tuple[int, int], sources: Indices, m: int) -> _Blocks:
         blocks = (-(-shape[0] // m), -(-shape[1] // m))
-        if m == 1:
-            return cls(m, blocks, sources, sources)
         columns = blocks[1] * m
         places = sources // shape[1] * columns + sources % shape[1]
         return cls(m, blocks, places, places // columns // m * blocks[1] + places % columns // m)
@@ -73,8 +73,6 @@ class _Blocks:
         m = self.m
         field = np.zeros((self.shape[0] * m, self.shape[1] * m), dtype=np.float32)
         field.ravel()[self.places] = values
-        if m == 1:
-            return field
         parts = (field[i::m, j::m] for i in range(m) for j in range(m))
         total = next(parts).copy()
         for part in parts:
@@ -91,50 +89,41 @@ def block_smoother(
     workers: int,
 ) -> Smoother:
     """M for the asperities at places `sources` of a box of sites; root (n,) is W."""
-    from scipy import fft
-
     squares = np.zeros(shape[0] * shape[1], dtype=np.float32)
     squares[sources] = root * root
     window = _window(squares.reshape(shape))
-    blocks = _Blocks.of(shape, sources, max(1, int(window / FINE)))
+    blocks = _Blocks.of(shape, sources, int(window / FINE))
     sums = blocks.sums(root * root)  # D^2
     touching = sums > 0
-    count = 1.0 if blocks.m == 1 else float(blocks.sums(root > 0)[touching].mean())
+    count = float(blocks.sums(root > 0)[touching].mean())
     size, spectrum = _block_spectrum(blocks.shape, basis, blocks.m, count, workers)
     w = root.astype(np.float32)
     touched = (w > 0).astype(np.float32)
-    mean = sums
-    if window > 1:
-        passed = _low_pass(size, basis * blocks.m, WIDTH * window / blocks.m)
-        mean = _local_mean(sums, touching, size, passed, workers)
+    passed = _low_pass(size, basis * blocks.m, WIDTH * window / blocks.m)
+    mean = _local_mean(sums, touching, size, passed, workers)
     q = np.divide(w, np.sqrt(mean).ravel()[blocks.which], out=np.zeros_like(w), where=w > 0)
 
     middle = np.float32(np.sqrt(np.median(mean[touching])))
     displacement = np.float32(scale) * middle * spectrum  # of A_b D
     removed = 1.0 - 1.0 / np.maximum(1.0 + middle * displacement, np.float32(LEAST))
-    if window > 1:
-        removed *= passed
+    removed *= passed
     energies = displacement * displacement
     energies[:, 1 : (size[1] + 1) // 2] *= 2  # each wave stands for its conjugate, too
     energies *= np.float32(blocks.m * blocks.m / (size[0] * size[1]))
 
-    rows, columns = blocks.shape
+    columns = blocks.shape[1]
 
     def smooth(values: NDArray[Any]) -> tuple[NDArray[Any], float]:
-        half = fft.rfft(blocks.sums(q * values), size[1], axis=1, workers=workers)
-        left = np.zeros(half.shape[1])
+        left = np.zeros(removed.shape[1])
 
-        def remove(each: slice) -> None:
-            waves = fft.fft(half[:, each], size[0], axis=0)
-            power = np.square(waves.real)
-            power += np.square(waves.imag)
+        def remove(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
+            power = np.square(waves[0].real)
+            power += np.square(waves[0].imag)
             left[each] = np.einsum("ij,ij->j", power, energies[:, each])
-            waves *= removed[:, each]
-            waves = fft.ifft(waves, axis=0, overwrite_x=True)
-            half[:, each] = waves[:rows]
+            waves[0] *= removed[:, each]
+            return waves
 
-        threads.each(remove, in_blocks(half), workers)
-        field = fft.irfft(half, size[1], axis=1, overwrite_x=True, workers=workers)
+        field = through_waves([blocks.sums(q * values)], size, workers, remove)[0]
         averages = np.ascontiguousarray(field[:, :columns]).ravel()[blocks.which]
         averages *= q
         np.subtract(values, averages, out=averages)
@@ -154,9 +143,9 @@ def _window(squares: Single) -> float:
     mean = windows.mean(axis=(1, 3), dtype=np.float64)
     variance = (windows * windows).mean(axis=(1, 3), dtype=np.float64) - mean * mean
     if not mean.any():
-        return 1.0
+        return LEAST_WINDOW
     scatter = float(variance.sum() / (mean * mean).sum())
-    return max(1.0, float(np.sqrt(scatter / SCATTER)))
+    return max(LEAST_WINDOW, float(np.sqrt(scatter / SCATTER)))
 
 
 def _low_pass(size: tuple[int, int], basis: Array, width: float) -> Single:
@@ -177,14 +166,15 @@ def _local_mean(
     sums: Single, touching: NDArray[np.bool_], size: tuple[int, int], passed: Single, workers: int
 ) -> Single:
     """d, with which sums / d have the local mean 1 about wherever there are any."""
-    from scipy import fft
+
+    def average(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
+        waves[0] *= passed[:, each]
+        return waves
 
     mean = np.ones_like(sums)
     for power in (1.0, 0.5, 0.5, 0.5):  # as a symmetric matrix is scaled to row sums of 1
         parts = np.where(touching, sums / mean, np.float32(0))
-        waves = fft.rfft2(parts, s=size, workers=workers)
-        waves *= passed
-        local = fft.irfft2(waves, s=size, workers=workers)[: sums.shape[0], : sums.shape[1]]
+        local = through_waves([parts], size, workers, average)[0][:, : sums.shape[1]]
         mean *= np.maximum(local, np.float32(1e-3) * local.max()) ** np.float32(power)
     return mean
 
@@ -204,17 +194,14 @@ def _block_spectrum(
     y = np.add.outer(i * (m * basis[0, 1]), j * (m * basis[1, 1]))
     x[0, 0] = np.inf
     mean = (1.0 / np.hypot(x, y)).astype(np.float32)
-    if m > 1:
-        site = np.stack(np.meshgrid(np.arange(m), np.arange(m)), axis=-1).reshape(-1, 2)
-        pairs = (site[:, None] - site).reshape(-1, 2)
-        for a in range(-min(2, (rows - 1) // 2), min(2, (rows - 1) // 2) + 1):
-            for b in range(-min(2, (columns - 1) // 2), min(2, (columns - 1) // 2) + 1):
-                r = np.hypot(*((pairs + np.array([a * m, b * m])) @ basis).T)
-                apart = r > 0
-                mean[a, b] = float((1.0 / r[apart]).sum()) / int(apart.sum())
-        mean[0, 0] *= max(0.0, 1.0 - 1.0 / count)
-    else:
-        mean[0, 0] = 0.0
+    site = np.stack(np.meshgrid(np.arange(m), np.arange(m)), axis=-1).reshape(-1, 2)
+    pairs = (site[:, None] - site).reshape(-1, 2)
+    for a in range(-min(2, (rows - 1) // 2), min(2, (rows - 1) // 2) + 1):
+        for b in range(-min(2, (columns - 1) // 2), min(2, (columns - 1) // 2) + 1):
+            r = np.hypot(*((pairs + np.array([a * m, b * m])) @ basis).T)
+            apart = r > 0
+            mean[a, b] = float((1.0 / r[apart]).sum()) / int(apart.sum())
+    mean[0, 0] *= max(0.0, 1.0 - 1.0 / count)
     spectrum: Any = fft.rfft2(mean, workers=workers).real
     return (rows, columns), np.ascontiguousarray(spectrum)
 

@@ -15,8 +15,7 @@ from convexrough.influence.convolution import Box, Kernel
 from convexrough.influence.near_pairs import Order
 from convexrough.influence.softened import Softened, twofold_lagrange
 from convexrough.influence.splitting import Splitting
-from convexrough.roundoff import ROUNDOFF
-from convexrough.twofold import Twofold
+from convexrough.numbers.pairs import Pair
 
 #: Points of one block at most: what keeps sums short, and a matrix product in the cache.
 BLOCK = 256
@@ -29,40 +28,9 @@ PLACES = 2**12
 class Mesh(Box):
     """A box of square cells, with the softened kernel."""
 
-    def softened(self, kernel: Softened) -> tuple[Kernel, float, float]:
-        """L for every difference of two nodes; and bounds on the sum and 2-norm of their errors."""
-        from scipy import fft
-
-        rows, columns = self.padded
-        spacing = float(self.basis[0, 0])
-        x = (np.arange(self.shape[0]) * spacing) ** 2
-        j = np.arange(columns)
-        j = np.minimum(j, columns - j)
-        y = np.where(j < self.shape[1], (j * spacing) ** 2, np.inf)
-        half = np.zeros((rows, columns // 2 + 1))
-        total = square = near = near_square = 0.0
-        block = max(1, 2**20 // columns)
-        for start in range(0, self.shape[0], block):
-            taken = slice(start, min(start + block, self.shape[0]))
-            squares = np.add.outer(x[taken], y)
-            values = kernel.smooth(squares)
-            weights = np.where(np.arange(taken.start, taken.stop) > 0, 2.0, 1.0)  # i and -i
-            total += float(weights @ values.sum(axis=1))
-            square += float(weights @ (values * values).sum(axis=1))
-            values_near = np.where(squares < kernel.reach**2, values, 0.0)
-            near += float(weights @ values_near.sum(axis=1))
-            near_square += float(weights @ (values_near * values_near).sum(axis=1))
-            # Even in j as well, so that the transform is real.
-            half[taken] = fft.rfft(values, axis=1, workers=self.workers).real
-        half[rows - self.shape[0] + 1 :] = half[self.shape[0] - 1 : 0 : -1]
-        spectrum = fft.fft(half, axis=0, workers=self.workers).real
-        norm = float(np.sqrt(square))
-        beyond, inner = kernel.beyond_roundoffs * ROUNDOFF, kernel.roundoffs * ROUNDOFF
-        return (
-            Kernel(np.ascontiguousarray(spectrum), total, norm),
-            beyond * total + inner * near,
-            beyond * norm + inner * float(np.sqrt(near_square)),
-        )
+    def softened(self, kernel: Softened) -> Kernel:
+        """L for every difference of two nodes."""
+        return self.kernels(lambda i, j, squares: [kernel.smooth(squares)], np.float64)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,13 +85,13 @@ class Interpolation:
         return result
 
 
-def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Twofold, Twofold]:
+def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Pair, Pair]:
     """(n, width) weights of some points in x and y, each set where its stencil is."""
     stencil = np.arange(splitting.kernel.order)
     factors = []
     for k in (0, 1):
         weights = twofold_lagrange(order.shares[some, k], len(stencil))
-        rows = Twofold(*(np.zeros((len(weights.high), splitting.width)) for _ in weights))
+        rows = Pair(*(np.zeros((len(weights.high), splitting.width)) for _ in weights))
         columns = (order.cells[some, k] % splitting.block)[:, None] + stencil
         for row, values in zip(rows, weights, strict=True):
             np.put_along_axis(row, columns, values, axis=1)

@@ -15,7 +15,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import squared_distances
 from convexrough.influence.splitting import Splitting
-from convexrough.twofold import Twofold, exact_sum, whole
+from convexrough.numbers.pairs import Pair, two_sum
 
 #: Pairs looked at together, and how many such pieces are held at once.
 PIECE, BATCH = 2**17, 32
@@ -26,6 +26,7 @@ class Order:
     """Points in the order of the blocks of the mesh that they are in.
 
     places : (n,) the points in order;  points : (n, 2) [length] in that order
+    tails  : (n, 2) [length] what these lack, or None
     cells  : (n, 2) mesh cells;  shares : (n, 2) where in its cell each is, from 0 to 1
     keys   : of blocks with points, in order;  starts : (blocks + 1,) their points
     shape  : rows and columns of blocks
@@ -33,6 +34,7 @@ class Order:
 
     places: Indices
     points: Array
+    tails: Array | None
     cells: Indices
     shares: Array
     keys: Indices
@@ -40,11 +42,11 @@ class Order:
     shape: tuple[int, int]
 
     @classmethod
-    def of(cls, points: Array, splitting: Splitting) -> Order:
+    def of(cls, points: Array, splitting: Splitting, tails: Array | None = None) -> Order:
         low = points.min(axis=0) if len(points) else np.zeros(2)
         cells, shares = np.zeros(points.shape, dtype=np.intp), np.zeros_like(points)
         if splitting.meshed:
-            cells, shares = _placed(points, low, splitting.spacing)
+            cells, shares = _placed(points, low, splitting.spacing, tails)
         blocks = cells // splitting.block
         rows, columns = (blocks.max(axis=0, initial=0) + 1).tolist()
         key = blocks[:, 0] * columns + blocks[:, 1]
@@ -53,6 +55,7 @@ class Order:
         return cls(
             places,
             points[places],
+            None if tails is None else tails[places],
             cells[places],
             shares[places],
             keys,
@@ -61,11 +64,20 @@ class Order:
         )
 
 
-def _placed(points: Array, low: Array, spacing: float) -> tuple[Indices, Array]:
-    """Cells, and shares of them that are rounded once: at most half a roundoff off."""
-    away = Twofold(*exact_sum(points, -low)).over(whole(spacing))
+def _placed(
+    points: Array, low: Array, spacing: float, tails: Array | None
+) -> tuple[Indices, Array]:
+    """Cells, and shares of them that are rounded once: at most half a roundoff off.
+
+    A tail may reach into the cell before: of the outermost points, out of it by a roundoff.
+    """
+    away = Pair(*two_sum(points, -low))
+    if tails is not None:
+        away += Pair.exact(tails)
+    away /= Pair.exact(spacing)
     cells = np.floor(away.high)
     cells -= (away.high == cells) & (away.low < 0)
+    cells = np.maximum(cells, 0.0)
     return cells.astype(np.intp), (away.high - cells) + away.low
 
 
@@ -136,7 +148,8 @@ def _pairs(order: Order, splitting: Splitting, piece: Piece) -> _Pairs:
     others = np.concatenate(
         [np.arange(a, b, dtype=np.int32) for a, b in zip(firsts, lasts, strict=True)]
     )
-    squares = squared_distances(order.points[rows], order.points[others])
+    tails = None if order.tails is None else (order.tails[rows], order.tails[others])
+    squares = squared_distances(order.points[rows], order.points[others], tails)
     wanted = squares < splitting.cut**2
     own = lasts[0] - firsts[0]  # each pair once
     wanted[:, :own] &= others[:own] > np.arange(rows.start, rows.stop)[:, None]

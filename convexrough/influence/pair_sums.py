@@ -37,23 +37,24 @@ class Product:
     weights: Interpolation | None
     mesh: Mesh
     kernel: Kernel
-    kernel_errors: tuple[float, float]
 
     @classmethod
-    def assemble(cls, points: Array, splitting: Splitting, dtype: Any) -> Product:
-        order = Order.of(points, splitting)
+    def assemble(
+        cls, points: Array, splitting: Splitting, dtype: Any, tails: Array | None = None
+    ) -> Product:
+        order = Order.of(points, splitting, tails)
         near = Near.assemble(order, splitting, dtype)
         if not splitting.meshed:
             nothing = Kernel(np.empty((0, 0)), 0.0, 0.0)
-            return cls(splitting, order, near, None, Mesh((1, 1), np.eye(2)), nothing, (0.0, 0.0))
+            return cls(splitting, order, near, None, Mesh((1, 1), np.eye(2)), nothing)
         weights = Interpolation.assemble(order, splitting, dtype)
         rows, columns = weights.shape
         mesh = Mesh((rows, columns), splitting.spacing * np.eye(2))
         size = float(mesh.padded[0]) * mesh.padded[1]
         checks.fits_in_memory("asperities that could touch", len(points), 32 * size / len(points))
-        kernel, *errors = mesh.softened(splitting.kernel)
+        kernel = mesh.softened(splitting.kernel)
         kernel = Kernel(kernel.spectrum.astype(dtype, copy=False), kernel.total, kernel.norm)
-        return cls(splitting, order, near, weights, mesh, kernel, (errors[0], errors[1]))
+        return cls(splitting, order, near, weights, mesh, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         """The sparse part on another thread: both it and the transforms leave Python."""
@@ -109,7 +110,7 @@ class Product:
         docs/theory/operators-mesh.md, "Anywhere: a mesh and near pairs", "Rounding".
         """
         kernel = self.splitting.kernel
-        relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 8) * ROUNDOFF
+        relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF
         relative += kernel.moved(2.0 * ROUNDOFF * self.splitting.spacing)
         relative += kernel.far_error(self.splitting.spacing)
         own = (kernel.roundoffs + 8) * ROUNDOFF * kernel.centre
@@ -123,13 +124,15 @@ class Product:
             ordered = loads[self.order.places]
             field = float(np.linalg.norm(self.weights.to_nodes(ordered)))
             sizes = float(np.linalg.norm(self.weights.to_nodes(np.abs(ordered), absolute=True)))
-            mesh, kernel, errors = self.mesh, self.kernel, self.kernel_errors
+            mesh, kernel = self.mesh, self.kernel
             to_mesh, from_mesh = self._weighing
-            transforms = mesh.bound(kernel, ROUNDOFF) + errors[0] + from_mesh * kernel.total
+            soft = self.splitting.kernel
+            from_mesh += max(soft.roundoffs, soft.beyond_roundoffs) * ROUNDOFF  # of each L
+            transforms = mesh.bound(kernel, ROUNDOFF) + from_mesh * kernel.total
             norm += self._stretch * (transforms * field + to_mesh * kernel.total * sizes)
             # One by one: Cauchy's inequality for a row of G, and the sum of a row of |W|.
-            transforms = mesh.bound_each(kernel, ROUNDOFF) + errors[1] + from_mesh * kernel.norm
-            growth = lebesgue(self.splitting.kernel.order) ** 2
+            transforms = mesh.bound_each(kernel, ROUNDOFF) + from_mesh * kernel.norm
+            growth = lebesgue(soft.order) ** 2
             each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
         return Rounding(relative, 1.01 * norm, 1.01 * each)
 

@@ -14,21 +14,28 @@ from typing import Any, ClassVar
 import numpy as np
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, Sums
+from convexrough.influence.convolution import Kernel
+from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, known
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
-from convexrough.influence.packing import clearances, point_packing
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered_smoother import coarse_inverse
-from convexrough.influence.sharp_sums import sharp_sums
-from convexrough.influence.slopes import Spectra, by_mesh, mesh_spectra
+from convexrough.influence.sharp_sums import MeshSums
+from convexrough.influence.sliced_matrix import MatrixSums
+from convexrough.influence.slopes import by_mesh, mesh_pulls
 from convexrough.influence.splitting import Splitting
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair
 from convexrough.scene.neighbours import crowding, separations
 
-#: Error of a product, relative to its own size, that is left to interpolation.
-TOLERANCE = 1e-15
+#: Error of a product, relative to its own size, that is left to interpolation: all that is of
+#: sharp sums, which are known to 1e-16.
+TOLERANCE = 5e-17
 
 #: The same where loads are in single precision, and for sums that need not be sharp.
 SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
+
+#: Up to so many asperities are summed up by their matrix: as fast as a mesh, and to 27 digits.
+FEW = 1500
 
 #: Up to so many pairs (asperity, other point) are coupled one by one: a heuristic, for speed only.
 FEW_PAIRS = 10**8
@@ -41,17 +48,18 @@ class ScatteredInfluence:
     points      : (n, 2) [length]
     scale       : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
     point_error : [length] bound on the error of each coordinate of the points
+    tails       : (n, 2) [length] what the points lack, or None; see `Scene.contact_tails`
     tolerance   : error of interpolation in a product, relative to its size
     """
 
     points: Array
     scale: float
     point_error: float = 0.0
+    tails: Array | None = None
     tolerance: float = TOLERANCE
 
     name: ClassVar[Kind] = "scattered"
     at_hand: ClassVar[bool] = False
-    prefers_single: ClassVar[bool] = True
     sharp: ClassVar[bool] = False
 
     def __len__(self) -> int:
@@ -67,7 +75,7 @@ class ScatteredInfluence:
 
     def rounding(self, loads: Array) -> Rounding:
         rounding = self._double.rounding(loads)
-        points = entry_error(self.point_error, self._double.near.nearest)
+        points = entry_error(self._unknown, self._double.near.nearest)
         interpolation = self._double.interpolation_norm * float(np.linalg.norm(loads))
         each = float(self._double.interpolation(np.abs(loads)).max(initial=0.0))
         return Rounding(
@@ -93,20 +101,21 @@ class ScatteredInfluence:
         return entry_error(self.point_error, float(self.separations().min(initial=np.inf)))
 
     def among(self, which: Indices) -> ScatteredInfluence:
-        return replace(self, points=self.points[which])
+        tails = None if self.tails is None else self.tails[which]
+        return replace(self, points=self.points[which], tails=tails)
 
     def onto(self, points: Array) -> Coupling:
         if len(points) * len(self) <= FEW_PAIRS:
             return DenseCoupling(self.points, points, self.scale, self.point_error)
         together = np.concatenate((self.points, points))
-        return ScatteredCoupling(replace(self, points=together), len(self))
+        return ScatteredCoupling(replace(self, points=together, tails=None), len(self))
 
     def slopes(self, loads: Array) -> Array:
-        return -self.scale * by_mesh(self._double, self._odd, loads)
+        return -self.scale * by_mesh(self._double, self._pulls, loads)
 
     @cached_property
-    def _odd(self) -> Spectra | None:
-        return mesh_spectra(self._double)
+    def _pulls(self) -> list[Kernel]:
+        return mesh_pulls(self._double)
 
     def separations(self) -> Array:
         return separations(self.points, self.point_error)
@@ -114,31 +123,31 @@ class ScatteredInfluence:
     def crowding(self, radii: Array) -> float:
         return crowding(self.points, radii)
 
-    def packing(self, radii: Array) -> float:
-        return point_packing(self.points, radii, 3.0 * self.point_error)
-
-    def clearances(self) -> Array:
-        return self.separations()
-
     def semidefinite_with(self, radius: float) -> bool:
         return False
 
-    def sums(self, loads: Array) -> Sums | None:
-        found = sharp_sums(self._double, loads)
-        if found is None or self.point_error == 0.0:
+    def sums(self, loads: Pair) -> Ball:
+        """By the mesh, or of few points by their matrix."""
+        found = self._sums(loads)
+        if isinstance(self._sums, MatrixSums) or self._unknown == 0.0:
             return found
         # Distances are off by this at most, and 1 / r by so much over r^2.
-        moved = 2.0 * math.sqrt(2.0) * self.point_error
-        off = 1.01 * moved / found.unit * self.falloff(np.abs(loads), 2)
-        error = found.error + float(off.max())
-        return found._replace(error=error, norm=found.norm + float(np.linalg.norm(off)))
+        moved = 2.0 * math.sqrt(2.0) * self._unknown
+        off = 1.01 * moved * self.falloff(np.abs(loads.high), 2)
+        return Ball.around(found.mid, found.radius + off)
+
+    @cached_property
+    def _sums(self) -> MatrixSums | MeshSums:
+        if len(self) > FEW and self._double.splitting.meshed:
+            return MeshSums(self._double)
+        return MatrixSums(*known(self.points, self.tails, self.point_error))
 
     def smoother(self, root: Array) -> Smoother | None:
         return coarse_inverse(self.points, self.scale, root)
 
     def _stretched(self, power: int) -> float:
         """How much higher 1 / r^q can be for what is known of the points."""
-        moved = entry_error(self.point_error, self._double.near.nearest)
+        moved = entry_error(self._unknown, self._double.near.nearest)
         return float((1.0 + moved) ** power) * (1.0 + 1e-6)
 
     @cached_property
@@ -159,7 +168,12 @@ class ScatteredInfluence:
 
     def _product(self, power: int, tolerance: float, dtype: Any) -> Product:
         splitting = Splitting.choose(self.points, power, tolerance)
-        return Product.assemble(self.points, splitting, dtype)
+        return Product.assemble(self.points, splitting, dtype, self.tails)
+
+    @property
+    def _unknown(self) -> float:
+        """[length] bound on the error of each coordinate, with the tails."""
+        return known(self.points, self.tails, self.point_error)[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,11 +191,6 @@ class ScatteredCoupling:
 
     def falloff(self, strengths: Array, power: int) -> Array:
         return self.joint.falloff(self._all(strengths), power)[self.sources :]
-
-    def clearances(self) -> Array:
-        points = self.joint.points
-        here, elsewhere = points[: self.sources], points[self.sources :]
-        return clearances(here, elsewhere, self.joint.point_error)
 
     def _all(self, values: Array) -> Array:
         everywhere = np.zeros(len(self.joint), dtype=values.dtype)

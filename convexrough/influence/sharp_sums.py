@@ -1,8 +1,7 @@
 """The sums of `pair_sums` to more digits, for the one product of a certificate.
 
 docs/theory/sharp-mesh.md. What goes to the mesh, through it and back is multiplied in slices: first
-ones of so few bits that their products are exact, and small rests. What is left is interpolation,
-and the rounding of near pairs beside their own sum.
+ones of so few bits that their products are exact, and small rests. What is left is interpolation.
 """
 
 from __future__ import annotations
@@ -17,25 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence.coupling import Sums
 from convexrough.influence.mesh import PLACES, twofold_weights
-from convexrough.influence.pair_sums import Product, within
-from convexrough.influence.sliced import Distances, sliced_sums
-from convexrough.influence.softened import TWOFOLD_WEIGHT, Softened, exact_series, lebesgue
+from convexrough.influence.pair_sums import Product
+from convexrough.influence.sharp_pairs import SharpPairs, soft_terms, soft_values
+from convexrough.influence.sliced import Distances, Sliced
+from convexrough.influence.softened import TWOFOLD_WEIGHT, Softened, lebesgue
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair, two_product, two_sum
 from convexrough.roundoff import ROUNDOFF
-from convexrough.twofold import Twofold, exact_product, exact_sum
 
 #: Bits of a float64 number, and of first slices where at most 16 units are added up.
 DIGITS, BITS = 53, 24
 
 #: Patches looked at together: what a cache holds.
 PATCHES = 64
-
-#: Rings that near pairs are counted in. A heuristic: with one, too, what is said of them holds.
-RINGS = 4
-
-#: Bits after the point of the integers that L is computed with within the reach.
-FIXED = 160
 
 LowWeights: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
 
@@ -47,7 +41,7 @@ class Slices(NamedTuple):
     second: Array
 
     @classmethod
-    def of(cls, values: Twofold, bits: int) -> Slices:
+    def of(cls, values: Pair, bits: int) -> Slices:
         unit = 2.0**bits
         first = np.rint(values.high * unit) / unit
         return cls(first, (values.high - first) + values.low)
@@ -69,77 +63,75 @@ def in_slices(
 class SoftValues:
     """unit L between nodes of a mesh.
 
-    heads, rests : by i^2 + j^2 within the reach;  distances : beyond;  size : the 2-norm of all
+    near : by i^2 + j^2 within the reach;  distances : beyond
     """
 
-    heads: Array
-    rests: Array
+    near: Pair
     distances: Distances
-    size: float
 
     @classmethod
     def of(cls, product: Product, unit: float) -> SoftValues:
         mesh, kernel, spacing = product.mesh, product.splitting.kernel, product.splitting.spacing
-        heads, rests = _within_reach(kernel, spacing, unit)
-        distances = Distances.of(mesh.basis, unit, max(mesh.shape))
-        return cls(heads, rests, distances, unit * product.kernel.norm)
+        basis = [[Fraction(x) / Fraction(unit) for x in row] for row in mesh.basis.tolist()]
+        distances = Distances.of(basis, max(mesh.shape))
+        return cls(_within_reach(kernel, spacing, unit), distances)
 
-    def sliced(self, i: Indices, j: Indices) -> tuple[Array, Array]:
-        head, rest = self.distances.sliced(i, j)
+    @property
+    def error(self) -> float:
+        return self.distances.error
+
+    def at(self, i: Indices, j: Indices) -> Pair:
+        found = self.distances.at(i, j)
         squares = np.add.outer(i * i, j * j)
-        near = squares < len(self.heads)
-        head[near], rest[near] = self.heads[squares[near]], self.rests[squares[near]]
-        return head, rest
-
-    def norm(self, shape: tuple[int, int]) -> float:
-        return self.size
+        near = squares < len(self.near.high)
+        found.high[near], found.low[near] = self.near.at(squares[near])
+        return found
 
 
-def _within_reach(kernel: Softened, spacing: float, unit: float) -> tuple[Array, Array]:
-    """unit L(spacing sqrt(s)), s = 0, 1, ... below the reach, as float32 numbers and rests."""
-    one = 1 << FIXED
-    steps = (Fraction(spacing) / Fraction(kernel.reach)) ** 2
-    scale = Fraction(unit) / Fraction(kernel.reach)
-    terms = [int(term * one) for term in reversed(exact_series(kernel.order, 1))]
-    heads, rests = [], []
-    for s in range(math.ceil(1 / steps)):
-        t = int((1 - s * steps) * one)
-        value = 0
-        for term in terms:
-            value = (value * t >> FIXED) + term
-        value = value * scale.numerator // scale.denominator
-        head = float(np.float32(value / one))
-        heads.append(head)
-        rests.append((value - int(Fraction(head) * one)) / one)
-    return np.array(heads), np.array(rests)
+def _within_reach(kernel: Softened, spacing: float, unit: float) -> Pair:
+    """unit L(spacing sqrt(s)), s = 0, 1, ... below the reach."""
+    step = Fraction(spacing) ** 2
+    nodes = math.ceil(Fraction(kernel.reach) ** 2 / step)
+    return soft_values(
+        soft_terms(kernel, step, nodes, 1)[0], Fraction(unit) / Fraction(kernel.reach)
+    )
 
 
-def sharp_sums(product: Product, loads: Array) -> Sums | None:
-    """sum_j P_j / r_ij for exact points; None where there is no mesh, or no slices small enough."""
-    top = float(np.abs(loads).max(initial=0.0))
-    if not product.splitting.meshed or top == 0.0:
-        return None
-    size = 2.0 ** np.ceil(np.log2(top))
-    shares = loads / size  # exact
-    ordered = shares[product.order.places]
-    lows = _low_weights(product)
-    field, node_error = _to_nodes(product, lows, ordered)
-    spacing = 2.0 ** np.floor(np.log2(product.splitting.spacing))
-    on_mesh = sliced_sums(product.mesh, SoftValues.of(product, spacing), spacing, *field)
-    if on_mesh is None:
-        return None
-    exact, left, unit, rounding = _from_nodes(product, lows, on_mesh)
-    left += product.near.apply(ordered) / unit
-    back = np.argsort(product.order.places)
-    whole, rest = exact[back], left[back]
+class MeshSums:
+    """sum_j P_j / r_ij for exact points, by the mesh of a product."""
 
-    field_error = node_error * math.sqrt(field.high.size)
-    error = on_mesh.error * on_mesh.unit + product.kernel.norm * field_error
-    error *= lebesgue(product.splitting.kernel.order) ** 2
-    sizes = (whole + rest) * unit if loads.min() >= 0 else product.apply(np.abs(shares))
-    error += _nearby(product, np.abs(shares)) + _relative(product) * float(sizes.max())
-    error = 1.01 * (error / unit + rounding)
-    return Sums(whole, rest, unit * size, error, error * math.sqrt(len(loads)))
+    def __init__(self, product: Product) -> None:
+        mesh, unit = product.mesh, 2.0 ** math.floor(math.log2(product.splitting.spacing))
+        self.product, self.lows = product, _low_weights(product)
+        self.pairs = SharpPairs.of(product)
+        values, norm = SoftValues.of(product, unit), unit * product.kernel.norm
+        self.sliced = Sliced.of(mesh, values, norm, unit)
+        self.places = np.add.outer(np.arange(mesh.shape[0]) * mesh.padded[1], range(mesh.shape[1]))
+
+    def __call__(self, loads: Pair) -> Ball:
+        product = self.product
+        top = float(np.abs(loads.high).max(initial=0.0))
+        if top == 0.0:
+            return Ball.exact(loads)
+        size = 2.0 ** np.ceil(np.log2(top))
+        shares = Pair(np.asarray(loads.high / size), np.asarray(loads.low / size))  # exact
+        ordered = shares.at(product.order.places)
+        field, node_error = _to_nodes(product, self.lows, ordered)
+        nodes = Pair(field.high.ravel(), field.low.ravel())
+        on_mesh = self.sliced.sums(nodes, self.places.ravel(), np.zeros(self.places.size), 0.0)
+        exact, left, unit, rounding = _from_nodes(product, self.lows, on_mesh)
+        near, errors = self.pairs(ordered)
+        back = np.argsort(product.order.places)
+        total = (Pair(*two_sum(exact * unit, left * unit)) + near).at(back)
+
+        field_error = node_error * math.sqrt(field.high.size)
+        error = float(on_mesh.radius.max()) + product.kernel.norm * field_error
+        error *= lebesgue(product.splitting.kernel.order) ** 2
+        sizes = np.abs(shares.high)
+        whole = total.high if shares.high.min() >= 0 else product.apply(sizes)
+        error += _relative(product) * float(whole.max()) + rounding * unit
+        radius = errors[back] + product.interpolation(sizes) + error
+        return Ball.around(Pair(total.high * size, total.low * size), 1.01 * radius * size)
 
 
 def _low_weights(product: Product) -> LowWeights:
@@ -153,50 +145,51 @@ def _low_weights(product: Product) -> LowWeights:
     return x, y
 
 
-def _to_nodes(product: Product, lows: LowWeights, ordered: Array) -> tuple[Twofold, float]:
+def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, float]:
     """W^T P for loads of at most 1, and a bound on the error at each node."""
     assert product.weights is not None
     met = _met(product)
     bits = (DIGITS - met.bit_length()) // 2
     exact, left = np.zeros(product.weights.shape), np.zeros(product.weights.shape)
     for some, patches, x, y in _weighed(product, lows):
-        mine = ordered[some, None]
-        high, low = exact_product(mine, y.high)
-        charges = Slices.of(Twofold(high, low + mine * y.low), bits)
+        mine = ordered.at(np.s_[some, None])
+        high, low = two_product(mine.high, y.high)
+        low = low + (mine.high * y.low + mine.low * y.high)
+        charges = Slices.of(Pair(high, low), bits)
         factors = Slices.of(x, bits)
         for rows, i, j in patches:
             first, second = in_slices(_transposed, factors.some(rows), charges.some(rows))
             exact[i, j] += first
             left[i, j] += second
     error = met * ((2 * met + 8) * ROUNDOFF * 2.0**-bits + 4 * TWOFOLD_WEIGHT)
-    return Twofold(*exact_sum(exact, left)), error
+    return Pair(*two_sum(exact, left)), error
 
 
 def _from_nodes(
-    product: Product, lows: LowWeights, on_mesh: Sums
+    product: Product, lows: LowWeights, on_mesh: Ball
 ) -> tuple[Array, Array, float, float]:
     """W of values on the mesh: whole numbers, what is left, their unit, and the rounding in it."""
-    high, low = exact_sum(on_mesh.whole, on_mesh.rest)
-    scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1.0))
-    values = Slices.of(Twofold(high * scale, low * scale), BITS)
+    high, low = (np.asarray(each).reshape(product.mesh.shape) for each in on_mesh.mid)
+    scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1e-300))
+    values = Slices.of(Pair(high * scale, low * scale), BITS)
     unit = 2.0 ** (-2 * BITS)
     exact, left = np.empty(len(product.order.places)), np.empty(len(product.order.places))
     for some, patches, x, y in _weighed(product, lows):
         across, along = Slices.of(x, BITS), Slices.of(y, BITS)
         for rows, i, j in patches:
             nodes = Slices(values.first[i, j], values.second[i, j])
-            lines = Slices.of(Twofold(*in_slices(np.matmul, across.some(rows), nodes)), BITS)
+            lines = Slices.of(Pair(*in_slices(np.matmul, across.some(rows), nodes)), BITS)
             here = slice(some.start + rows.start, some.start + rows.stop)
             exact[here], left[here] = in_slices(_row_by_row, lines, along.some(rows))
     # Sums of weights are below 4 in size; those of second slices, p of them, below p 2^-BITS.
     kernel, width = product.splitting.kernel, product.splitting.width
     rounding = 12 * kernel.order * (width + 8) * ROUNDOFF * 2.0**-BITS + 32 * TWOFOLD_WEIGHT
-    return exact / unit, left / unit, unit / scale * on_mesh.unit, rounding / unit
+    return exact / unit, left / unit, unit / scale, rounding / unit
 
 
 def _weighed(
     product: Product, lows: LowWeights
-) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Twofold, Twofold]]:
+) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
     """The points of some patches; of each its rows among these, and nodes; and the weights."""
     assert product.weights is not None
     weights, width = product.weights, product.splitting.width
@@ -207,34 +200,19 @@ def _weighed(
             (slice(a - start, b - start), slice(i, i + width), slice(j, j + width))
             for a, b, i, j in patches
         ]
-        x, y = Twofold(weights.x[some], lows[0][some]), Twofold(weights.y[some], lows[1][some])
+        x, y = Pair(weights.x[some], lows[0][some]), Pair(weights.y[some], lows[1][some])
         yield some, places, x, y
 
 
 def _met(product: Product) -> int:
-    """The most points that a node has in its reach."""
-    overlaps = (-(-product.splitting.width // product.splitting.block)) ** 2
-    return overlaps * int(np.diff(product.order.starts).max())
-
-
-def _nearby(product: Product, strengths: Array) -> float:
-    """The largest error of interpolation, and of near pairs beside their own sums."""
-    near, kernel = product.near, product.splitting.kernel
-    ordered = strengths[product.order.places]
-    own = near.apply(ordered) + kernel.centre * ordered
-    entries = kernel.beyond_roundoffs + kernel.roundoffs + 8
-    rounding = (near.terms + 4) * own + entries * (own + _smooth_nearby(product, ordered))
-    return ROUNDOFF * float(rounding.max()) + float(product.interpolation(strengths).max())
-
-
-def _smooth_nearby(product: Product, ordered: Array) -> Array:
-    """(n,) upper bounds on the sum of L |P| over near pairs: L falls from ring to ring."""
-    edges = product.splitting.cut * np.arange(RINGS + 1) / RINGS
-    levels = np.append(product.splitting.kernel.smooth(edges[:-1] ** 2), 0.0)
-    total = np.zeros(len(ordered))
-    for edge, fall in zip(edges[1:], -np.diff(levels), strict=True):
-        total += fall * within(product.order.points, ordered, float(edge))
-    return total
+    """The most points that have a node in their stencil."""
+    assert product.weights is not None
+    order, counts = product.splitting.kernel.order, np.zeros(product.weights.shape, dtype=np.intp)
+    np.add.at(counts, tuple(product.order.cells.T), 1)
+    for rows in (counts, counts.T):
+        rows[:] = rows.cumsum(axis=0)
+        rows[order:] -= rows[:-order].copy()
+    return int(counts.max())
 
 
 def _relative(product: Product) -> float:

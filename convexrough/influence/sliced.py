@@ -1,8 +1,9 @@
-"""A product on a lattice to some thirty digits, by exact convolutions of whole numbers.
+"""Products on a box of sites to as many digits as are asked for, by exact convolutions.
 
-docs/theory/sliced.md. Loads and kernel are cut in two: whole numbers of a coarse unit, and a small
-rest. The transforms' product of the whole parts is off by less than a half, so that rounding makes
-it exact; the other products are small, and so are their errors.
+docs/theory/sliced.md. Loads and kernel are cut into slices: whole numbers of units that shrink by
+the same power of two from one slice to the next, and a small rest. The products of all slices that
+share a unit are a level; the transforms' sum of a level is off by less than a half, so that
+rounding makes it exact. What is left beside these levels is small, and so is its error.
 """
 
 from __future__ import annotations
@@ -10,49 +11,59 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import threads
 from convexrough.arrays import Array, Indices
-from convexrough.influence.convolution import Box, Kernel, in_blocks
-from convexrough.influence.coupling import Sums
+from convexrough.influence.convolution import Box, Kernel, through_waves
+from convexrough.numbers.balls import TINY, Ball
+from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_sum
 from convexrough.roundoff import ROUNDOFF
 
-#: The product of whole parts may be off by at most this, to be rounded to what it is.
+#: A level may be off by at most this, to be rounded to what it is.
 SURE = 0.45
 
-#: Bounds on the error of each value of the kernel: over the largest, and of its rest as a number.
-VALUE_ERROR, REST_ERROR = 2.0**-69, 2.0**-53
+#: Slices unless more are asked for.
+SLICES = 3
+
+#: Whole numbers of at most so many bits are cut off at once: float64 holds them with a rest.
+MOST_BITS = 48
 
 
 class Values(Protocol):
-    """An even kernel of size 1 at most, at differences of sites."""
+    """An even kernel of size 1 at most, at differences of sites.
 
-    def sliced(self, i: Indices, j: Indices) -> tuple[Array, Array]:
-        """(len(i), len(j)) values as float32 numbers and rests, to `VALUE_ERROR`."""
-        ...
+    error : bound on the relative error of each value
+    """
 
-    def norm(self, shape: tuple[int, int]) -> float:
-        """About the 2-norm over all differences of two sites of a box."""
+    @property
+    def error(self) -> float: ...
+
+    def at(self, i: Indices, j: Indices) -> Pair:
+        """(len(i), len(j)) values."""
         ...
 
 
 @dataclass(frozen=True)
 class Distances:
-    """1 / |i b1 + j b2| for whole i and j, of a basis over a power of two.
+    """1 / |i b1 + j b2| for whole i and j; 0 for no difference.
 
     gram : three slices (3, 3) of b1 b1, 2 b1 b2 and b2 b2, the first two of so few bits that their
         sums over i^2, i j and j^2 are exact
     """
 
     gram: Array
+    error: float
 
     @classmethod
-    def of(cls, basis: Array, unit: float, largest: int) -> Distances:
-        (a, b), (c, d) = ([Fraction(x) / Fraction(unit) for x in row] for row in basis.tolist())
+    def of(cls, basis: list[list[Fraction]], largest: int) -> Distances:
+        """For i and j below the largest.
+
+        basis : reduced, in a unit that is at most its shortest length and more than half of it
+        """
+        (a, b), (c, d) = basis
         bits = 52 - (4 * largest * largest).bit_length()
         slices = np.zeros((3, 3))
         products = a * a + b * b, 2 * (a * c + b * d), c * c + d * d
@@ -64,10 +75,11 @@ class Distances:
                 slices[s, k] = float(part)
                 value, finest = value - part, finest / 2 ** (bits - 1)
             slices[2, k] = float(value)
-        return cls(slices)
+        # The third slices, 2^(above - 2 bits) at most, lose four roundoffs of i^2 + |i j| + j^2 in
+        # all; on a reduced basis r^2 is at least a third of that.
+        return cls(slices, PAIR_ROUNDOFF + 12 * ROUNDOFF * 2.0 ** (above - 2 * bits))
 
-    def sliced(self, i: Indices, j: Indices) -> tuple[Array, Array]:
-        """To 2^-70 of each; 0 for no difference."""
+    def at(self, i: Indices, j: Indices) -> Pair:
         squares, cross = np.square(j, dtype=np.float64), j.astype(np.float64)
         parts = []
         for one, both, two in self.gram.tolist():
@@ -75,141 +87,153 @@ class Distances:
             part += squares * two
             part += (np.square(i, dtype=np.float64) * one)[:, None]
             parts.append(part)
-        high = parts[0] + parts[1]
-        low = parts[1] - (high - parts[0])
-        low += parts[2]
-        nowhere = (i[:, None] == 0) & (j == 0) if (i == 0).any() else None
-        if nowhere is not None:
-            high[nowhere] = 1.0
-        head = (1.0 / np.sqrt(high)).astype(np.float32).astype(np.float64)
-        rest = _correction(high, low, head)
-        if nowhere is not None:
-            head[nowhere] = rest[nowhere] = 0.0
-        return head, rest
-
-    def norm(self, shape: tuple[int, int]) -> float:
-        one, both, two = (float(each) for each in self.gram.sum(axis=0))
-        i, j = np.arange(-8, 9)[:, None], np.arange(-8, 9)
-        squares = one * i * i + both * i * j + two * j * j
-        squares[8, 8] = np.inf
-        near = float((1.0 / squares).sum())
-        area = math.sqrt(max(one * two - both * both / 4.0, 1e-300))
-        wide = max(shape) / 8.0
-        return math.sqrt(near + 2.0 * math.pi / area * max(math.log(wide), 0.0) + 1.0)
+        high, low = two_sum(parts[0], parts[1])
+        high, low = two_sum(high, low + parts[2])
+        return Pair(high, low).inverse_root()
 
 
-def _correction(high: Array, low: Array, head: Array) -> Array:
-    """What 1 / sqrt(high + low) is more than `head`, which is it to 2^-22."""
-    square = head * head  # exact, as head has 24 bits
-    a1 = square.astype(np.float32).astype(np.float64)
-    a2 = square - a1
-    s1 = high.astype(np.float32).astype(np.float64)
-    s2 = high - s1
-    missing = 1.0 - s1 * a1
-    missing -= s1 * a2
-    missing -= s2 * a1
-    missing -= s2 * a2 + low * square
-    factor = missing * (5.0 / 16.0)
-    factor += 3.0 / 8.0
-    factor *= missing
-    factor += 0.5
-    factor *= missing
-    factor *= head
-    return factor
+def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
+    """Whole numbers v_1, v_2, ... and a rest, the last:  values = sum 2^-(bits + s more) v_{s+1}.
 
-
-def sliced_sums(
-    box: Box, values: Values, spacing: float, loads: Array, rest: Array | float = 0.0
-) -> Sums | None:
-    """sum_j P_j g_ij / spacing over the sites of a box; None where no slices are small enough.
-
-    loads : of the whole box, 0 where there is no asperity;  rest : less than a roundoff of the
-        largest of them, if they are known so well;  spacing : the unit of `values`, a power of two
+    Below 2^bits max |values|, then 2^(more - 1) at most; the rest is rounded once.
     """
-    top = float(np.abs(loads).max(initial=0.0))
-    if top == 0.0:
-        return Sums(np.zeros(box.shape), np.zeros(box.shape), 1.0, 0.0, 0.0)
-    size = 2.0 ** np.ceil(np.log2(top))
-    shares = loads / size  # exact
-    kernel_bits, load_bits = _bits(box, values, shares)
-    if kernel_bits < 1 or load_bits < 1:
-        return None
-    fine = shares * 2.0**load_bits
-    first = np.rint(fine)
-    second = fine - first
-    second += rest * (2.0**load_bits / size)
-    whole, left = _kernels(box, values, kernel_bits)
-    sizes = [float(np.linalg.norm(each)) for each in (first, second)]
-    loss = each_loss(box)
-    if not loss * whole.norm * sizes[0] < SURE:
-        return None
-    exact, remaining = _convolve(box, (first, second), (whole, left))
-    error = loss * (whole.norm * sizes[1] + left.norm * (sizes[0] + sizes[1]))
-    of_values = VALUE_ERROR * 2.0**kernel_bits + REST_ERROR
-    error += of_values * float(np.abs(first).sum() + np.abs(second).sum()) * (1 + 1e-9)
-    unit = 2.0 ** -(kernel_bits + load_bits) * size / spacing
-    count = math.sqrt(box.shape[0] * box.shape[1])
-    return Sums(np.rint(exact), remaining, unit, 1.01 * error, 1.01 * error * count)
+    high, low = values.high * 2.0**bits, values.low * 2.0**bits
+    slices = []
+    for _ in range(count - 1):
+        slices.append(np.rint(high))
+        high, low = two_sum(high - slices[-1], low)
+        high *= 2.0**more
+        low *= 2.0**more
+    return [*slices, np.asarray(high + low)]
 
 
-def each_loss(box: Box, roundoff: float = ROUNDOFF) -> float:
-    """Of a component of a product, over both 2-norms: (2) of docs/theory/operators-lattice.md.
+@dataclass(frozen=True, eq=False)
+class Sliced:
+    """A kernel on a box, in slices of which the transforms are kept: for any loads.
 
-    9 roundoffs instead of 4, as two products are added up before the inverse transform, and loads
-    that are known better than to a roundoff have a rest to be added.
+    unit    : [length] a power of two, by which the values are divided
+    kernels : of the slices, 2^-(bits + t more) of K_{t+1};  error : that of the values
+    budget  : the most that both norms of two slices may multiply to
     """
-    return 1.01 * roundoff * ((2.0 + math.sqrt(2.0)) * box.loss + 9.0)
+
+    box: Box
+    unit: float
+    kernels: list[Kernel]
+    bits: int
+    more: int
+    error: float
+    budget: float
+
+    @classmethod
+    def of(cls, box: Box, values: Values, norm: float, unit: float, count: int = SLICES) -> Sliced:
+        """norm : about the 2-norm of the kernel, over all differences of two sites."""
+        rows, columns = box.shape
+        places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
+        sites = math.sqrt(float(rows * columns))
+        budget = SURE / ((count - 1) * each_loss(box, count))
+        # The norms of all slices of the kernel, and so those of loads, are to be about the same.
+        most = math.sqrt(budget * places / sites)
+        bits = min(max(math.floor(math.log2(0.95 * most / max(norm, 1.0))), 1), MOST_BITS)
+        more = min(1 + math.floor(math.log2(budget / (places * sites)) / 2.0), MOST_BITS)
+        while True:
+            kernels = _kernels(box, values, bits, more, count)
+            largest = max(each.norm for each in kernels[:-1])
+            # Of any loads, further slices are 2^(more - 1) at most.
+            if count == 2 or largest * 2.0 ** (more - 1) * sites <= budget:
+                return cls(box, unit, kernels, bits, more, values.error, budget)
+            more -= 1
+
+    def sums(self, loads: Pair, at: Indices, change: Array, error: float) -> Ball:
+        """(n,) sum_j g_ij P_j / unit, and what is known beside it, to within an error.
+
+        at : (n,) places of the loads, in the box as wide as the transforms
+        """
+        count = len(self.kernels)
+        top = float(np.abs(loads.high).max(initial=0.0))
+        if top == 0.0:
+            return Ball.around(change, error)
+        size = 2.0 ** np.ceil(np.log2(top))
+        shares = Pair(np.asarray(loads.high / size), np.asarray(loads.low / size))  # exact
+        slices, bits = self._cut(shares)
+        sizes = [float(np.linalg.norm(each)) for each in slices]
+        shape = self.box.shape[0], self.box.padded[1]
+
+        def laid_out(values: Array) -> Array:
+            field = np.zeros(shape)
+            field.ravel()[at] = values
+            return field
+
+        fields = [laid_out(slices.pop(0)) for _ in range(count)]
+        levels = through_waves(fields, self.box.padded, self.box.workers, self._levels)
+        del fields
+        units = [2.0 ** -(self.bits + bits + level * self.more) for level in range(count)]
+
+        def add_up(some: slice) -> Pair:
+            parts = [level.ravel()[at[some]] for level in levels]
+            total = Pair.exact(np.rint(parts[0]) * units[0])
+            for part, each in zip(parts[1:-1], units[1:], strict=False):
+                total = total + Pair.exact(np.rint(part) * each)
+            total = total + Pair.exact(parts[-1] * units[-1])
+            return Pair(total.high * unit, total.low * unit) + Pair.exact(change[some])
+
+        unit = size / self.unit
+        left = behind = 0.0  # of norms, as `_levels`
+        for kernel, norm in zip(self.kernels, sizes[::-1], strict=True):
+            behind = behind * 2.0**-self.more + norm
+            left += kernel.norm * behind
+        # By Cauchy's inequality, of the values and of pairs.
+        whole = 1.01 * self.norm * float(np.linalg.norm(shares.high))
+        radius = each_loss(self.box, count) * left * units[-1]
+        radius += (self.error + count * PAIR_ROUNDOFF) * whole
+        radius = 1.01 * radius * unit + error + PAIR_ROUNDOFF * float(np.abs(change).max()) + TINY
+        return Ball.around(in_parts(len(at), add_up), radius)
+
+    @property
+    def norm(self) -> float:
+        """The 2-norm of the kernel, and a little."""
+        norms = (k.norm * 2.0 ** -(t * self.more) for t, k in enumerate(self.kernels))
+        return 2.0**-self.bits * sum(norms)
+
+    def _cut(self, shares: Pair) -> tuple[list[Array], int]:
+        """Slices of loads of which all levels are exact, and the bits of the first."""
+        count = len(self.kernels)
+        most = self.budget / max(1.0, *(each.norm for each in self.kernels[:-1]))
+        guess = math.floor(math.log2(most / float(np.linalg.norm(shares.high))))
+        bits = min(guess, MOST_BITS)
+        while float(np.linalg.norm(np.rint(shares.high * 2.0**bits))) > most:
+            bits -= 1
+        return cut(shares, bits, self.more, count), bits
+
+    def _levels(self, waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
+        """Those of whole numbers, and the sum of all that is left."""
+        spectra = [kernel.spectrum[:, each] for kernel in self.kernels]
+        last = len(waves) - 1
+        levels = []
+        for level in range(last):
+            total = waves[0] * spectra[level]
+            for s in range(1, level + 1):
+                total += waves[s] * spectra[level - s]
+            levels.append(total)
+        behind = waves[last].copy()
+        left = behind * spectra[0]
+        for t in range(1, last + 1):
+            behind *= 2.0**-self.more
+            behind += waves[last - t]
+            left += behind * spectra[t]
+        return [*levels, left]
 
 
-def _bits(box: Box, values: Values, shares: Array) -> tuple[int, int]:
-    """Of the kernel's and of the loads' whole parts: all that are exact, shared out evenly."""
-    rows, columns = box.shape
-    norm, size = values.norm(box.shape), float(np.linalg.norm(shares))
-    bits = np.floor(np.log2(0.9 * SURE / (each_loss(box) * norm * size)))
-    count, places = float(np.count_nonzero(shares)), 4.0 * rows * columns
-    more = np.log2(np.sqrt(places) * size / (norm * np.sqrt(count)))
-    of_kernel = int(np.clip(np.rint((bits + more) / 2.0), 1, max(bits - 1, 1)))
-    return min(of_kernel, 22), int(bits) - min(of_kernel, 22)
+def each_loss(box: Box, count: int) -> float:
+    """Of a component of a level, over both 2-norms: (2) of docs/theory/operators-lattice.md.
+
+    Twice `count` and 6 roundoffs instead of 4: up to so many sums of loads and of products are
+    added up before the inverse transform, and the last slices are rounded.
+    """
+    return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 2.0 * count + 6.0)
 
 
-def _kernels(box: Box, kernel: Values, bits: int) -> tuple[Kernel, Kernel]:
-    """The whole part of 2^bits g, and the rest."""
+def _kernels(box: Box, values: Values, bits: int, more: int, count: int) -> list[Kernel]:
+    def slices(i: Indices, j: Indices, _: Array) -> list[Array]:
+        return cut(values.at(i, j), bits, more, count)
 
-    def values(i: Indices, j: Indices) -> tuple[Array, Array]:
-        head, rest = kernel.sliced(i, j)
-        head *= 2.0**bits
-        rest *= 2.0**bits
-        whole = np.rint(head)
-        head -= whole
-        head += rest
-        return whole, head
-
-    whole, rest = box.kernels(values, np.float64)
-    return whole, rest
-
-
-def _convolve(
-    box: Box, fields: tuple[Array, Array], kernels: tuple[Kernel, Kernel]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """whole * first, and whole * second + rest * (first + second)."""
-    from scipy import fft
-
-    rows, columns = box.padded
-    halves = [fft.rfft(each, columns, axis=1, workers=box.workers) for each in fields]
-
-    def multiply(each: slice) -> None:
-        first, second = (fft.fft(half[:, each], rows, axis=0) for half in halves)
-        both = first + second
-        both *= kernels[1].spectrum[:, each]
-        first *= kernels[0].spectrum[:, each]
-        second *= kernels[0].spectrum[:, each]
-        second += both
-        for half, full in zip(halves, (first, second), strict=True):
-            full = fft.ifft(full, axis=0, overwrite_x=True)
-            half[:, each] = full[: box.shape[0]]
-
-    threads.each(multiply, in_blocks(halves[0]), box.workers)
-    exact, remaining = (
-        fft.irfft(half, columns, axis=1, workers=box.workers)[:, : box.shape[1]] for half in halves
-    )
-    return exact, remaining
+    return box.kernels(slices, np.float64)

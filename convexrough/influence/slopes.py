@@ -13,63 +13,49 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence.convolution import Box, Values
+from convexrough.influence.convolution import Box, Kernel
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.softened import Softened
 
 #: Pairs looked at together.
 BLOCK = 2**22
 
-Spectra = tuple[NDArray[Any], NDArray[Any]]
 
-
-def odd_spectra(box: Box, over_cube: Callable[[Array], Array]) -> Spectra:
-    """The transforms of x and y over r^3 for every difference of two sites of a box.
+def pulls(box: Box, over_cube: Callable[[Array], Array]) -> list[Kernel]:
+    """x and y over r^3 for every difference of two sites of a box: odd kernels.
 
     over_cube : 1 / r^3, or what is taken for it, of squared distances
     """
-    from scipy import fft
 
-    x, y = box.laid_out(pulls(box, over_cube), slice(0, box.padded[0]))
-    return fft.rfft2(x, workers=box.workers), fft.rfft2(y, workers=box.workers)
-
-
-def pulls(box: Box, over_cube: Callable[[Array], Array]) -> Values:
-    """x and y over r^3 at differences of two sites; `over_cube` as for `odd_spectra`."""
-
-    def values(i: Indices, j: Indices) -> tuple[Array, Array]:
+    def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
+        weights = over_cube(squares)
         x, y = (np.add.outer(i * box.basis[0, k], j * box.basis[1, k]) for k in (0, 1))
-        weights = over_cube(x * x + y * y)
-        return weights * x, weights * y
+        return [weights * x, weights * y]
 
-    return values
+    return box.kernels(values, np.float64, odd=True)
 
 
-def by_mesh(product: Product, spectra: Spectra | None, values: Array) -> Array:
+def by_mesh(product: Product, smooth: list[Kernel], values: Array) -> Array:
     """(n, 2) the same sums: smooth at a distance, pair by pair nearby."""
     ordered = values[product.order.places]
     total = _nearby(product, ordered)
-    if product.weights is not None and spectra is not None:
+    if product.weights is not None:
         field = product.weights.to_nodes(ordered)
-        for k in (0, 1):
-            smooth = product.mesh.convolve(field, spectra[k])
-            total[:, k] += product.weights.from_nodes(smooth)
+        for k, pull in enumerate(smooth):
+            on_mesh = product.mesh.convolve(field, 1j * pull.spectrum)
+            total[:, k] += product.weights.from_nodes(on_mesh)
     result = np.empty_like(total)
     result[product.order.places] = total
     return result
 
 
-def mesh_spectra(product: Product) -> Spectra | None:
-    """Those of the smooth part of a product; None where it has none."""
-    if product.weights is None:
-        return None
-    return odd_spectra(product.mesh, _softer(product).smooth)
+def mesh_pulls(product: Product) -> list[Kernel]:
+    """Those of the smooth part of a product; none where it has none."""
+    return [] if product.weights is None else pulls(product.mesh, _softer(product).smooth)
 
 
 def _softer(product: Product) -> Softened:

@@ -18,7 +18,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.twofold import Twofold, exact_sum, whole
+from convexrough.numbers.pairs import Pair, two_sum
 
 #: Near pairs whose part would be less than so much of the error of interpolation are left out. A
 #: heuristic: what is left out is part of the bound.
@@ -157,23 +157,23 @@ def lagrange(places: Array, order: int) -> Array:
     return weights
 
 
-def twofold_lagrange(places: Array, order: int) -> Twofold:
-    """The same in twofold numbers."""
+def twofold_lagrange(places: Array, order: int) -> Pair:
+    """The same in pairs."""
     nodes = range(1 - order // 2, order // 2 + 1)
-    away = [Twofold(*exact_sum(places, -float(node))) for node in nodes]
-    left, right = [whole(np.ones(len(places)))], [whole(np.ones(len(places)))]
+    away = [Pair(*two_sum(places, -float(node))) for node in nodes]
+    left, right = [Pair.exact(np.ones(len(places)))], [Pair.exact(np.ones(len(places)))]
     for k in range(order - 1):
         left.append(left[-1] * away[k])
         right.append(right[-1] * away[-1 - k])
-    weights = Twofold(np.empty((len(places), order)), np.empty((len(places), order)))
+    weights = Pair(np.empty((len(places), order)), np.empty((len(places), order)))
     for k in range(order):
         size = (-1) ** (order - 1 - k) * math.factorial(k) * math.factorial(order - 1 - k)
-        scale = Twofold.nearest(Fraction(1, size))
+        scale = Pair.nearest(Fraction(1, size))
         weights.high[:, k], weights.low[:, k] = left[k] * right[-1 - k] * scale
     return weights
 
 
-#: Bounds on the relative error of each of them: of at most 60 operations on twofold numbers and of
+#: Bounds on the relative error of each of them: of at most 60 operations on pairs and of
 #: a low part in single precision; and, in roundoffs, of float64 numbers alone.
 TWOFOLD_WEIGHT = 2.0**-76
 WEIGHT_ROUNDOFFS = 1.0 + 2.0**-40

@@ -57,6 +57,11 @@ class Box(NamedTuple):
     faces: Array  # upper faces that the solution must be shown to stay below; else infinite
     held: NDArray[np.bool_]  # taken to be open, which has to be shown of the solution
 
+    @property
+    def closed(self) -> Box:
+        """The same box for another load or approach, of which it may not hold every solution."""
+        return self._replace(faces=np.where(self.loads > 0, self.loads, np.inf))
+
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
     """Global from the a priori bound by shells, then by Cholesky; else local."""

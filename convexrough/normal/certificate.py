@@ -1,27 +1,33 @@
 """The certificate: what is proved of given loads, for whoever reads it.
 
-`judgement` has the mathematics. Every bound holds for the exact solution of the scene whose data
-are the given float64 numbers, and includes the rounding of everything computed there.
+Every bound holds for the exact solution of the scene whose data are the given float64 numbers. The
+way there: the contact law on balls (`refine`), a box and the theorem (`proved`), and here how far
+the given loads are from the solution that was proved.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
+from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
-from convexrough.normal.boxes import Scope
-from convexrough.normal.judgement import Judgement
+from convexrough.influence.coupling import Coupling
+from convexrough.normal.boxes import Scope, lowest_ceiling
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.residual import Displaced
+from convexrough.normal.proved import Obstacle, Proved, proved
+from convexrough.normal.refine import Trial, completed, refined, refines, trial
+from convexrough.normal.rivals import NO_RIVALS, Rivals
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair
 from convexrough.record import Along, Table
-from convexrough.roundoff import SAFETY
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
@@ -144,63 +150,158 @@ def certify(
     checks.instance("scene", scene, Scene)
     values = checks.array("loads", loads, length=len(scene), sign="not negative")
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
-    return judge(problem, values)
+    return certify_on(problem, values)
 
 
-def judge(
-    problem: NormalProblem, scene_loads: Array, nearby: Displaced | None = None
+def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
+    """`certify` for a problem already assembled; loads (n,) [force] of the whole scene."""
+    given = loads[problem.candidates] / problem.units.force
+    if problem.load is not None and not given.any():
+        expected = "a load on some asperity that could touch, as the total is prescribed"
+        raise InputError("loads", found="none", expected=expected)
+    pair = completed(problem, Pair.exact(given))
+    product = problem.product(pair) if refines(problem) else problem.plain_product(pair)
+    start = trial(problem, pair, product)
+    found = proved(problem, start)
+    if refines(problem) and len(problem):
+        better = proved(problem, refined(problem, start))
+        found = better if isinstance(better, Proved) else found
+    return certificate_of(problem, loads, start, found)
+
+
+def certificate_of(
+    problem: NormalProblem, loads: Array, start: Trial, found: Proved | Obstacle
 ) -> Certificate:
-    """`certify` for a problem already assembled; loads (n,) [force] of the whole scene.
+    """What is proved of loads (n,) [force] of the whole scene, from a solution proved near them.
 
-    nearby : loads (of the candidates, in the problem's units) near these, of which A P is known to
-        many digits: this saves work where they are of this problem, and proves the same
+    start : these loads among the candidates, scaled to a prescribed total
     """
     length, force = problem.units.length, problem.units.force
-    given = scene_loads[problem.candidates]
-    found = Judgement.of(problem, given / force, nearby)
-    # The screened asperities carry nothing: a load there is off by all of it.
-    load_errors = scene_loads if found.scope != "none" else np.full(len(scene_loads), np.inf)
-    load_errors = load_errors.copy()
-    lost = np.abs(given - given / force * force)  # too small for own units
-    load_errors[problem.candidates] = found.load_errors * force + lost
-    words = np.where(found.indentation < -found.errors, np.int8(2), np.int8(0))
-    words[problem.candidates[found.touches]] = 1
+    screened = _screened(problem, start)
+    indentation = problem.to_scene(start.indentation.value)
+    indentation[screened.which] = screened.indentation
+    if isinstance(found, Obstacle):
+        return _unproved(problem, start, indentation, found)
+    given = loads[problem.candidates]
+    same = start is found.trial and np.array_equal(given / force, found.loads.value)
+    if same:  # the solution was proved from these loads
+        off = found.loads.error
+        moved = off + np.abs(start.loads.low)
+        known, shift = found.indentation.error, float(found.approach.error)
+    else:
+        off = (Ball.exact(given / force) - found.loads).size
+        moved = (Ball.exact(start.loads) - found.loads).size
+        known = (found.indentation - start.indentation.value).size
+        shift = float((found.approach - start.approach.value).size)
+    # Asperities that cannot touch carry nothing; loads too small for own units are lost there.
+    load_errors = loads.copy()
+    load_errors[problem.candidates] = off * force + np.abs(given - given / force * force)
+    errors = problem.to_scene(known)
+    errors[screened.which] = screened.rounding + shift
+    if screened.coupling is not None:
+        felt = screened.coupling.apply(moved)
+        errors[screened.which] += felt + screened.coupling.rounding(moved).of(felt)
+    errors *= 1 + SAFETY
+    words = np.where(indentation < -errors, np.int8(2), np.int8(0))
+    words[problem.candidates[found.touching]] = 1
+    words[problem.candidates[found.open]] = 2
+    rivals = NO_RIVALS
+    if found.box.scope != "global":
+        ceiling = lowest_ceiling(problem, found.loads.value, start.product.value)
+        rivals = Rivals.of(problem, found.loads.upper, ceiling)
+    energy = _energy_error(problem, start, found, moved)
+    energy += _screened_energy(problem, loads, indentation, errors)
     return Certificate(
-        scope=found.scope,
-        convexity_number=found.convexity_number,
+        scope="local" if rivals.possible else "global",
+        convexity_number=found.box.convexity_number,
         status=frozen(WORDS[words]),
         load_errors=frozen(load_errors),
-        gaps=frozen(np.maximum(-found.indentation, 0.0) * length),
-        gap_errors=frozen(found.errors * length),
-        approach=found.approach * length,
-        approach_error=found.approach_error * length,
-        held=found.held,
-        rival_crowding=found.rivals.crowding,
-        rival_covers=found.rivals.cover,
-        in_the_way=frozen(problem.candidates[found.obstacle.which]),
-        obstacle=found.obstacle.reason,
-        duality_gap=(found.duality_gap + _screened_energy(problem, scene_loads, found))
-        * (force * length),
+        gaps=frozen(np.maximum(-indentation, 0.0) * length),
+        gap_errors=frozen(errors * length),
+        approach=float(start.approach.value) * length,
+        approach_error=0.0 if problem.load is None else shift * (1 + SAFETY) * length,
+        duality_gap=energy * (force * length),
+        held=int(found.box.held.sum()),
+        rival_crowding=rivals.crowding,
+        rival_covers=rivals.cover,
     )
 
 
-def _screened_energy(problem: NormalProblem, scene_loads: Array, found: Judgement) -> float:
-    """Bound on what loads on screened asperities add to the energy, in own units.
+def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Array) -> float:
+    """Phi(P) - Phi(P*) <= e'|P - P*|, where the energy is convex between the two."""
+    most = np.maximum(found.box.loads, start.loads.high * (1 + SAFETY))
+    if not found.box.problem.convexity_number(most) < 1 and (most > found.box.loads).any():
+        return np.inf
+    excess = np.where(found.box.held, 0.0, start.excess)
+    total = float(excess @ moved) + float(start.missing.size * found.approach.size)
+    return total * (1 + SAFETY + len(moved) * ROUNDOFF)
+
+
+class _Screened(NamedTuple):
+    """The asperities that cannot touch."""
+
+    which: Indices  # in the scene
+    coupling: Coupling | None  # from the candidates; None if there are no others
+    indentation: Array  # D - A P
+    rounding: Array  # bound on its error
+
+
+def _screened(problem: NormalProblem, start: Trial) -> _Screened:
+    scene, length, loads = problem.scene, problem.units.length, start.loads.high
+    left = np.ones(len(scene), dtype=bool)
+    left[problem.candidates] = False
+    others = left.nonzero()[0]
+    if len(others) == 0:
+        return _Screened(others, None, np.zeros(0), np.zeros(0))
+    coupling = problem.influence.onto(scene.contact_points[others])
+    product, offsets = coupling.apply(loads), scene.offsets[others] / length
+    approach = float(start.approach.value)
+    rounding = coupling.rounding(loads).of(product) + scene.offset_errors[others] / length
+    rounding += 16 * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(approach))
+    return _Screened(others, coupling, approach + offsets - product, rounding)
+
+
+def _screened_energy(
+    problem: NormalProblem, loads: Array, indentation: Array, errors: Array
+) -> float:
+    """Bound on what loads on asperities that cannot touch add to the energy, in own units.
 
     Of loads s besides P:  sum (3/5) k s^(5/3) + (A P - D)'s + s'A s / 2,  where A P - D >= 0.
     """
-    screened = scene_loads.copy()
+    screened = loads.copy()
     screened[problem.candidates] = 0.0
     which = np.flatnonzero(screened)
     if len(which) == 0 or problem.load is not None:
         return 0.0
-    scene, s = problem.scene, scene_loads[which] / problem.units.force
+    # Numbers that own units would lose are counted as the least that they hold.
+    s = np.maximum(loads[which] / problem.units.force, checks.SMALLEST)
     coefficients = hertz.local_coefficient(
-        scene.material.contact_modulus, scene.relative_radii[which]
+        problem.scene.material.contact_modulus, problem.scene.relative_radii[which]
     )
-    coupling = couple(scene, which, problem.influence.scale, None)
+    coupling = couple(problem.scene, which, problem.influence.scale, None)
     moved = coupling.apply(s)
     moved += coupling.rounding(s).of(moved)
     local = 0.6 * hertz.indentation(s, coefficients * problem.units.local)
-    outside = found.errors[which] - found.indentation[which]
-    return float(s @ (local + outside + 0.5 * np.maximum(moved, 0.0))) * (1 + SAFETY)
+    outside = errors[which] - indentation[which]
+    energy = float(s @ (local + outside + 0.5 * np.maximum(moved, 0.0))) * (1 + SAFETY)
+    return max(energy, checks.SMALLEST)
+
+
+def _unproved(
+    problem: NormalProblem, start: Trial, indentation: Array, obstacle: Obstacle
+) -> Certificate:
+    """Nothing is proved, and it is said what is in the way."""
+    n, length = len(indentation), problem.units.length
+    return Certificate(
+        scope="none",
+        convexity_number=max(1.0, problem.convexity_number(start.loads.high)),
+        status=frozen(np.full(n, WORDS[0])),
+        load_errors=frozen(np.full(n, np.inf)),
+        gaps=frozen(np.maximum(-indentation, 0.0) * length),
+        gap_errors=frozen(np.full(n, np.inf)),
+        approach=float(start.approach.value) * length,
+        approach_error=0.0 if problem.load is None else np.inf,
+        duality_gap=np.inf,
+        in_the_way=frozen(problem.candidates[obstacle.which]),
+        obstacle=obstacle.reason,
+    )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices, frozen
+from convexrough.roundoff import SAFETY
 
 #: How far a sum may be off the prescribed total, relatively, unless `within` says so.
 TOTAL_WITHIN = 1e-6
@@ -71,7 +72,8 @@ class Claim(ABC):
         if (nearby := self.nearby()) is None:
             return self.errors_alone
         true, bounds = nearby
-        return frozen(np.minimum(self.errors_alone, np.abs(self.values - true) + bounds))
+        apart = (np.abs(self.values - true) + bounds) * (1 + SAFETY)
+        return frozen(np.minimum(self.errors_alone, apart))
 
     @property
     def holds(self) -> bool:

@@ -12,6 +12,7 @@ from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
 from convexrough.influence.coupling import Coupling
 from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
@@ -113,12 +114,22 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 def smooth_loads(scene: Scene, load: float) -> Array:
     """(n,) [force] of this total, on asperities that ride on the surface under a smooth sphere."""
-    modulus, radius = scene.material.contact_modulus, scene.sphere_radius
-    coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-    a = float(hertz.contact_radius(load, modulus, radius))
-    sunk = hertz.surface_displacement(scene.asperities.distances, a, radius)
+    coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
+    sunk = smooth_displacement(scene, scene.asperities.distances, load)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
     return np.asarray(hertz.load(indentation, coefficients))
+
+
+def smooth_displacement(scene: Scene, distances: Array, load: float) -> Array:
+    """[length] of the surface under a smooth sphere of this load, at distances from the axis.
+
+    A guess for other bases: the sphere of their mean curvature; 0 where flat, as all sinks alike.
+    """
+    if not scene.curved:
+        return np.zeros_like(distances)
+    radius = scene.mean_radius
+    a = float(hertz.contact_radius(load, scene.material.contact_modulus, radius))
+    return np.asarray(hertz.surface_displacement(distances, a, radius))
 
 
 def all_that_could_touch(
@@ -136,7 +147,7 @@ def all_that_could_touch(
     cut off: its height is at least the displacement at every asperity, so at those that are left.
     """
     axis = scene_within(0.0)
-    modulus, radius = axis.material.contact_modulus, axis.sphere_radius
+    modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))
     within = LEAST_REACH * float(hertz.contact_radius(load, modulus, radius))
     while True:
         reached = WIDER * within

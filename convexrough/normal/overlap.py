@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Influence
-from convexrough.influence.packing import NEAREST
 from convexrough.roundoff import ROUNDOFF
 
 #: Radii of shells over t that are tried, the cheapest first; wider for a pair that is nearly as
 #: close as can be, and beside wider ones. Heuristics: any radii prove what they say.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
+
+#: Neighbours looked at for each point before any others.
+NEAREST = 8
 
 #: No more pairs of shells are looked at than so many for each asperity: what memory holds.
 MOST_PAIRS = 200

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from fractions import Fraction
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +25,18 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, among_zeros, evenly, taken
 from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.shells import fitted_shells, shells
-from convexrough.normal.load_control import approach_bound, highest_approach, shifted_to_load
+from convexrough.normal.load_control import (
+    approach_bound,
+    highest_approach,
+    shifted_to_load,
+    smooth_displacement,
+)
 from convexrough.normal.units import Units
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair, in_parts, square_sum, two_sum
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
-from convexrough.twofold import Twofold, exact_sum, in_parts, square_sum, whole
 
 #: The part of the room between neighbours that fitted shells share out by size. A heuristic: any
 #: part gives shells that hold, some of them sharper bounds (docs/theory/certificate.md, "Which
@@ -38,6 +45,25 @@ FITTED = 0.9
 
 #: Candidates looked at together: what a cache holds.
 CHUNK = 2**14
+
+
+#: A change of loads, over the largest, up to which float64 gives a matrix times it to 29 digits.
+NEARBY = 1e-13
+
+#: To 66 digits.
+INVERSE_PI = Fraction("0.318309886183790671537767526745028724068919291480912897495334688118")
+
+
+class Data(NamedTuple):
+    """The numbers of a problem as balls, in own units.
+
+    coefficients : (n,) k of the local law, or (1,) where all are equal;  offsets : (n,) d
+    scale        : () 1 / (pi E*)
+    """
+
+    coefficients: Ball
+    offsets: Ball
+    scale: Ball
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +92,97 @@ class NormalProblem:
     approach: float | None
     load: float | None
     ceiling: float
+    exact_load: Ball | None = None
+    exact_approach: Ball | None = None
 
     def __len__(self) -> int:
         return len(self.candidates)
+
+    @cached_property
+    def exact(self) -> Data:
+        """The scene's data to thirty digits."""
+        scene, units = self.scene, self.units
+        modulus = scene.material.contact_modulus
+        tips = taken(scene.asperities.tip_radii, self.candidates)
+        tips = tips[:1] if tips.strides == (0,) else tips
+        if len(tips) and (tips == tips[0]).all():
+            tips = tips[:1]
+        curvature = 1.0 / Ball.exact(tips)
+        for radius, axes in scene.curved:  # the mean curvature of the base
+            curvature = curvature + len(np.arange(2)[axes]) / 2.0 / Ball.exact(radius)
+        inverse = 1.0 / Ball.exact(modulus)
+        cubed = curvature * (inverse * inverse * 0.5625)
+        for _ in range(3):  # before the root: numpy's is rounded by the sign of the exponent, too
+            cubed = cubed.scaled(units.local)
+        k = cubed.cbrt()
+        offsets = self.twofold_offsets()
+        sizes = np.abs(offsets.high) + self.offset_errors / ROUNDOFF
+        scale = (inverse * INVERSE_PI).scaled(units.force / units.length)
+        return Data(k, Ball.around(offsets, 2.0**-98 * sizes), scale)
+
+    def at_load(self, load: Ball) -> NormalProblem:
+        """The same asperities under a prescribed total load, up to that of the ceiling."""
+        return self._like(replace(self, approach=None, load=float(load.value), exact_load=load))
+
+    def at_approach(self, approach: Ball) -> NormalProblem:
+        """The same asperities at a prescribed approach, up to the ceiling."""
+        prescribed = float(approach.value)
+        return self._like(replace(self, approach=prescribed, load=None, exact_approach=approach))
+
+    def _like(self, other: NormalProblem) -> NormalProblem:
+        """Another problem of the same asperities, with what depends on these alone."""
+        for name in ("exact", "row_norm", "largest_entry"):
+            other.__dict__[name] = getattr(self, name)
+        return other
+
+    @property
+    def total(self) -> Ball:
+        """The prescribed total load: a float64 number unless it is known as a ball."""
+        assert self.load is not None
+        return Ball.exact(self.load) if self.exact_load is None else self.exact_load
+
+    @property
+    def depth(self) -> Ball:
+        """The prescribed approach: a float64 number unless it is known as a ball."""
+        assert self.approach is not None
+        return Ball.exact(self.approach) if self.exact_approach is None else self.exact_approach
+
+    def product(self, loads: Pair) -> Ball:
+        """(n,) A P to some thirty digits."""
+        return self.influence.sums(loads) * self.exact.scale
+
+    def plain_product(self, loads: Pair) -> Ball:
+        """(n,) A P of loads that are not negative, to the digits of float64."""
+        product, off = self.influence.apply(loads.high), self.influence.rounding(loads.high)
+        most = np.maximum(product, 0.0) + off.of(product)
+        errors = off.of(product) + (off.relative + 2 * ROUNDOFF) * most
+        return Ball.around(product, errors * (1 + SAFETY))
+
+    def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
+        """A P of other loads nearby: sharp where that is cheap, else from the change alone."""
+        change = others - loads
+        small = NEARBY * float(loads.high.max())
+        if self.influence.at_hand and float(np.abs(change.high).max()) > small:
+            return self.product(others)
+        moved, off = self.influence.apply(change.high), self.influence.rounding(change.high)
+        most = off.most  # of A |change|
+        if not np.isfinite(most):
+            felt = self.influence.apply(np.abs(change.high))
+            most = float((felt + off.of(felt)).max(initial=0.0))
+        error = (off.relative + 2 * ROUNDOFF) * most + off.each
+        return product + Ball.around(moved, error * (1 + SAFETY))
+
+    @cached_property
+    def row_norm(self) -> float:
+        """Bound on the largest 2-norm of a row of A."""
+        squares = self.influence.falloff(np.ones(len(self)), 2)
+        return self.influence.scale * math.sqrt(squares.max(initial=0.0)) * (1 + SAFETY)
+
+    @cached_property
+    def largest_entry(self) -> float:
+        """Bound on the largest entry of A."""
+        nearest = float(self.influence.separations().min(initial=np.inf))
+        return self.influence.scale / nearest * (1 + SAFETY) if nearest > 0 else np.inf
 
     @classmethod
     def assemble(
@@ -131,6 +245,23 @@ class NormalProblem:
             shells=taken(self.shells, which),
         )
 
+    def widened(self, which: Indices) -> NormalProblem:
+        """The problem of these asperities of the scene, among which are all candidates."""
+        scene, units = self.scene, self.units
+        coefficients = hertz.local_coefficient(
+            scene.material.contact_modulus, scene.relative_radii[which]
+        )
+        influence = couple(scene, which, self.influence.scale, self.influence.name)
+        return replace(
+            self,
+            candidates=which,
+            coefficients=coefficients * units.local,
+            offsets=scene.offsets[which] / units.length,
+            offset_errors=scene.offset_errors[which] / units.length,
+            influence=influence,
+            shells=shells(influence),
+        )
+
     def fitted_to(self, loads: Array) -> NormalProblem:
         """The same problem, with shells as large as neighbours of these loads allow."""
         with np.errstate(divide="ignore"):
@@ -173,15 +304,15 @@ class NormalProblem:
 
     def smooth_indentation(self) -> Array:
         """A start: the heights, riding on the surface that a smooth sphere would make."""
-        radius, modulus = self.scene.sphere_radius, self.scene.material.contact_modulus
-        load = self.load
+        scene, load = self.scene, self.load
         if load is None:
-            smooth = hertz.local_coefficient(modulus, radius) * self.units.local
-            alone = float(self.bounds(self.ceiling).sum())
-            load = min(float(hertz.load(self.ceiling, smooth)), alone) or alone
-        a = float(hertz.contact_radius(load * self.units.force, modulus, radius))
-        distances = self.scene.asperities.distances[self.candidates]
-        sunk = hertz.surface_displacement(distances, a, radius) / self.units.length
+            load = alone = float(self.bounds(self.ceiling).sum())
+            if scene.curved:
+                smooth = hertz.local_coefficient(scene.material.contact_modulus, scene.mean_radius)
+                load = min(float(hertz.load(self.ceiling, smooth * self.units.local)), alone)
+                load = load or alone
+        distances = scene.asperities.distances[self.candidates]
+        sunk = smooth_displacement(scene, distances, load * self.units.force) / self.units.length
         indentation: Array = self.offsets - sunk
         return shifted_to_load(indentation, self.coefficients, load)
 
@@ -198,92 +329,25 @@ class NormalProblem:
         ratio = self.shells / stiffness
         return float(ratio.max(initial=0.0)) * (1 + SAFETY)
 
-    def duality_gap(
-        self,
-        loads: Array,
-        displacement: Array,
-        approach: float,
-        box: Array,
-        error: Array | float = 0.0,
-    ) -> float:
-        """Upper bound on Phi(P) less its minimum over 0 <= P <= box, from the loads alone.
-
-        docs/theory/exact-cones-answers.md, "A dual bound that trusts no solver": with
-        M = A + diag(shells), positive semidefinite, and h_i = (3/5) k P^(5/3) - shell P^2 / 2,
-        convex on the box where its convexity number is at most 1, any P gives a dual bound:
-
-            min Phi >= -P'MP / 2 + sum min over 0 <= x <= box_i of [h_i(x) - (D - M P)_i x].
-
-        Phi(P) less that is a sum of terms that are not negative. Under load control `approach` is
-        any estimate of the multiplier, and what the loads miss the total by is counted with it.
-        Infinite where the shells do not prove the box convex. Rounding is counted, so it is never
-        quite 0.
-
-        displacement : A P, and a bound on its error beyond that of a few roundings
-        """
-        if self.convexity_number(box) > 1:
-            return np.inf
-        total = rounding = 0.0
-        error = np.broadcast_to(error, len(self))
-        for start in range(0, len(self), CHUNK):
-            some = slice(start, start + CHUNK)
-            part = loads[some], displacement[some], approach, box[some], error[some]
-            gap, lost = self._duality_terms(some, *part)
-            total, rounding = total + gap, rounding + lost
-        if self.load is not None:
-            rounding += abs(approach) * self.missing(loads)
-        return total + rounding
-
-    def _duality_terms(
-        self,
-        some: slice,
-        loads: Array,
-        displacement: Array,
-        approach: float,
-        box: Array,
-        error: Array,
-    ) -> tuple[float, float]:
-        """The sum of the terms of some candidates, and a bound on its rounding."""
-        k, shells = self.coefficients[some], self.shells[some]
-        slope = approach + self.offsets[some] - displacement - shells * loads  # (D - M P)_i
-        best = _loads_at_slope(slope, box, k, shells)
-
-        def charge(x: Array) -> Array:
-            return np.asarray(x * (0.6 * hertz.indentation(x, k) - shells * x / 2.0 - slope))
-
-        size = 0.6 * hertz.indentation(box, k) + shells * box + np.abs(slope)
-        rounding = 32 * ROUNDOFF * float(((loads + best) * size).sum())
-        # A slope off by e moves a term by e times the distance from P to the best x at most, and
-        # the best x by e over the least curvature there.
-        curvature = self.stiffness(box, some) - shells
-        moved = np.divide(error, curvature, out=np.full(len(box), np.inf), where=curvature > 0)
-        distance = np.minimum(np.abs(loads - best) + moved, np.maximum(loads, box))
-        rounding += float((error * distance).sum()) * (1 + SAFETY)
-        return float(np.maximum(charge(loads) - charge(best), 0.0).sum()), rounding
-
-    def twofold_offsets(self) -> Twofold:
-        """`offsets` from the scene's numbers, to twice as many digits: z - r^2 / (2 R)."""
+    def twofold_offsets(self) -> Pair:
+        """`offsets` from the scene's numbers, to twice as many digits: z - r^2 / (2 R), by axes."""
         return in_parts(len(self), lambda some: self._twofold_offsets(self.candidates[some]))
 
-    def _twofold_offsets(self, which: Indices) -> Twofold:
+    def _twofold_offsets(self, which: Indices) -> Pair:
         scene, length = self.scene, self.units.length
-        x, y = scene.asperities.positions[which].T / length
-        further = np.zeros(len(which))
+        points, further = scene.asperities.positions[which] / length, np.zeros(len(which))
         if scene.geometry == "closest":
             further = scene.asperities.tip_radii[which] / length
-        radius = Twofold(*exact_sum(np.full(len(which), scene.sphere_radius / length), further))
-        drops = square_sum(x, y).over(radius + radius)
-        return whole(scene.asperities.heights[which] / length) + -drops
-
-    def missing(self, loads: Array) -> float:
-        """Bound on what loads miss the prescribed total by."""
-        assert self.load is not None
-        return (abs(math.fsum(loads) - self.load) + 2 * ROUNDOFF * self.load) * (1 + SAFETY)
+        offsets = Pair.exact(scene.asperities.heights[which] / length)
+        for R, axes in scene.curved:
+            far = Pair(*two_sum(np.full(len(which), R / length), further))
+            offsets = offsets - square_sum(*points[:, axes].T) / (far + far)
+        return offsets
 
     def overhang(self, weights: Array, displacement: Array) -> float:
         """Upper bound on D0 at every solution of load control, from any trial loads.
 
-        (2) of docs/theory/certificate-rounding.md, "Prescribed load".
+        (1) of docs/theory/prescribed-load.md.
 
         weights      : (n,) trial loads, not negative, not all zero
         displacement : A times weights
@@ -302,22 +366,3 @@ def _middle(values: Array) -> float:
     """The median of about a thousand of these, spread evenly: any number of their size will do."""
     some = np.sort(values[:: max(1, len(values) // 1000)])
     return float(some[len(some) // 2])
-
-
-def _loads_at_slope(slope: Array, box: Array, coefficients: Array, shells: Array) -> Array:
-    """(n,) the x from 0 to box_i with h_i'(x) = slope_i, or the nearer end: h_i of the above.
-
-    s = (x / box)^(1/3) solves k box^(2/3) s^2 - shell box s^3 = slope: by Newton's method, from
-    a lower bound.
-    """
-    k_box, shell_box = hertz.indentation(box, coefficients), shells * box
-    target = np.minimum(np.maximum(slope, 0.0), k_box - shell_box)
-    s = np.sqrt(np.divide(target, k_box, out=np.zeros_like(target), where=k_box > 0))
-    for _ in range(60):
-        value = s * s * (k_box - shell_box * s) - target
-        rate = s * (2.0 * k_box - 3.0 * shell_box * s)
-        step = np.divide(value, rate, out=np.zeros_like(s), where=rate > 0)
-        s = np.minimum(np.maximum(s - step, 0.0), 1.0)
-        if np.abs(step).max(initial=0.0) < 1e-9:  # the next would be about its square
-            break
-    return np.asarray(box * s**3)

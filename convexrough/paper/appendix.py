@@ -24,7 +24,7 @@ from convexrough import checks, fields
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.shearing.state import ShearState, shear
+from convexrough.friction.shear import ShearState, shear
 from convexrough.sphere import mindlin
 
 

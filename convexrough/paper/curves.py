@@ -11,14 +11,14 @@ from matplotlib.patches import Rectangle
 
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
+from convexrough.friction.cycle import cycles
+from convexrough.friction.path import history
 from convexrough.plots.cycle import ring_colour
 from convexrough.plots.style import DASHED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE, ShearScale, label
-from convexrough.shearing.cycle import cycles
-from convexrough.shearing.history import history
 
 #: Amplitude Q / (f P) at which the paper reads off its Fig. 9 that the curves cross: "about".
 READ_CROSSING = 0.37
-AMPLITUDES = 401
+AMPLITUDES = 81
 
 
 def forces_figure(
@@ -32,10 +32,10 @@ def forces_figure(
     left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     firsts = {name: int(ring[0]) for name, ring in named.items()}
     starts = np.minimum(onsets[list(firsts.values())], 1.0)
-    even = 1.0 - np.linspace(1.0, 0.0, 161) ** 2  # close together at gross sliding
+    even = 1.0 - np.linspace(1.0, 0.0, 61) ** 2  # close together at gross sliding
     share = np.union1d(even, starts)
     past = history(contact, forces=np.minimum(share, 1.0) * scale.force)
-    force = 100.0 * past.forces / scale.force
+    force = 100.0 * past.asperity_forces / scale.force
     moved = past.asperity_displacements / scale.displacement
     own = moved - past.slips / scale.displacement
 
@@ -88,9 +88,9 @@ def loss_figure(contact: Contact, scale: ShearScale) -> Figure:
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     whole, zoom = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     even = np.linspace(0.0, 1.0, AMPLITUDES)
-    amplitude = np.union1d(even, 1.0 - 0.02 * even[:-1:20] ** 2)  # steep at gross sliding
+    amplitude = np.union1d(even, 1.0 - 0.02 * even[:-1:8] ** 2)  # steep at gross sliding
     steady = cycles(contact, amplitude * scale.force)
-    rough = np.array([each.energy_normalised for each in steady])
+    rough = np.array([each.loss_normalised for each in steady])
     smooth = np.array([each.smooth_normalised for each in steady])
     for axes in (whole, zoom):
         axes.plot(amplitude, rough, lw=1.3, color=ROUGH, label="asperities")

@@ -13,8 +13,8 @@ from convexrough.arrays import Array, Indices
 from convexrough.paper.example import lettered
 
 #: Amplitudes of the loss curve and forces of the asperity curves, as fractions of f P.
-AMPLITUDES = np.concatenate((np.geomspace(1e-3, 0.02, 20)[:-1], np.linspace(0.02, 1.0, 99)))
-FRACTIONS = np.linspace(0.0, 1.0, 201)
+AMPLITUDES = np.concatenate((np.geomspace(1e-3, 0.02, 6)[:-1], np.linspace(0.02, 1.0, 50)))
+FRACTIONS = np.linspace(0.0, 1.0, 51)
 
 Columns = dict[str, NDArray[Any]]
 
@@ -76,7 +76,7 @@ def _loading(contact: cr.Contact) -> dict[str, Columns]:
     limit, named = 0.5 * contact.load, lettered(contact)
     smooth = cr.smooth(contact.scene, load=contact.load)
     path = cr.history(contact, forces=FRACTIONS * limit)
-    loop = cr.cycle(contact, maximum=0.5 * limit).loop(200)
+    loop = cr.cycle(contact, maximum=0.5 * limit).loop(80)
     branch = smooth.branch(loop.forces[: len(loop.forces) // 2 + 1], 0.5 * limit)
     smooth_loop: Array = np.concatenate((branch, -branch[1:]))
     cycles = cr.cycles(contact, AMPLITUDES * limit)
@@ -84,7 +84,7 @@ def _loading(contact: cr.Contact) -> dict[str, Columns]:
         "fig7_asperities": {
             "fraction": FRACTIONS,
             "displacement": path.displacements,
-            **_of_each_ring("force", named, path.forces),
+            **_of_each_ring("force", named, path.asperity_forces),
             **_of_each_ring("displacement", named, path.asperity_displacements),
         },
         "fig8_loops": {
@@ -96,7 +96,7 @@ def _loading(contact: cr.Contact) -> dict[str, Columns]:
         },
         "fig9_energy": {
             "fraction": AMPLITUDES,
-            "loss": np.array([cycle.energy_normalised for cycle in cycles]),
+            "loss": np.array([cycle.loss_normalised for cycle in cycles]),
             "smooth_loss": np.array([cycle.smooth_normalised for cycle in cycles]),
             "balance_defect": np.array([cycle.balance_defect for cycle in cycles]),
         },

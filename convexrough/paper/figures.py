@@ -14,6 +14,9 @@ from matplotlib.patheffects import withStroke
 from convexrough import checks, fields
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
+from convexrough.friction.cycle import cycle
+from convexrough.friction.onset import onset_of_sliding
+from convexrough.friction.shear import ShearState, shear
 from convexrough.paper.curves import forces_figure, loss_figure
 from convexrough.paper.example import lettered
 from convexrough.plots.cycle import MOST_ASPERITIES, loops_figure
@@ -29,8 +32,8 @@ from convexrough.plots.style import (
     Scale,
     ShearScale,
     abscissae,
-    draw_circle,
     draw_discs,
+    draw_smooth,
     frame_map,
     label,
     legend_above,
@@ -40,8 +43,7 @@ from convexrough.plots.style import (
     towards_rim,
 )
 from convexrough.scene.rings import evenly_chosen
-from convexrough.shearing.cycle import cycle
-from convexrough.shearing.state import ShearState, onset_of_sliding, shear
+from convexrough.sphere.smooth import smooth
 
 #: Q / (f P) of the paper's Figs. 4 to 6 and 8.
 SHARE = 0.5
@@ -78,7 +80,7 @@ def paper_figures(
         "fig3_pressure": pressure_figure(contact, scale),
         "fig4_rings": _rings_figure(state, named, onsets, scale, friction),
         "fig5_traction": _traction_figure(state, centre, scale, friction),
-        "fig6_section": _section_figure(state, scale, friction),
+        "fig6_section": _section_figure(state, scale),
         "fig7_asperities": forces_figure(contact, named, onsets, friction),
         "fig8_loops": loops_figure([steady], firsts, some, "ring", friction),
         "fig9_energy": loss_figure(contact, friction),
@@ -91,7 +93,7 @@ def _rings_figure(
     contact = state.contact
     figure = Figure(figsize=(DOUBLE, 3.4), layout="constrained")
     chart, bars = figure.subplots(1, 2, width_ratios=[1.0, 0.9], gridspec_kw={"wspace": 0.06})
-    draw_state(chart, state, scale, float(friction.sphere.stick_radius(state.force)))
+    draw_state(chart, state, scale)
     frame_map(chart, 1.08 * map_edge(contact, scale))  # room for the letters
     points = contact.scene.contact_points / scale.length
     halo = [withStroke(linewidth=1.5, foreground="white")]
@@ -121,7 +123,7 @@ def _rings_figure(
     above: dict[str, Any] = {"textcoords": "offset points", "xycoords": "axes fraction"}
     bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK, **above)
     figure.legend(
-        handles=legend_handles(contact, [state]),
+        handles=legend_handles(contact, [state], scale),
         loc="outside upper center",
         ncols=4,
         fontsize=TICK,
@@ -142,7 +144,7 @@ def _traction_figure(state: ShearState, centre: int, scale: Scale, friction: She
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
     unit = _traction_unit(state, scale)
     top = _draw_tractions(chart, state, scale, unit)
-    draw_circle(chart, 1.0)
+    draw_smooth(chart, scale)
     frame_map(chart, map_edge(contact, scale))
     chart.set_anchor("E")
     label(chart, scale.length_label("x"), "$y\\,/\\,a_H$")
@@ -205,9 +207,9 @@ def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: float) ->
     return top
 
 
-def _section_figure(state: ShearState, scale: Scale, friction: ShearScale) -> Figure:
+def _section_figure(state: ShearState, scale: Scale) -> Figure:
     """f p and q along y = 0, of the asperities and of the smooth sphere."""
-    contact, sphere = state.contact, friction.sphere
+    contact, sphere = state.contact, smooth(state.contact.scene, load=state.contact.load)
     figure = Figure(figsize=(DOUBLE, 2.9), layout="constrained")
     axes = figure.subplots()
     unit = _traction_unit(state, scale)

@@ -13,13 +13,14 @@ from convexrough.arrays import Array
 from convexrough.compare import Comparison
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.friction.curve import MemoryCurve
+from convexrough.friction.cycle import Cycle
+from convexrough.friction.path import History, LoadPath
+from convexrough.friction.phases import PhaseLosses
+from convexrough.friction.shear import ShearState
+from convexrough.friction.side_by_side import PathComparison
 from convexrough.gradients.gradient import Gradient
-from convexrough.paths.memory import MemoryCurve
-from convexrough.paths.path import LoadPath
-from convexrough.paths.phases import PhaseLosses
-from convexrough.paths.shakedown import Shakedown
-from convexrough.paths.side_by_side import PathComparison
-from convexrough.paths.steady import Steady
+from convexrough.melan.shakedown import Shakedown
 from convexrough.plots.closed_path import draw_losses
 from convexrough.plots.cycle import few_ticks, smooth_loop
 from convexrough.plots.gradient import draw_gradient
@@ -44,9 +45,6 @@ from convexrough.plots.style import (
 )
 from convexrough.plots.surface import draw_provability, draw_summits, draw_surface
 from convexrough.plots.verdict import draw_claim
-from convexrough.shearing.cycle import Cycle
-from convexrough.shearing.history import History
-from convexrough.shearing.state import ShearState
 from convexrough.surface.provability import Provability
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
@@ -60,10 +58,11 @@ def plot(
     """Draw the main picture of a result, and return the axes it is in.
 
     result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
-        Cycle: its loop, History: its path, Q against X; Gradient: map of who matters; Verdict:
-        map of who is not as claimed; Comparison: what each solver took; LoadPath, MemoryCurve,
-        Steady: the plane of loads; PhaseLosses: loss against phase; Shakedown: map of the factors;
-        PathComparison: what each way took; Surface, Summits: map; Provability: contacts by pruning
+        Cycle: its loop, or the plane of loads where P varies; History: its path, Q against X;
+        Gradient: map of who matters; Verdict: map of who is not as claimed; Comparison: what each
+        solver took; LoadPath, MemoryCurve: the plane of loads; PhaseLosses: loss against phase;
+        Shakedown: map of the factors; PathComparison: what each way took; Surface, Summits: map;
+        Provability: contacts by pruning
     axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
     length_unit, force_unit : only said, never converted
 
@@ -89,8 +88,8 @@ def _(contact: Contact, axes: Axes, length_unit: str, force_unit: str) -> None:
         return say_no_contact(axes)
     scale = Scale.of(contact, length_unit, force_unit)
     colours, _ = draw_pressure(axes, contact, scale)
-    label(axes, scale.length_label("x"), "$y\\,/\\,a_H$")
-    return draw_pressure_bar(axes, contact, colours)
+    label(axes, scale.length_label("x"), scale.short("y"))
+    return draw_pressure_bar(axes, contact, colours, scale)
 
 
 @_draw.register(ShearState)
@@ -100,11 +99,10 @@ def _(state: State, axes: Axes, length_unit: str, force_unit: str) -> None:
         return say_no_contact(axes)
     scale = Scale.of(state.contact, length_unit, force_unit)
     friction = ShearScale.of(state.contact, length_unit, force_unit)
-    size = float(np.linalg.norm(state.force))
-    draw_state(axes, state, scale, float(friction.sphere.stick_radius(min(size, friction.force))))
+    draw_state(axes, state, scale)
     axes.set_title(state_title(state, friction, narrow=False), fontsize=TICK)
-    label(axes, scale.length_label("x"), "$y\\,/\\,a_H$")
-    handles = legend_handles(state.contact, [state])
+    label(axes, scale.length_label("x"), scale.short("y"))
+    handles = legend_handles(state.contact, [state], scale)
     axes.legend(handles=handles, fontsize=TICK - 2, ncols=2, frameon=False,
                 loc="upper center", bbox_to_anchor=(0.5, -0.2))  # fmt: skip
     return None
@@ -114,12 +112,14 @@ def _(state: State, axes: Axes, length_unit: str, force_unit: str) -> None:
 def _(cycle: Cycle, axes: Axes, length_unit: str, force_unit: str) -> None:
     if not cycle.contact.loads.any():
         return say_no_contact(axes)
+    if np.ptp(cycle.loads) > 0:
+        return draw_closed(axes, cycle, force_unit)
     scale = ShearScale.of(cycle.contact, length_unit, force_unit)
     loop = cycle.loop(asperities=[])
-    smooth = smooth_loop(scale.sphere, loop.forces)
     _against(axes, scale, loop.displacements, loop.forces, color=ROUGH, label="asperities")
-    look = {"color": SMOOTH, "ls": DASHED, "label": "smooth sphere"}
-    _against(axes, scale, smooth, loop.forces, **look)
+    if scale.sphere is not None:
+        look = {"color": SMOOTH, "ls": DASHED, "label": scale.name}
+        _against(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, **look)
     axes.legend(fontsize=TICK, frameon=False, loc="upper left")
     return None
 
@@ -170,11 +170,6 @@ def _(path: LoadPath, axes: Axes, length_unit: str, force_unit: str) -> None:
 @_draw.register
 def _(curve: MemoryCurve, axes: Axes, length_unit: str, force_unit: str) -> None:
     draw_curve(axes, curve, force_unit)
-
-
-@_draw.register
-def _(closed: Steady, axes: Axes, length_unit: str, force_unit: str) -> None:
-    draw_closed(axes, closed, force_unit)
 
 
 @_draw.register

@@ -6,9 +6,8 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 
-from convexrough.contact import press
-from convexrough.paths.phases import PhaseLosses
-from convexrough.paths.steady import Steady
+from convexrough.friction.cycle import Cycle
+from convexrough.friction.phases import PhaseLosses
 from convexrough.plots.load_plane import PATTERNS, draw_closed
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import COLOURS, DOUBLE, SINGLE, SMOOTH, TICK, label, quantity
@@ -17,7 +16,7 @@ from convexrough.plots.words import draw_words, word_handles
 MOST_FACTORS = 5
 
 
-def steady_figures(found: Steady, *, length_unit: str = "", force_unit: str = "") -> Figures:
+def steady_figures(found: Cycle, *, length_unit: str = "", force_unit: str = "") -> Figures:
     """The figure of a closed path.
 
     "steady" : the path in the load plane, with the two lines that keep the point (L*, T*) for ever;
@@ -26,13 +25,12 @@ def steady_figures(found: Steady, *, length_unit: str = "", force_unit: str = ""
     figure = Figure(figsize=(DOUBLE, 3.3), layout="constrained")
     plane, place = figure.subplots(1, 2)
     draw_closed(plane, found, force_unit)
-    contact = press(found.scene, load=float(found.loads.max()), influence=found.influence)
-    draw_words(place, found.scene, contact.contact_radii, found.status)
+    draw_words(place, found.scene, found.contact.contact_radii, found.status)
     if handles := word_handles(np.unique(found.status)):
         place.legend(handles=handles, fontsize=TICK, frameon=False, loc="upper left",
                      bbox_to_anchor=(1.0, 1.0))  # fmt: skip
     label(place, f"$x$ {length_unit}".strip(), f"$y$ {length_unit}".strip())
-    lost = quantity(found.energy, f"{force_unit} {length_unit}".strip())
+    lost = quantity(found.loss, f"{force_unit} {length_unit}".strip())
     place.set_title(f"every later cycle loses {lost}", fontsize=TICK, loc="left")
     return Figures({"steady": figure})
 
@@ -52,13 +50,13 @@ def draw_losses(axes: Axes, found: PhaseLosses, length_unit: str, force_unit: st
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     shades = matplotlib.colormaps[COLOURS](np.linspace(0.3, 1.0, len(sizes)))
     cubes = np.abs(found.factors) ** 3
-    unit = float((found.energy / cubes).max()) or 1.0
+    unit = float((found.losses / cubes).max()) or 1.0
     for size, shade, pattern in zip(sizes, shades, (*PATTERNS, "-"), strict=False):
         those = found.factors == size
         order = np.argsort(found.phases[those])
         turns = np.degrees(found.phases[those][order])
         rough, smooth = (
-            (each / cubes)[those][order] / unit for each in (found.energy, found.smooth)
+            (each / cubes)[those][order] / unit for each in (found.losses, found.smooth)
         )
         axes.plot(turns, rough, color=shade, lw=1.5, ls=pattern, label=f"{size:g}")
         axes.plot(turns, smooth, color=SMOOTH, lw=0.7, ls=pattern)

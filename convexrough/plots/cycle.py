@@ -14,6 +14,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from convexrough.arrays import Array
+from convexrough.friction.cycle import Cycle, Loop
+from convexrough.friction.cycle import loops as steady_loops
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     DASHED,
@@ -22,15 +24,14 @@ from convexrough.plots.style import (
     ROUGH,
     SMOOTH,
     TICK,
+    Scale,
     ShearScale,
     label,
     no_contact_figure,
     round_ticks,
+    say_nothing,
 )
 from convexrough.scene.rings import one_of_each_ring
-from convexrough.shearing.cycle import Cycle
-from convexrough.shearing.cycle import loops as steady_loops
-from convexrough.shearing.loop import Loop
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
 
@@ -68,6 +69,7 @@ def cycle_figures(
         if several:
             figures["loss"] = no_contact_figure(("amplitude of $Q$", "$W$"))
         return figures
+    lengths = Scale.of(contact, length_unit, force_unit)
     scale = ShearScale.of(contact, length_unit, force_unit)
     by_range = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
     distances = np.hypot(*contact.scene.contact_points.T)
@@ -75,11 +77,12 @@ def cycle_figures(
         known = np.arange(len(distances)) if loops is None else loops[0].asperities
         asperities = one_of_each_ring(distances[known], contact.loads[known], MOST_ASPERITIES)
         asperities = known[asperities].tolist()
-    names = [f"{r:.2f}" for r in distances[list(asperities)] / scale.sphere.contact_radius]
+    names = [f"{r:.2f}" for r in distances[list(asperities)] / lengths.length]
     shown = _spread([cycles[i].force_amplitude for i in by_range])
     some = [cycles[by_range[i]] for i in shown]
     theirs = None if loops is None else [loops[by_range[i]] for i in shown]
-    figure = loops_figure(some, asperities, names, "$r\\,/\\,a_H$", scale, theirs, len(cycles))
+    meaning = lengths.short("r")
+    figure = loops_figure(some, asperities, names, meaning, scale, theirs, len(cycles))
     figures = Figures({"hysteresis": figure})
     if several:
         figures["loss"] = _loss_figure([cycles[i] for i in by_range], scale)
@@ -117,14 +120,16 @@ def loops_figure(
     whole, upright, single = figure.subplots(1, 3, width_ratios=[1, 1, 1.1])
     for cycle, loop in zip(cycles, loops, strict=True):
         forces = _around(cycle, POINTS)
-        smooth = smooth_loop(scale.sphere, forces) / scale.displacement
         rough = loop.displacements / scale.displacement
         up, smooth_up = loop.forces / scale.force, forces / scale.force
         for axes, elastic in ((whole, 0.0), (upright, 2.0 / 3.0)):
             look: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "label": "asperities"}
             axes.plot(rough - elastic * up, up, **look)
-            look = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": "smooth sphere"}
-            axes.plot(smooth - elastic * smooth_up, smooth_up, **look)
+            if scale.sphere is not None:
+                smooth = smooth_loop(scale.sphere, forces) / scale.displacement
+                look = {"color": SMOOTH, "lw": 1.0, "ls": DASHED}
+                look["label"] = scale.name
+                axes.plot(smooth - elastic * smooth_up, smooth_up, **look)
         _name(upright, rough[0] - 2.0 / 3.0 * up[0], up[0], _range(cycle, scale))
     label(whole, "$X\\,/\\,X_0$", "$Q\\,/\\,(fP)$")
     label(upright, r"$X\,/\,X_0 - \frac{2}{3}\,Q\,/\,(fP)$", "")
@@ -224,9 +229,9 @@ def ring_colour(order: int, count: int) -> Any:
 
 
 def _legend(figure: MatplotlibFigure, axes: Axes) -> None:
-    """Above all panels, the first two lines of one."""
+    """Above all panels, the lines of one, each name once."""
     figure.legend(
-        handles=axes.lines[:2],
+        handles=list({line.get_label(): line for line in reversed(axes.lines)}.values())[::-1],
         loc="outside upper left",
         ncols=2,
         fontsize=TICK,
@@ -249,7 +254,7 @@ def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
     loss, ratio = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     some = [each for each in cycles if each.maximum > each.minimum]
     amplitude = np.array([each.force_amplitude for each in some]) / scale.force
-    rough = np.array([each.energy_normalised for each in some])
+    rough = np.array([each.loss for each in some]) / scale.energy
     smooth = np.array([each.smooth_normalised for each in some])
     marks: dict[str, Any] = {
         "color": ROUGH,
@@ -261,7 +266,8 @@ def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
     marks |= {"marker": "o", "ls": ""} if len(some) < 100 else {"ls": "-"}
 
     t = np.geomspace(min(0.7 * amplitude[0], 0.3), 1.0, 300)
-    loss.plot(t, mindlin.loss(t), ls=DASHED, lw=1.1, color=SMOOTH, label="smooth sphere")
+    if scale.sphere is not None:
+        loss.plot(t, mindlin.loss(t), ls=DASHED, lw=1.1, color=SMOOTH, label=scale.name)
     loss.plot(amplitude, rough, label="asperities", **marks)
     loss.set(xscale="log", yscale="log", xlim=(t[0], 1.0))
     few_ticks(loss.xaxis)
@@ -270,11 +276,14 @@ def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
     loss.legend(loc="upper left", fontsize=TICK, frameon=False)
     loss.set_title("energy lost per cycle", fontsize=TICK, loc="left")
 
+    if scale.sphere is None:
+        say_nothing(ratio, "no smooth reference")
+        return figure
     ratio.axhline(1.0, ls=DASHED, lw=1.1, color=SMOOTH)
     ratio.plot(amplitude, rough / smooth, **marks)
     ratio.set(xlim=(0.0, 1.0))
     label(ratio, "amplitude of $Q\\,/\\,(fP)$", "$W\\,/\\,W_\\mathrm{smooth}$")
-    ratio.set_title("the same, over the smooth sphere's", fontsize=TICK, loc="left")
+    ratio.set_title(f"the same, over the {scale.name}'s", fontsize=TICK, loc="left")
     return figure
 
 

@@ -16,10 +16,10 @@ from convexrough.plots.style import (
     SMOOTH,
     TICK,
     Scale,
-    draw_circle,
     draw_discs,
     draw_mosaic,
     draw_open,
+    draw_smooth,
     frame_map,
     label,
     map_edge,
@@ -63,9 +63,9 @@ def draw_gradient(axes: Axes, gradient: Gradient, scale: Scale, of: str = "J") -
         draw_discs(axes, points[touching], radii, "contact discs", linewidths=0.3, **look)
     else:
         draw_mosaic(axes, points, colours.to_rgba(parts), touching, edge, 500)
-    draw_circle(axes, 1.0)
+    draw_smooth(axes, scale)
     frame_map(axes, edge)
-    label(axes, scale.length_label("x"), "$y\\,/\\,a_H$")
+    label(axes, scale.length_label("x"), scale.short("y"))
     axes.set_title(f"{gradient.holding} held", fontsize=TICK, loc="left")
     bar = axes.figure.colorbar(colours, ax=axes, aspect=28, pad=0.02)
     bar.ax.tick_params(labelsize=TICK)

@@ -14,6 +14,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from convexrough.arrays import Array
+from convexrough.friction.path import History, history
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     DOUBLE,
@@ -23,9 +24,8 @@ from convexrough.plots.style import (
     label,
     no_contact_figure,
 )
-from convexrough.shearing.history import History, history
 
-MOST_POINTS, MOST_NUMBERS, MOST_DOTS = 2000, 12, 60
+MOST_POINTS, MOST_NUMBERS, MOST_DOTS = 500, 12, 60
 
 
 def history_figures(past: History, *, length_unit: str = "", force_unit: str = "") -> Figures:
@@ -40,7 +40,7 @@ def history_figures(past: History, *, length_unit: str = "", force_unit: str = "
     scale = ShearScale.of(contact, length_unit, force_unit)
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     path, cost = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
-    steps = len(past.applied)
+    steps = len(past.forces)
     at, x, q, w = between_steps(past)
     x, q, w = x / scale.displacement, q / scale.force, w / scale.energy
     colours = ScalarMappable(Normalize(0.0, max(1, steps)), _darkening())
@@ -48,7 +48,8 @@ def history_figures(past: History, *, length_unit: str = "", force_unit: str = "
         _draw_path(axes, at, across, up, colours)
     label(path, scale.displacement_label(), f"$Q\\,/\\,(fP)$  ({scale.limit()})")
     label(cost, "step", scale.energy_label())
-    path.set_title("$X_0$: smooth sphere, gross sliding", fontsize=TICK, loc="left")
+    whose = scale.name if scale.sphere else "this contact"
+    path.set_title(f"$X_0$: {whose}, gross sliding", fontsize=TICK, loc="left")
     cost.set_title("energy lost since the beginning", fontsize=TICK, loc="left")
     path.margins(0.12)
     cost.xaxis.set_major_locator(MaxNLocator(8, integer=True))
@@ -81,10 +82,10 @@ def between_steps(past: History) -> tuple[Array, Array, Array, Array]:
 
     Fewer points where many asperities touch: each takes time.
     """
-    stops = np.concatenate(([0.0], past.applied))
-    steps = len(past.applied)
-    affordable = min(MOST_POINTS, 80_000 // int(np.count_nonzero(past.contact.loads)))
-    each = int(np.clip(affordable // max(1, steps), 1, 80))
+    stops = np.concatenate(([0.0], past.forces))
+    steps = len(past.forces)
+    affordable = min(MOST_POINTS, 8_000 // int(np.count_nonzero(past.contact.loads)))
+    each = int(np.clip(affordable // max(1, steps), 1, 40))
     at = np.arange(steps * each + 1) / each
     if each > 1:
         whole = np.floor(at[:-1]).astype(int)
@@ -92,7 +93,7 @@ def between_steps(past: History) -> tuple[Array, Array, Array, Array]:
         q = np.append(stops[whole] * (1 - part) + stops[whole + 1] * part, stops[-1])
         past = history(past.contact, forces=q[1:])
         at = np.append(whole + part, float(steps))
-    x, q, w = (np.append(0.0, field) for field in (past.displacements, past.applied, past.energy))
+    x, q, w = (np.append(0.0, field) for field in (past.displacements, past.forces, past.losses))
     return at, x, q, w
 
 

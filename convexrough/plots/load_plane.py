@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from convexrough.arrays import Array
-from convexrough.paths.memory import MemoryCurve
-from convexrough.paths.path import LoadPath
-from convexrough.paths.steady import Steady
+from convexrough.friction.curve import MemoryCurve
+from convexrough.friction.cycle import Cycle
+from convexrough.friction.path import LoadPath
 from convexrough.plots.style import (
     COLOURS,
     DASHED,
@@ -32,7 +32,7 @@ PATTERNS = ("-", (0, (5, 1.5)), (0, (3, 1.2, 1, 1.2)), (0, (1, 1)))
 def draw_path(axes: Axes, path: LoadPath, force_unit: str) -> None:
     """The path, and the memory curve at some of its points."""
     f, unit = path.scene.friction or 1.0, float(path.loads.max()) or 1.0
-    P, T = path.loads / unit, path.applied / (f * unit)
+    P, T = path.loads / unit, path.forces / (f * unit)
     _friction_cone(axes, float(P.max()))
     axes.plot(np.append(0.0, P), np.append(0.0, T), color=FAINT, lw=0.9)
     chosen = evenly_chosen(range(len(P)), MOST_CURVES)
@@ -64,10 +64,10 @@ def draw_curve(axes: Axes, curve: MemoryCurve, force_unit: str) -> None:
     _name(axes, unit, force_unit)
 
 
-def draw_closed(axes: Axes, found: Steady, force_unit: str) -> None:
+def draw_closed(axes: Axes, found: Cycle, force_unit: str) -> None:
     """A closed path, and the two lines that keep the point (L*, T*) for ever."""
     f, unit = found.scene.friction or 1.0, float(found.loads.max()) or 1.0
-    P, T = (np.append(each, each[0]) for each in (found.loads / unit, found.applied / (f * unit)))
+    P, T = (np.append(each, each[0]) for each in (found.loads / unit, found.forces / (f * unit)))
     level, height = found.level / unit, found.force_level / (f * unit)
     ends = np.array([level, P.max()])
     for sign in (1.0, -1.0):

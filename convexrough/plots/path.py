@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from convexrough.paths.path import LoadPath, load_path
+from convexrough.friction.path import LoadPath, load_path
 from convexrough.plots.load_plane import dots, draw_path, number
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import DOUBLE, ROUGH, TICK, label, quantity
@@ -33,9 +33,9 @@ def path_figures(path: LoadPath, *, length_unit: str = "", force_unit: str = "")
     fine = between_points(path)
     travel = float(np.abs(fine.displacements).max()) or 1.0
     f = path.scene.friction or 1.0
-    x, q = fine.displacements / travel, fine.applied / (f * unit)
+    x, q = fine.displacements / travel, fine.forces / (f * unit)
     loop.plot(np.append(0.0, x), np.append(0.0, q), color=ROUGH, lw=1.2)
-    x, q = path.displacements / travel, path.applied / (f * unit)
+    x, q = path.displacements / travel, path.forces / (f * unit)
     dots(loop, x, q)
     number(loop, x, q)
     loop.margins(0.12)
@@ -44,10 +44,10 @@ def path_figures(path: LoadPath, *, length_unit: str = "", force_unit: str = "")
         f"$X$ / {quantity(travel, length_unit)}",
         f"$Q\\,/\\,f$ / {quantity(unit, force_unit)}",
     )
-    work = float(path.energy.max()) or 1.0
-    steps = np.linspace(0.0, len(path.loads), len(fine.energy) + 1)
-    cost.plot(steps, np.append(0.0, fine.energy) / work, color=ROUGH, lw=1.2)
-    dots(cost, np.arange(1.0, len(path.loads) + 1), path.energy / work)
+    work = float(path.losses.max()) or 1.0
+    steps = np.linspace(0.0, len(path.loads), len(fine.losses) + 1)
+    cost.plot(steps, np.append(0.0, fine.losses) / work, color=ROUGH, lw=1.2)
+    dots(cost, np.arange(1.0, len(path.loads) + 1), path.losses / work)
     name = f"{force_unit} {length_unit}".strip()
     label(cost, "point", f"energy lost / {quantity(work, name)}")
     cost.set_ylim(bottom=0.0)
@@ -56,10 +56,10 @@ def path_figures(path: LoadPath, *, length_unit: str = "", force_unit: str = "")
 
 def between_points(path: LoadPath) -> LoadPath:
     """The same path with points in between, where that is affordable; loops are curved."""
-    m, n = path.forces.shape
+    m, n = path.asperity_forces.shape
     if n > MOST_BETWEEN or m > MOST_SEGMENTS or path.order == "fails":
         return path
-    corners = np.vstack(([0.0, 0.0], np.column_stack((path.loads, path.applied))))
+    corners = np.vstack(([0.0, 0.0], np.column_stack((path.loads, path.forces))))
     parts = (np.arange(1, BETWEEN + 1) / BETWEEN)[:, None]
     pieces = [a + parts * (b - a) for a, b in pairwise(corners)]
     P, Q = np.concatenate(pieces).T
@@ -75,10 +75,10 @@ def _maps(path: LoadPath) -> Figure:
     places = figure.subplots(rows, columns, squeeze=False)
     modulus = path.scene.material.contact_modulus
     for axes, k in zip(places.ravel(), chosen, strict=False):
-        radii = hertz.contact_radius(path.normal_loads[k], modulus, path.scene.relative_radii)
+        radii = hertz.contact_radius(path.asperity_loads[k], modulus, path.scene.relative_radii)
         draw_words(axes, path.scene, radii, path.status[k])
         slide = int((path.status[k] == "sliding").sum())
-        touch = int((path.normal_loads[k] > 0).sum())
+        touch = int((path.asperity_loads[k] > 0).sum())
         axes.set_title(f"{k + 1}: {slide:,} of {touch:,} slide", fontsize=TICK)
         axes.tick_params(labelbottom=False, labelleft=False)
     for axes in places.ravel()[len(chosen) :]:

@@ -23,11 +23,11 @@ from convexrough.plots.style import (
     Scale,
     abscissae,
     census,
-    draw_circle,
     draw_density,
     draw_discs,
     draw_mosaic,
     draw_open,
+    draw_smooth,
     frame_map,
     label,
     legend_above,
@@ -35,6 +35,7 @@ from convexrough.plots.style import (
     map_edge,
     round_ticks,
     say_no_contact,
+    smooth_name,
     towards_rim,
 )
 from convexrough.sphere import hertz
@@ -67,8 +68,8 @@ def pressure_figure(contact: Contact, scale: Scale) -> Figure:
     colours, edge = draw_pressure(chart, contact, scale)
     top = colours.get_clim()[1] or 1.0
     chart.set_anchor("E")
-    label(chart, "$x\\,/\\,a_H$", "$y\\,/\\,a_H$")
-    draw_pressure_bar(chart, contact, colours)
+    label(chart, scale.short("x"), scale.short("y"))
+    draw_pressure_bar(chart, contact, colours, scale)
     _draw_profile(profile, contact, scale, edge)
     profile.set(xlim=(-edge, edge), ylim=(0.0, 1.04 * top))
     label(profile, scale.length_label("x"), scale.pressure_label())
@@ -91,18 +92,18 @@ def draw_pressure(axes: Axes, contact: Contact, scale: Scale) -> tuple[ScalarMap
         _draw_peaks(axes, points[touching], radii, peaks[touching], colours)
     else:
         draw_mosaic(axes, points, colours.to_rgba(peaks), touching, edge, 500)
-    draw_circle(axes, 1.0)
+    draw_smooth(axes, scale)
     frame_map(axes, edge)
     axes.set_title(census(contact), fontsize=TICK, loc="left")
     return colours, edge
 
 
-def draw_pressure_bar(axes: Axes, contact: Contact, colours: ScalarMappable) -> None:
+def draw_pressure_bar(axes: Axes, contact: Contact, colours: ScalarMappable, scale: Scale) -> None:
     """Beside a map of the pressure, what its colours mean."""
     bar = axes.figure.colorbar(colours, ax=axes, aspect=28, pad=0.02)
     bar.ax.tick_params(labelsize=TICK)
     peak = "" if np.count_nonzero(contact.loads) < CROWDED else "peak "
-    bar.ax.set_title(peak + "$p\\,/\\,p_0$", fontsize=TICK)
+    bar.ax.set_title(peak + scale.short_pressure(), fontsize=TICK)
 
 
 def _draw_peaks(
@@ -143,8 +144,10 @@ def _draw_profile(axes: Axes, contact: Contact, scale: Scale, edge: float) -> No
         peaks = fields.peak_pressures(contact)[near] / scale.pressure
         word = f"peaks, $|y|<{STRIP:g}\\,a_H$"
         draw_density(axes, points[near, 0], peaks, float(peaks.max()), ROUGH, word)
-    s = towards_rim()
-    axes.plot(s, hertz.pressure(s, 1.0, 1.0), "--", lw=1.3, color=SMOOTH, label="smooth sphere")
+    if scale.smooth is not None:
+        s = towards_rim()
+        x, p = scale.smooth[0] * s, hertz.pressure(s, 1.0, 1.0)
+        axes.plot(x, p, "--", lw=1.3, color=SMOOTH, label=smooth_name(contact))
     legend_above(axes, ncols=3 if np.count_nonzero(touching) < CROWDED else 2)
 
 
@@ -194,8 +197,10 @@ def _draw_smooth_share(axes: Axes, contact: Contact, scale: Scale) -> None:
     """Percentage of the load that the smooth sphere's pressure lays on the cell of an asperity.
 
     100 p(r) A / P, with p0 = 3 P / (2 pi a_H^2) and A the median cell of the touching asperities;
-    left out where fewer than seven of these have a whole cell.
+    left out where fewer than seven of these have a whole cell, and where the base is no sphere.
     """
+    if scale.smooth != (1.0, 1.0):
+        return
     points = contact.scene.contact_points
     sample = np.argsort(np.hypot(*points.T))[:5000]  # of very many, those nearest to the axis
     areas = fields.cell_areas(points[sample])

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
 from convexrough.arrays import Array
-from convexrough.paths.shakedown import Shakedown
+from convexrough.melan.shakedown import Shakedown
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     COLOURS,

@@ -11,8 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact
+from convexrough.friction.shear import ShearState
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     CROWDED,
@@ -27,19 +29,19 @@ from convexrough.plots.style import (
     Scale,
     ShearScale,
     doubt,
-    draw_circle,
     draw_discs,
     draw_mosaic,
     draw_open,
+    draw_smooth,
     frame_map,
     literal,
     map_edge,
     no_contact_figure,
     quantity,
     round_ticks,
+    smooth_name,
 )
 from convexrough.scene.rings import evenly_chosen
-from convexrough.shearing.state import ShearState
 from convexrough.vector_shear.state import VectorShearState
 
 State: TypeAlias = ShearState | VectorShearState
@@ -78,7 +80,7 @@ def shear_figures(
     figure = Figure(figsize=(width, height), layout="constrained")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, state in zip(panels, shown, strict=False):
-        draw_state(axes, state, scale, float(friction.sphere.stick_radius(state.force)))
+        draw_state(axes, state, scale)
         axes.set_title(state_title(state, friction, narrow=columns == 4), fontsize=TICK)
         if columns == 4:
             axes.xaxis.set_major_locator(round_ticks(4))
@@ -88,9 +90,9 @@ def shear_figures(
         axes.tick_params(labelbottom=True)
     words = f"{scale.length_label('x')[:-1]},  $fP$ = {quantity(friction.force, force_unit)})"
     figure.supxlabel(words, fontsize=LABEL)
-    figure.supylabel("$y\\,/\\,a_H$", fontsize=LABEL)
+    figure.supylabel(scale.short("y"), fontsize=LABEL)
     figure.legend(
-        handles=legend_handles(contact, shown),
+        handles=legend_handles(contact, shown, scale),
         loc="outside upper center",
         ncols=2 if columns == 1 else 4,
         fontsize=TICK,
@@ -101,18 +103,18 @@ def shear_figures(
     return Figures({"stick_slip": figure})
 
 
-def draw_state(axes: Axes, state: State, scale: Scale, stick_radius: float) -> None:
-    """Contact discs, stick discs, open dots.
-
-    stick_radius : of the smooth sphere, for comparison [length]
-    """
+def draw_state(axes: Axes, state: State, scale: Scale) -> None:
+    """Contact discs, stick discs, open dots; and those of the smooth sphere, for comparison."""
     contact = state.contact
+    limit = checks.friction(contact.scene.friction) * contact.load
+    share = float(np.linalg.norm(state.force)) / limit
+    stick = float(np.cbrt(max(1.0 - share, 0.0)))  # over the contact
     points = contact.scene.contact_points / scale.length
     touching = contact.loads > 0
     edge = map_edge(contact, scale)
-    draw_circle(axes, 1.0)
-    if 0 < stick_radius < scale.length:
-        draw_circle(axes, stick_radius / scale.length, DOTTED)
+    draw_smooth(axes, scale)
+    if 0 < stick < 1:
+        draw_smooth(axes, scale, stick, DOTTED)
     if int(touching.sum()) >= CROWDED:
         draw_mosaic(axes, points, _mean_shades(state), touching, edge, 320)
     else:
@@ -157,7 +159,7 @@ def _draw_words(axes: Axes, state: State, points: Array, scale: Scale) -> None:
             draw_discs(axes, points[chosen], across[chosen] / scale.length, word, **look)
 
 
-def legend_handles(contact: Contact, states: Sequence[State]) -> list[Artist]:
+def legend_handles(contact: Contact, states: Sequence[State], scale: Scale) -> list[Artist]:
     """What each look means, of those that occur."""
     words = {word for state in states for word in np.unique(state.status[contact.loads > 0])}
     entries = [
@@ -174,10 +176,12 @@ def legend_handles(contact: Contact, states: Sequence[State]) -> list[Artist]:
         handles.append(Line2D([], [], ls="", marker="x", ms=4, color=SMOOTH, label="undecided"))
     if (contact.loads == 0).any() and np.count_nonzero(contact.loads) < CROWDED:
         handles.append(Line2D([], [], ls="", marker="o", ms=2, mew=0, color=FAINT, label="open"))
+    if scale.smooth is None:
+        return handles
     line: dict[str, Any] = {"lw": 0.9, "color": SMOOTH}
-    handles.append(Line2D([], [], ls=DASHED, label="smooth sphere: contact", **line))
+    handles.append(Line2D([], [], ls=DASHED, label=f"{smooth_name(contact)}: contact", **line))
     if any(np.any(state.force != 0) for state in states):
-        handles.append(Line2D([], [], ls=DOTTED, label="smooth sphere: stick", **line))
+        handles.append(Line2D([], [], ls=DOTTED, label=f"{smooth_name(contact)}: stick", **line))
     return handles
 
 

@@ -1,7 +1,9 @@
 """The shared look of the figures: sizes, colours, scales, labels, and maps of contact discs.
 
 Lengths are in a_H and pressures in p0, contact radius and peak pressure of the smooth sphere under
-the same load. Shear forces are in f P, displacements in X0 and energies in W0 (`ShearScale`).
+the same load. Shear forces are in f P, displacements in X0 and energies in W0 (`ShearScale`). Where
+the base has no smooth reference, lengths are in r_c, how far contact reaches from the axis, and
+pressures in the mean one over the circle of that radius.
 """
 
 from __future__ import annotations
@@ -13,15 +15,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
-from matplotlib.patches import Circle
+from matplotlib.patches import Ellipse
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.plots.notebook import Figure
-from convexrough.sphere import hertz
-from convexrough.sphere.smooth import SmoothSphere, smooth
+from convexrough.sphere import mindlin
+from convexrough.sphere.smooth import SmoothEllipsoid, SmoothSphere, smooth_reference
 
 LABEL, TICK = 9, 8  # points
 SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal
@@ -37,55 +40,90 @@ DENSE, CROWDED = 200, 3000
 
 @dataclass(frozen=True)
 class Scale:
-    """What lengths and pressures are divided by, and how the labels say so."""
+    """What lengths and pressures are divided by, and how the labels say so.
+
+    smooth : semi-axes of the smooth contact, in a_H; None where there is none
+    """
 
     length: float  # a_H
     pressure: float  # p0
     length_unit: str
     pressure_unit: str
+    smooth: tuple[float, float] | None = (1.0, 1.0)
 
     @classmethod
     def of(cls, contact: Contact, length_unit: str, force_unit: str) -> Scale:
-        modulus, radius = contact.scene.material.contact_modulus, contact.scene.sphere_radius
-        a_H = float(hertz.contact_radius(contact.load, modulus, radius))
-        p0 = float(hertz.peak_pressure(a_H, modulus, radius))
         pressure_unit = f"{force_unit}/{length_unit}²" if force_unit and length_unit else ""
-        return cls(a_H, p0, length_unit, pressure_unit)
+        sphere = smooth_reference(contact.scene, contact.load) if contact.load else None
+        if sphere is None:
+            touching = contact.loads > 0
+            rims = np.hypot(*contact.scene.contact_points.T) + contact.contact_radii
+            r_c = float(rims[touching].max(initial=0.0))
+            mean = contact.load / (np.pi * r_c**2) if r_c > 0 else 0.0
+            return cls(r_c, mean, length_unit, pressure_unit, None)
+        a_H, axes = sphere.contact_radius, (1.0, 1.0)
+        if isinstance(sphere, SmoothEllipsoid):
+            axes = (sphere.semi_axes[0] / a_H, sphere.semi_axes[1] / a_H)
+        return cls(a_H, sphere.peak_pressure, length_unit, pressure_unit, axes)
+
+    def short(self, name: str) -> str:
+        """A length without what it is divided by."""
+        return f"${name}\\,/\\,{self._length}$"
 
     def length_label(self, name: str) -> str:
-        return f"${name}\\,/\\,a_H$  ($a_H$ = {quantity(self.length, self.length_unit)})"
+        known = f"(${self._length}$ = {quantity(self.length, self.length_unit)})"
+        return f"{self.short(name)}  {known}"
+
+    def short_pressure(self) -> str:
+        return f"$p\\,/\\,{self._pressure}$"
 
     def pressure_label(self) -> str:
-        return f"$p\\,/\\,p_0$  ($p_0$ = {quantity(self.pressure, self.pressure_unit)})"
+        known = f"(${self._pressure}$ = {quantity(self.pressure, self.pressure_unit)})"
+        return f"{self.short_pressure()}  {known}"
+
+    @property
+    def _length(self) -> str:
+        return "a_H" if self.smooth else "r_c"
+
+    @property
+    def _pressure(self) -> str:
+        return "p_0" if self.smooth else "\\bar p"
 
 
 @dataclass(frozen=True)
 class ShearScale:
     """What shear forces, displacements and energies are divided by, and how the labels say so.
 
-    sphere : the smooth sphere under the same load
-    X0 is its displacement at gross sliding, W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H).
+    sphere : the smooth sphere under the same load, or None
+    displacement : X0, its displacement at gross sliding; where there is none, the contact's own
+    energy : W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H), which is 24/5 f P X0
     """
 
-    sphere: SmoothSphere
+    sphere: SmoothSphere | None
+    force: float
+    displacement: float
     length_unit: str
     force_unit: str
 
     @classmethod
     def of(cls, contact: Contact, length_unit: str, force_unit: str) -> ShearScale:
-        return cls(smooth(contact.scene, load=contact.load), length_unit, force_unit)
+        scene, f = contact.scene, checks.friction(contact.scene.friction)
+        sphere, limit = smooth_reference(scene, contact.load), f * contact.load
+        if sphere is not None:
+            X0 = float(sphere.displacement(limit))
+        else:  # by Ciavarella and Jaeger, c_t f times the approach from first touch
+            X0 = f * float(mindlin.ratio(scene.material.poisson_ratio))
+            X0 *= contact.approach + float(scene.offsets.max())
+        return cls(sphere, limit, X0, length_unit, force_unit)
 
     @property
-    def force(self) -> float:
-        return self.sphere.largest_force
-
-    @property
-    def displacement(self) -> float:
-        return float(self.sphere.displacement(self.force))
+    def name(self) -> str:
+        """What the smooth reference is called."""
+        return f"smooth {'ellipsoid' if isinstance(self.sphere, SmoothEllipsoid) else 'sphere'}"
 
     @property
     def energy(self) -> float:
-        return self.sphere.energy_scale
+        return 4.8 * self.force * self.displacement
 
     def limit(self) -> str:
         """f P, in words for a label."""
@@ -97,7 +135,8 @@ class ShearScale:
     def footnote(self) -> str:
         """What the letters of short labels are."""
         X0 = quantity(self.displacement, self.length_unit)
-        return f"{self.limit()},   $X_0$ = {X0}: the smooth sphere's $X$ at gross sliding"
+        whose = f"the {self.name}'s" if self.sphere else "this contact's"
+        return f"{self.limit()},   $X_0$ = {X0}: {whose} $X$ at gross sliding"
 
     def energy_label(self) -> str:
         both = self.force_unit and self.length_unit
@@ -105,11 +144,17 @@ class ShearScale:
         return f"$W\\,/\\,W_0$  ($W_0$ = {quantity(self.energy, unit)})"
 
 
+def smooth_name(contact: Contact) -> str:
+    """What the smooth reference is called."""
+    word = "ellipsoid" if isinstance(contact.scene.sphere_radius, tuple) else "sphere"
+    return f"smooth {word}"
+
+
 def map_edge(contact: Contact, scale: Scale) -> float:
-    """Half the width of a map that holds every contact disc and the smooth sphere's [a_H]."""
+    """Half the width of a map that holds every contact disc and the smooth contact [a_H]."""
     touching = contact.loads > 0
     reach = np.hypot(*contact.scene.contact_points[touching].T) + contact.contact_radii[touching]
-    return 1.06 * max(1.0, float(reach.max()) / scale.length)
+    return 1.06 * max(*(scale.smooth or (1.0, 1.0)), float(reach.max()) / scale.length)
 
 
 def frame_map(axes: Axes, edge: float) -> None:
@@ -124,9 +169,13 @@ def round_ticks(most: int = 6) -> MaxNLocator:
     return MaxNLocator(most, steps=[1, 2, 5, 10])
 
 
-def draw_circle(axes: Axes, radius: float, style: Any = DASHED, colour: str = SMOOTH) -> None:
-    """A circle about the axis: what the smooth sphere would do."""
-    axes.add_patch(Circle((0, 0), radius, fill=False, ls=style, lw=0.9, ec=colour))
+def draw_smooth(
+    axes: Axes, scale: Scale, share: float = 1.0, style: Any = DASHED, colour: str = SMOOTH
+) -> None:
+    """A circle, or ellipse, about the axis: what the smooth contact would do; this part of it."""
+    if scale.smooth is not None:
+        width, height = (2.0 * share * axis for axis in scale.smooth)
+        axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=style, lw=0.9, ec=colour))
 
 
 def draw_open(axes: Axes, points: Array) -> None:
@@ -235,9 +284,14 @@ def no_contact_figure(*labels: tuple[str, str], width: float = DOUBLE) -> Figure
 
 
 def say_no_contact(axes: Axes) -> None:
+    say_nothing(axes, "no contact")
+
+
+def say_nothing(axes: Axes, why: str) -> None:
+    """An empty panel, and why."""
     axes.set(xticks=[], yticks=[])
     place = axes.transAxes
-    axes.text(0.5, 0.5, "no contact", transform=place, fontsize=LABEL, ha="center", va="center")
+    axes.text(0.5, 0.5, why, transform=place, fontsize=LABEL, ha="center", va="center")
 
 
 def census(contact: Contact) -> str:

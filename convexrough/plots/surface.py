@@ -23,14 +23,14 @@ from convexrough.plots.style import (
     SMOOTH,
     TICK,
     UNSURE,
-    draw_circle,
+    Scale,
     draw_discs,
+    draw_smooth,
     label,
     literal,
     quantity,
     round_ticks,
 )
-from convexrough.sphere import hertz
 from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
@@ -189,12 +189,11 @@ def _draw_contacts(axes: Axes, contact: Contact) -> float:
     """
     touching = contact.loads > 0
     centres, radii = contact.scene.contact_points[touching], contact.contact_radii[touching]
-    modulus, radius = contact.scene.material.contact_modulus, contact.scene.sphere_radius
-    smooth = float(hertz.contact_radius(contact.load, modulus, radius))
-    edge = 1.2 * max(smooth, float((np.abs(centres).max(axis=1) + radii).max()))
+    scale = Scale.of(contact, "", "")
+    edge = 1.2 * max(scale.length, float((np.abs(centres).max(axis=1) + radii).max()))
     shown = np.maximum(radii, edge * float(np.clip(0.1 / np.sqrt(len(radii)), 0.002, 0.01)))
     draw_discs(axes, centres, shown, "_contacts", facecolors=UNSURE, **RIM)
-    draw_circle(axes, smooth, colour="white")
+    draw_smooth(axes, scale, scale.length, colour="white")
     pairs, _ = crowded(contact)
     for i, j in pairs[:1]:
         place = contact.scene.asperities.positions[[i, j]].mean(axis=0)

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
+from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plots.style import DOUBLE, SINGLE, TICK, UNSURE, label, literal, round_ticks
-from convexrough.shearing.verdict import ShearVerdict
 from convexrough.verdict import Verdict
 
 #: From so many asperities on each is a cell of a mosaic: dots would make a pattern of their own.

@@ -25,22 +25,36 @@ ROOM = ((1e-6, 1e-2), (5e-2, 3e-1))
 #: Relative room for rounding in what is computed here.
 ROUNDING = 1e-9
 
-#: Convexity numbers to try by Cholesky factorisation.
-BY_CHOLESKY = (0.9, 0.99, 0.999)
+#: Convexity numbers to try by shells that overlap, and by Cholesky factorisation.
+CROWDED = (0.9, 0.99, 0.999, 0.9999)
 
 #: The part of the room between neighbours that fitted shells share out by size.
 FITTED = 0.9
 
 
+#: Radii of shells that may overlap over the least that would do without overlap.
+WIDTHS = (2.0, 4.0, 8.0)
+
+#: How far beyond their radii boxes of those that touch end, all others being held open: relatively,
+#: for radii to thirty digits, to all digits, and for rough ones.
+LEEWAY = (1e-12, 1e-6, 1e-2)
+
+#: Box, convexity number and shells of an argument.
+Reason = tuple[Array, float, Array | None]
+
+
 class Argument(NamedTuple):
     """On the box 0 <= a <= box the Hessian is at least 1 - convexity_number of its local part.
 
-    shells : (n,) [length] radii of spheres that do not overlap, or None: by Cholesky
+    box     : (n,) [length] 0 of those that are held open
+    shells  : (n,) [length] radii of spheres that overlap little, or None: by Cholesky
+    ceiling : above all (A P)_i [length], for a bound on the approach; None where it is prescribed
     """
 
     box: Array
     convexity_number: float
     shells: Array | None
+    ceiling: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,51 +97,79 @@ class Trial:
         return float(self.radii @ wanted / self.radii.sum())
 
     @cached_property
-    def ceiling(self) -> float:
-        """A bound on the approach of every solution: (4) of docs/theory/proof-file.md."""
+    def ceiling(self) -> tuple[float | None, float]:
+        """What `Argument.ceiling` is, and the bound on the approach of every solution from it."""
         if self.approach is not None:
-            return self.approach
+            return None, self.approach
         loaded = self.loads > 0
         p, w, R = self.loads[loaded], self.pushed[loaded], self.scene.relative_radii[loaded]
         share = p / p.sum()
         least, most = self.pushed.max(), (2 / 3 * self.local + self.pushed).max()
         tops = [least + (most - least) * 0.75**k for k in range(12)]
         bounds = [top + float(share @ ((p / (top - w)) ** 2 / (12 * R))) for top in tops]
+        best, bound = min(zip(tops, bounds, strict=True), key=lambda each: each[1])
         drop = float(share @ self.scene.offsets[loaded])
-        return float(min(bounds) - drop + ROUNDING * (min(bounds) + abs(drop)))
+        return float(best), bound - drop + ROUNDING * (bound + abs(drop))
 
     def arguments(self) -> Iterator[Argument]:
         """The most general first; those that fail already in floating point are left out."""
+        top = self.ceiling[0]
+        for argument in self._tried():
+            yield Argument(*argument, top)
+
+    def _tried(self) -> Iterator[Reason]:
         for beyond, least in ROOM:
             box = self._box(beyond, least)
-            able = box > 0
-            room = np.where(able, self.apart[able].min(axis=0, initial=4 * box.max()) / 2, 0.0)
+            room = self._room(box)
             yield from _by_shells(box, room)
-            yield from self._by_cholesky(box)
+            yield from self._crowded(box)
             yield from self._local(box, room)
             yield from self._local(box, self._fitted(room))
+        for beyond in LEEWAY:
+            box = self.radii * (1 + beyond)
+            yield from _by_shells(box, self._room(box))
+            yield from self._crowded(box)
+
+    def _room(self, box: Array) -> Array:
+        """(n,) [length] half the distances to the nearest of the box, 0 outside it."""
+        able = box > 0
+        nearest = self.apart[able].min(axis=0, initial=4 * box.max(initial=0.0))
+        return np.where(able, nearest / 2, 0.0)
 
     def _box(self, beyond: float, least: float) -> Array:
         """(n,) [length] radii that hold every solution; 0 where none can touch."""
         R, offsets = self.scene.relative_radii, self.scene.offsets
-        deepest = self.ceiling + offsets
-        size = np.abs(offsets) + abs(self.ceiling)
+        deepest = self.ceiling[1] + offsets
+        size = np.abs(offsets) + abs(self.ceiling[1])
         box: Array = np.sqrt(R * np.maximum(deepest, 0.0)) * (1 + beyond)
         box = np.maximum(box, least * max(box.max(), self.radii.max()))
         box[(deepest < -ROUNDING * size) & (self.radii == 0)] = 0.0
         return box
 
-    def _by_cholesky(self, box: Array) -> Iterator[Argument]:
+    def _crowded(self, box: Array) -> Iterator[Reason]:
+        """By shells that overlap, or else by Cholesky."""
         able = np.flatnonzero(box)
+        apart = self.apart[np.ix_(able, able)]
+        for number in CROWDED:
+            least = 2 * box[able] / (np.pi * number)  # t_i of docs/theory/proof-file-steps.md, (3)
+            for width in WIDTHS:
+                s = width * least
+                over = np.maximum(s[:, None] + s - apart, 0.0)
+                overlaps = (over**2 / (4 * apart)).sum(axis=1) * (1 + ROUNDING)
+                if (overlaps < s * (width - 1)).all():
+                    shells = np.zeros(len(box))
+                    shells[able] = s * (1 + ROUNDING)
+                    yield box, number, shells
+                    return
         root = np.sqrt(2 * box[able])
-        scaled = root[:, None] / (np.pi * self.apart[np.ix_(able, able)]) * root
-        for number in BY_CHOLESKY:
+        scaled = root[:, None] / (np.pi * apart) * root
+        for number in CROWDED:
             np.fill_diagonal(scaled, number - ROUNDING)
             try:
                 cholesky(scaled, lower=True, check_finite=False)
             except LinAlgError:
                 continue
-            yield Argument(box, number, None)
+            yield box, number, None
             return
 
     def _fitted(self, room: Array) -> Array:
@@ -139,7 +181,7 @@ class Trial:
             return room
         return np.where(room > 0, FITTED * self.radii / crowding + (1 - FITTED) * room, 0.0)
 
-    def _local(self, box: Array, shells: Array) -> Iterator[Argument]:
+    def _local(self, box: Array, shells: Array) -> Iterator[Reason]:
         """A box that ends half-way between these radii and where convexity ends."""
         end = np.pi / 2 * shells
         number = float((self.radii[box > 0] / end[box > 0]).max(initial=0.0))
@@ -147,9 +189,9 @@ class Trial:
             yield from _by_shells(np.minimum(box, (1 + number) / 2 * end), shells)
 
 
-def _by_shells(box: Array, shells: Array) -> Iterator[Argument]:
+def _by_shells(box: Array, shells: Array) -> Iterator[Reason]:
     able = box > 0
     shells = shells * (1 - ROUNDING)
     number = float((2 * box[able] / (np.pi * shells[able])).max(initial=ROUNDING)) * (1 + ROUNDING)
     if number < 1:
-        yield Argument(box, number, shells)
+        yield box, number, shells

@@ -9,18 +9,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checker, checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, ProofError
+from convexrough.normal.level import Level
+from convexrough.numbers.pairs import Pair
 from convexrough.progress import Announce
-from convexrough.proof.arguments import Argument, Trial
+from convexrough.proof.arguments import Trial
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
-from convexrough.sphere import hertz, mindlin
+from convexrough.sphere import hertz
 from convexrough.whole import replacing
 
 
@@ -29,10 +32,33 @@ class Sheared(Protocol):
 
     @property
     def force(self) -> float: ...
-    @property
-    def displacement(self) -> float: ...
-    @property
-    def stick_radii(self) -> Array: ...
+
+
+class Near(NamedTuple):
+    """Loads near a solution, to any number of digits, in the order of the scene's asperities.
+
+    loads : n of them [force];  approach : [length], None where it is not known better than loads
+    """
+
+    loads: Sequence[Fraction]
+    approach: Fraction | None
+
+    @classmethod
+    def given(cls, loads: Array) -> Near:
+        """Loads (n,) [force] as they are."""
+        return cls(list(map(Fraction, loads.tolist())), None)
+
+    @classmethod
+    def of(cls, level: Level, n: int) -> Near:
+        """Those of a level, in a scene of n asperities."""
+        found, units = [Fraction(0)] * n, level.problem.units
+        if level.trial is None:
+            return cls(found, None)
+        loads, approach = level.trial.loads, level.trial.approach.mid
+        for i, high, low in zip(level.problem.candidates, *loads, strict=True):
+            found[i] = (Fraction(high) + Fraction(low)) * Fraction(units.force)
+        centre = Fraction(float(approach.high)) + Fraction(float(approach.low))
+        return cls(found, centre * Fraction(units.length))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,18 +80,19 @@ class Proof(Record):
 
 def prove(
     scene: Scene,
-    loads: ArrayLike,
+    loads: ArrayLike | Near,
     *,
     approach: float | None = None,
     load: float | None = None,
-    sheared: Sequence[Sheared] = (),
+    sheared: Sequence[tuple[float, Near]] = (),
     announce: Announce | None = None,
 ) -> Proof:
     """A proof of the solution near these loads, wherever they came from.
 
-    loads : (n,) [force] not negative, in the order of the scene's asperities
+    loads : (n,) [force] not negative, in the order of the scene's asperities, or to more digits
     approach [length] or load [force] : what is prescribed, exactly one
-    sheared : friction states to prove, too, with the loss of the cycle from -force to force
+    sheared : shear forces Q [force] of states to prove, too, with the loss of the cycle from -Q to
+        Q; and what is near the solution at the load P - Q / f
     announce : told in a line how far long work has come
 
     The bounds are those that the checker computes in exact arithmetic, so proving takes as long as
@@ -76,16 +103,23 @@ def prove(
     """
     checks.exactly_one("approach", approach, "load", load)
     refuse_many(scene)
-    given = checks.array("loads", loads, length=len(scene), sign="not negative")
-    if load is not None and not given.any():
+    if not isinstance(loads, Near):
+        loads = Near.given(checks.array("loads", loads, length=len(scene), sign="not negative"))
+    if load is not None and not any(loads.loads):
         raise InputError("loads", found="none", expected="a load on some asperity")
     modulus = scene.material.contact_modulus
-    radii = hertz.contact_radius(given, modulus, scene.relative_radii)
+    rounded = np.array(loads.loads, dtype=np.float64)
+    radii = hertz.contact_radius(rounded, modulus, scene.relative_radii)
     trial = Trial(scene, radii, approach, None if load is None else load / modulus)
-    prescribed = {"approach": approach} if load is None else {"load": load}
+    document = _document(trial, {"approach": approach} if load is None else {"load": load})
+    document["pressed"] = _place(trial, document, loads, approach)
+    document["sheared"] = [
+        {"force": abs(force).hex(), "held": _place(trial, document, near, None)}
+        for force, near in sheared
+    ]
     refusal = "contacts overlap too much for the energy to be proved convex near these loads"
     for argument in trial.arguments():
-        document = _document(trial, prescribed, argument, sheared)
+        document["argument"] = _written(argument._asdict())
         try:
             proved = checker.prove(document, announce or (lambda line: None))
         except checker.Refused as error:
@@ -103,10 +137,8 @@ def refuse_many(scene: Scene) -> None:
         raise InputError("asperities of a scene to prove", found=f"{len(scene):,}", expected=most)
 
 
-def _document(
-    trial: Trial, prescribed: dict[str, Any], argument: Argument, sheared: Sequence[Sheared]
-) -> dict[str, Any]:
-    """The file, without claims as yet."""
+def _document(trial: Trial, prescribed: dict[str, Any]) -> dict[str, Any]:
+    """The file, without what is said of the solution as yet."""
     scene = trial.scene
     x, y = scene.asperities.positions.T
     given = {
@@ -120,27 +152,43 @@ def _document(
         "heights": scene.asperities.heights,
         "tip_radii": scene.asperities.tip_radii,
     }
-    friction = checks.friction(scene.friction) if sheared else 0.0
-    travel = mindlin.ratio(scene.material.poisson_ratio) * friction
-    states = [
-        {
-            "force": abs(state.force),
-            "radii": state.stick_radii,
-            "approach": trial.best_approach - abs(state.displacement) / travel,
-        }
-        for state in sheared
-    ]
-    document: dict[str, Any] = {
+    return {
         "format": checker.FORMAT,
         "scene": _written(given),
         "prescribed": _written(prescribed),
         "sha256": checker.digest(_written(given), _written(prescribed)),
-        "argument": _written(argument._asdict()),
-        "pressed": _written({"radii": trial.radii, "approach": trial.best_approach}),
-        "sheared": _written(states),
+        "argument": None,
+        "pressed": None,
+        "sheared": [],
         "claims": None,
     }
-    return document
+
+
+def _place(
+    trial: Trial, document: dict[str, Any], near: Near, approach: float | None
+) -> dict[str, Any]:
+    """Contact radii to thirty digits, and the approach."""
+    scene = checker.read_scene(document["scene"])
+    radii = [
+        _cube_root(load * R * Fraction(3, 4) / scene.modulus)
+        for load, R in zip(near.loads, scene.radii, strict=True)
+    ]
+    centre = Fraction(trial.best_approach) if near.approach is None else near.approach
+    if approach is not None:
+        centre = Fraction(approach)
+    return {"radii": [_digits(radius) for radius in radii], "approach": _digits(centre)}
+
+
+def _cube_root(x: Fraction) -> Fraction:
+    """To some thirty digits."""
+    near = Fraction(math.cbrt(x))
+    return near + (x - near**3) / (3 * near**2) if near else near
+
+
+def _digits(x: Fraction) -> list[str]:
+    """As a sum of float64 numbers, two or one."""
+    high, low = Pair.nearest(x)
+    return [high.hex(), low.hex()] if low else [high.hex()]
 
 
 def _written(value: Any) -> Any:

@@ -1,7 +1,7 @@
 """The slider page: states of first loading, found and judged here, inside one HTML file.
 
 The page steps through these states and shows their numbers as they are. Loops are made of them by
-Masing's rule (docs/theory/shear.md, "Histories"); nothing else is computed there.
+Masing's rule (docs/theory/paths.md); nothing else is computed there.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
+from convexrough.friction.cycle import Cycle, cycles
+from convexrough.friction.path import History, history
 from convexrough.progress import Announce
 from convexrough.run.report import bound, describe
-from convexrough.run.scene_file import UnitNames
 from convexrough.run.summary import SHEAR, Summary, counts
+from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
-from convexrough.shearing.cycle import Cycle, cycles
-from convexrough.shearing.history import History, history
 from convexrough.sphere.smooth import smooth
+from convexrough.tabular.units import UnitNames
 
 #: Forces of the slider for up to so many touching asperities; fewer for still more.
 FORCES = {2_500: 101, 20_000: 51}
@@ -37,7 +38,7 @@ MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 def slider_page(
     contact: Contact, summary: Summary, units: UnitNames, announce: Announce | None = None
 ) -> str:
-    """The page as HTML. Raises InputError if the scene has no friction."""
+    """The page as HTML. Raises InputError if the scene has no friction, or another base."""
     found = json.dumps(page_data(contact, summary, units, announce), separators=(",", ":"))
     template = files("convexrough.run").joinpath("page.html").read_text(encoding="utf-8")
     return template.replace("{{data}}", found.replace("<", "\\u003c"))
@@ -51,6 +52,7 @@ def page_data(
     Numbers have the five digits that are shown. `stick` has a row per force and a column per disc:
     the stick radius in thousandths of the contact radius, 0 where sliding, -1 where undecided.
     """
+    sphere_radius(contact.scene.sphere_radius, "slider page")
     limit = checks.friction(contact.scene.friction) * contact.load
     touching = np.flatnonzero(contact.loads)
     fractions = np.linspace(0.0, 1.0, _forces(len(touching)))
@@ -110,7 +112,7 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
         "length": _digits(moved),
         "displacement": _digits(moved / X0),
         "displacement_error": [bound(each.displacement_error) for each in steady],
-        "loss": _digits([each.energy_normalised for each in steady]),
+        "loss": _digits([each.loss_normalised for each in steady]),
         "smooth_loss": _digits([each.smooth_normalised for each in steady]),
         "smooth_displacement": _digits(1.0 - stuck**2),
         "smooth_stick": _digits(stuck),
@@ -135,7 +137,7 @@ def _stick(
 def _shares(contact: Contact, loading: History, which: Indices) -> Array:
     """(m, k) Q_i / (f P_i)."""
     limits = checks.friction(contact.scene.friction) * contact.loads[which]
-    return np.asarray(loading.forces[:, which] / limits)
+    return np.asarray(loading.asperity_forces[:, which] / limits)
 
 
 def _followed(contact: Contact, loading: History, which: Indices, X0: float) -> dict[str, Any]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from convexrough.friction.shear import shear
 from convexrough.progress import Announce
 from convexrough.proof import Proof
 from convexrough.run.stages import Findings
-from convexrough.shearing.state import shear
 
 #: At friction's limit nothing is left to stick; shear forces nearer to it are left out.
 BELOW_LIMIT = 1 - 1e-9

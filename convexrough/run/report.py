@@ -7,10 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from convexrough.plausibility import doubts
 from convexrough.run.columns import aligned
-from convexrough.run.plausibility import doubts, geometry_matters
+from convexrough.run.plausibility import described_geometry, described_modulus, neglected
 from convexrough.run.sensitivity import gradient_lines
 from convexrough.run.summary import NORMAL, Summary
+from convexrough.tabular.units import UnitNames
 
 _SCOPES = {
     "global": "global: the scene has exactly one solution",
@@ -26,7 +28,7 @@ _INFLUENCES = {
 
 def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -> list[str]:
     """Aligned lines for people, of either summary."""
-    normal = summary["normal"]
+    normal, units = summary["normal"], UnitNames(length_unit, force_unit)
     proof = normal["certificate"]
     able = f"  ({normal['candidates']} could touch)" if "candidates" in normal else ""
     width = len(str(normal["asperities"]))
@@ -47,7 +49,9 @@ def describe(summary: Summary, *, length_unit: str = "", force_unit: str = "") -
         lines += [
             ("model error", f"{normal['model_error']:.2g}  (point forces for pressures)"),
             ("crowding", f"{normal['crowding']:.3g}  (contact discs overlap above 1)"),
-            *((("geometry", said),) if (said := geometry_matters(normal)) else ()),
+            *((("bodies", said),) if (said := neglected(normal)) else ()),
+            ("geometry", described_geometry(normal)),
+            ("contact modulus", described_modulus(normal["contact_modulus"], units)),
             ("solver", f"{normal['solver']}, {steps}"),
             ("influence", _INFLUENCES[normal["influence"]]),
         ]
@@ -65,20 +69,22 @@ def _describe_shear(summary: Summary, length_unit: str, force_unit: str) -> list
         lines += _numbers(heading, [[row[key] for key in keys] for row in rows])
     if rows := summary.get("cycle"):
         keys = ["maximum", "minimum", "force_amplitude", "displacement_amplitude"]
-        keys += ["secant_stiffness", "energy", "loss_factor"]
-        keys += ["energy_normalised", "smooth_normalised", "sliding"]
+        keys += ["secant_stiffness", "loss", "loss_factor"]
+        over = not math.isnan(rows[0]["smooth_normalised"])  # a smooth reference
+        keys += [*(["loss_normalised", "smooth_normalised"] if over else []), "sliding"]
         stiffness = f"{force_unit}/{length_unit}" if force_unit and length_unit else ""
         lines += ["", _titled("steady cycles", f"Qa {force_unit}", f"Xa {length_unit}",
                               f"Qa/Xa {stiffness}", f"loss W {work}")]  # fmt: skip
-        heading = ["max/(fP)", "min/(fP)", "Qa", "Xa", "Qa/Xa", "W", "W/(pi Qa Xa)", "W/W0"]
-        heading += ["smooth W/W0", "slide"]
+        heading = ["max/(fP)", "min/(fP)", "Qa", "Xa", "Qa/Xa", "W", "W/(pi Qa Xa)"]
+        heading += [*(["W/W0", "smooth W/W0"] if over else []), "slide"]
         lines += _numbers(heading, [[row[key] for key in keys] for row in rows], digits=6)
+        lines += [] if over else ["no smooth reference, so no W/W0: a flat base, or a cylinder"]
     if past := summary.get("history"):
-        steps = list(zip(past["fraction"], past["displacement"], past["energy"], strict=True))
-        lines += ["", _titled("history", f"displacement {length_unit}", f"energy {work}")]
+        steps = list(zip(past["fraction"], past["displacement"], past["loss"], strict=True))
+        lines += ["", _titled("history", f"displacement {length_unit}", f"loss {work}")]
         if len(steps) > 20:
             lines.append(f"(the last 20 of {len(steps)} steps; all are in history.csv)")
-        lines += _numbers(["Q/(fP)", "displacement", "energy"], steps[-20:])
+        lines += _numbers(["Q/(fP)", "displacement", "loss"], steps[-20:])
     lines += describe_varied(summary, length_unit, force_unit)
     return lines + (gradient_lines(summary["gradient"]) if "gradient" in summary else [])
 
@@ -88,27 +94,27 @@ def describe_varied(summary: Summary, length_unit: str, force_unit: str) -> list
     work = f"{force_unit} {length_unit}".strip()
     lines = []
     if path := summary.get("path"):
-        keys = ["load", "force", "displacement", "energy", "stuck", "partial_slip", "sliding"]
+        keys = ["load", "force", "displacement", "loss", "stuck", "partial_slip", "sliding"]
         lines += ["", _titled("load path", f"forces {force_unit}", f"displacement {length_unit}",
-                              f"energy {work}")]  # fmt: skip
+                              f"loss {work}")]  # fmt: skip
         if len(path["load"]) > 20:
             lines.append(f"(the last 20 of {len(path['load'])} points; all are in path.csv)")
         rows = list(zip(*(path[key][-20:] for key in keys), strict=True))
-        lines += _numbers(["P", "Q", "displacement", "energy", "stuck", "partial", "slide"], rows)
+        lines += _numbers(["P", "Q", "displacement", "loss", "stuck", "partial", "slide"], rows)
         lines.append(f"order of indentations: {path['order']}")
     if steady := summary.get("steady"):
-        lines += ["", _titled("steady", f"level {force_unit}", f"energy {work}")]
-        keys = ["level", "energy", "energy_error", "partial_slip", "sliding", "intermittent"]
-        heading = ["stuck level", "energy", "error", "partial", "slide", "intermittent"]
+        lines += ["", _titled("steady", f"level {force_unit}", f"loss {work}")]
+        keys = ["level", "loss", "loss_error", "partial_slip", "sliding", "intermittent"]
+        heading = ["stuck level", "loss", "error", "partial", "slide", "intermittent"]
         lines += _numbers(heading, [[steady[key] for key in keys]])
         lines.append(f"order of indentations: {steady['order']}")
     if losses := summary.get("phase_losses"):
-        lines += ["", _titled("loss against phase", f"energy {work}")]
-        keys = ["phase", "factor", "energy", "smooth"]
+        lines += ["", _titled("loss against phase", f"loss {work}")]
+        keys = ["phase", "factor", "loss", "smooth"]
         rows = list(zip(*(losses[key] for key in keys), strict=True))
         if len(rows) > 20:
             lines.append(f"(the last 20 of {len(rows)} ellipses; all are in phase_losses.csv)")
-        lines += _numbers(["phase", "factor", "energy", "smooth sphere"], rows[-20:])
+        lines += _numbers(["phase", "factor", "loss", "smooth sphere"], rows[-20:])
     if limit := summary.get("shakedown"):
         lines += ["", f"shakedown  ({limit['kind']})"]
         keys = ["factor", "lower", "upper", "gross"]

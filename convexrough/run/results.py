@@ -17,11 +17,12 @@ import numpy as np
 from convexrough.errors import FileError
 from convexrough.progress import Announce
 from convexrough.run.page import slider_page
-from convexrough.run.scene_file import SceneFile, UnitNames, digest
+from convexrough.run.scene_file import SceneFile, digest
 from convexrough.run.sensitivity import NUMBERS, Differentiated
 from convexrough.run.stage_tables import stage_tables
 from convexrough.run.stages import Findings
 from convexrough.run.summary import Summary, to_json
+from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 from convexrough.whole import remove_unfinished, replacing
 

@@ -15,21 +15,24 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 import numpy as np
 
 from convexrough.errors import FileError, InputError, SceneFileError
+from convexrough.friction.shapes import elliptic_path
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
-from convexrough.paths.shapes import elliptic_path
 from convexrough.record import Record
 from convexrough.run.sensitivity import Sensitivity
 from convexrough.run.stages import Stages
-from convexrough.run.tables import few, read_summits, read_text
+from convexrough.run.tables import read_summits, read_text
 from convexrough.run.toml_slips import explained
 from convexrough.run.varying import Limit, Phases, Points, Varying
 from convexrough.scene.asperities import Asperities, largest_tip_radius
+from convexrough.scene.base import checked
 from convexrough.scene.material import Material
 from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
+from convexrough.tabular.table import Reading, few, named_columns
+from convexrough.tabular.units import UnitNames
 
 if TYPE_CHECKING:
     from convexrough.run.schema import Cycle, Document, Lattice
@@ -42,17 +45,13 @@ MOST_MISTAKES = 50
 #: Bytes of a scene file; many asperities go into a file of their own.
 MOST_BYTES = 2**25
 
+#: What a file of summits may call otherwise.
+SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
+
 #: Parts of a dotted key: tomllib takes time and memory with their square.
 MOST_PARTS = 100
 
 _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
-
-
-class UnitNames(NamedTuple):
-    """How the scene's units are called, "" where the file does not say; never converted."""
-
-    length: str = ""
-    force: str = ""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -64,6 +63,7 @@ class SceneFile(Record, Stages):
         made to reach as far as that; else None
     influence : how to couple the asperities; None for the cheapest exact way
     text   : the file itself;  seed : of its random heights and radii, None where there are none
+    convert : numbers whose file names other units are converted
     inputs : the SHA-256 of each file it was read from, by its path
 
     >>> file = cr.read_scene(new_scene)
@@ -83,6 +83,7 @@ class SceneFile(Record, Stages):
     solver: Solver
     influence: Kind | None
     units: UnitNames
+    convert: bool
 
     def problem(self) -> NormalProblem:
         """The normal contact problem of the file, assembled."""
@@ -137,7 +138,8 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
         loop_asperities=_whose_loops(path, cycle, len(scene)) if cycle else None,
         solver=named(tables.solver.name),
         influence=cast("Kind | None", tables.solver.influence),
-        units=UnitNames(units.length, units.force),
+        units=units.names,
+        convert=units.convert,
     )
 
 
@@ -250,18 +252,12 @@ def build_scene(
 
     Raises InputError for mistakes that show only here.
     """
-    material = tables.material
-    ratio = material.poisson_ratio
     with _blamed_on(path, "material"):
-        if material.contact_modulus is not None:
-            stuff = Material(material.contact_modulus, ratio, material.hardness)
-        else:
-            assert material.youngs_modulus is not None  # exactly one of the two
-            stuff = Material.from_youngs(material.youngs_modulus, ratio, material.hardness)
+        stuff = _material(tables)
 
     def press_on(asperities: Asperities) -> Scene:
         return Scene(
-            tables.sphere.radius,
+            checked(tables.sphere.radius),
             asperities,
             stuff,
             friction=tables.friction.coefficient if tables.friction else None,
@@ -273,10 +269,29 @@ def build_scene(
         if asperities is not None:
             return press_on(asperities), None
         if layout.pattern == "file":
-            return press_on(
-                layouts.summits(path.parent / layout.path, tip_radius=layout.tip_radius)
-            ), None
+            how = Reading(
+                columns=named_columns("columns", layout.columns, SUMMIT_COLUMNS),
+                units=tables.units.names,
+                convert=tables.units.convert,
+            )
+            place = path.parent / layout.path
+            return press_on(layouts.summits(place, tip_radius=layout.tip_radius, how=how)), None
         return _lattice(layout, tables, press_on, layouts)
+
+
+def _material(tables: Document) -> Material:
+    """Of both bodies."""
+    from convexrough.run.schema import Bodies
+
+    def of(body: Any) -> Material:
+        return Material.from_youngs(body.youngs_modulus, body.poisson_ratio, body.hardness)
+
+    table = tables.material
+    if isinstance(table, Bodies):
+        return Material.pair(of(table.sphere), of(table.base))
+    if table.youngs_modulus is not None:
+        return of(table)
+    return Material(table.contact_modulus, table.poisson_ratio, table.hardness)
 
 
 def _lattice(
@@ -296,7 +311,7 @@ def _lattice(
     def farthest(approach: float) -> float:
         return reach(
             approach,
-            sphere_radius=tables.sphere.radius,
+            sphere_radius=checked(tables.sphere.radius),
             tip_radius=largest_tip_radius(layout.tip_radius, layout.tip_radius_cv),
             height=CUT_DEVIATIONS * layout.height_std,
             geometry=layout.geometry,

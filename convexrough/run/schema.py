@@ -5,14 +5,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from convexrough.checks import nearest
+from convexrough.errors import InputError
 from convexrough.run.path_schema import Path, Shakedown, Steady
 from convexrough.run.sensitivity import BY
 from convexrough.run.values import (
@@ -28,19 +31,22 @@ from convexrough.run.values import (
     Pattern,
     Points,
     Positive,
+    Radius,
     Ratio,
     Seed,
     Share,
     Shares,
     SolverName,
+    Switch,
     Table,
     Text,
     TipRadius,
 )
+from convexrough.tabular.units import UnitNames, force_of, known_unit, parsed
 
 
 class Sphere(Table):
-    radius: Positive
+    radius: Radius
 
 
 class Material(Table):
@@ -49,6 +55,19 @@ class Material(Table):
     youngs_modulus: Positive | None = None
     poisson_ratio: Ratio
     hardness: Positive | None = None
+
+
+class Body(Table):
+    youngs_modulus: Positive
+    poisson_ratio: Ratio
+    hardness: Positive | None = None
+
+
+class Bodies(Table):
+    """[material] of two bodies that differ."""
+
+    sphere: Body
+    base: Body
 
 
 class Lattice(Table):
@@ -60,14 +79,15 @@ class Lattice(Table):
     height_std: NonNegative = 0.0
     tip_radius_cv: NonNegative = 0.0
     seed: Seed | None = None
-    geometry: Geometry = "summit"
+    geometry: Geometry = "closest"
 
 
 class Summits(Table):
     pattern: Literal["file"]
     path: Text
     tip_radius: TipRadius | None = None
-    geometry: Geometry = "summit"
+    columns: dict[str, Text] = Field(default_factory=dict)
+    geometry: Geometry = "closest"
 
 
 class Normal(Table):
@@ -134,6 +154,31 @@ class Solver(Table):
 class Units(Table):
     length: Text = ""
     force: Text = ""
+    pressure: Text = ""
+    convert: Switch = False
+
+    @property
+    def names(self) -> UnitNames:
+        """The force is that of the pressure on a square, where only these are named."""
+        pressure, length = (parsed(name) if name else None for name in (self.pressure, self.length))
+        made = force_of(pressure, length) if pressure and length else ""
+        return UnitNames(self.length.strip(), self.force.strip() or made)
+
+    def mistakes_within(self) -> Iterator[str]:
+        for kind in ("length", "force", "pressure"):
+            try:
+                known_unit(kind, getattr(self, kind), kind)
+            except InputError as error:
+                yield f"{error}; without [units] no unit is looked at"
+                return
+        pressure, length, force = map(parsed, (self.pressure, self.length, self.force))
+        if pressure and not length:
+            yield "length: missing, needed with pressure"
+        elif pressure and length and not (made := force_of(pressure, length)):
+            yield f"pressure: found {self.pressure}, expected one that makes a force with a name"
+        elif pressure and length and force and force.size != (pressure * length**2).size:
+            makes = f"as {self.pressure} and {self.length} make"
+            yield f"force: found {self.force}, expected {made}, {makes}"
 
 
 @dataclass(frozen=True)
@@ -141,7 +186,7 @@ class Document:
     """The tables of one file, each right by itself and beside the others."""
 
     sphere: Sphere
-    material: Material
+    material: Material | Bodies
     asperities: Lattice | Summits
     normal: Normal
     friction: Friction | None = None
@@ -158,7 +203,7 @@ class Document:
 
 _TABLES: dict[str, tuple[type[Table], ...]] = {
     "sphere": (Sphere,),
-    "material": (Material,),
+    "material": (Material, Bodies),
     "asperities": (Lattice, Summits),
     "normal": (Normal,),
     "friction": (Friction,),
@@ -172,6 +217,14 @@ _TABLES: dict[str, tuple[type[Table], ...]] = {
     "solver": (Solver,),
     "units": (Units,),
 }
+#: Letters of the formulas, and the keys that they stand for.
+MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
+MEANT |= {"nu": "poisson_ratio", "R": "radius", "rho": "tip_radius", "f": "coefficient"}
+MEANT |= {"mu": "coefficient", "P": "load", "D": "approach"}
+
+#: [Pa] moduli of solids: from gels to diamond, with room.
+SOFTEST, HARDEST = 1e3, 1e13
+
 _REQUIRED = ("sphere", "material", "asperities", "normal")
 _FRICTIONAL = ("shear", "cycle", "history", "path", "steady", "shakedown")
 
@@ -199,6 +252,7 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
     if "friction" not in contents and (given := [name for name in _FRICTIONAL if name in contents]):
         mistakes.append(f"[friction]: missing table, needed with [{given[0]}]")
     mistakes += _unbounded(tables)
+    mistakes += _implausible(tables)
     asked = tables.get("gradient")
     if "friction" not in contents and asked is not None and asked.sheared:
         mistakes.append(f"[friction]: missing table, needed with the {asked.of} of [gradient]")
@@ -208,8 +262,12 @@ def validate(contents: dict[str, Any]) -> tuple[Document | None, list[str]]:
 def validate_table(
     name: str, keys: dict[str, Any], models: tuple[type[Table], ...]
 ) -> tuple[Table | None, list[str]]:
-    """One table, or None and what is wrong in it; the last of the models is that of files."""
-    model = models[-1] if keys.get("pattern") == "file" else models[0]
+    """One table, or None and what is wrong in it.
+
+    The last of the models is that of files, or of two bodies.
+    """
+    other = keys.get("pattern") == "file" or not keys.keys().isdisjoint(Bodies.model_fields)
+    model = models[-1] if other else models[0]
     mistakes = list(model.mistakes_between(keys))
     try:
         table = model.model_validate(keys)
@@ -221,23 +279,46 @@ def validate_table(
 def _phrase(models: tuple[type[Table], ...], model: type[Table], error: ErrorDetails) -> str:
     """One mistake: the key, or element of its list, what was found, what is expected."""
     key, *inner = error["loc"]
+    if model is Bodies and inner:
+        return f"{key}.{_phrase((Body,), Body, {**error, 'loc': tuple(inner)})}"
     place = str(key) + "".join(f"[{i}]" for i in inner if isinstance(i, int))
     if error["type"] == "extra_forbidden":
-        if any(key in other.model_fields for other in models):
-            return f"{place}: not used with this pattern"
-        return f"{place}: unknown key, {nearest(place, model.model_fields)}"
+        if any(key in other.model_fields for other in models if other is not model):
+            return f"{place}: not used with {'two bodies' if model is Bodies else 'this pattern'}"
+        meant = f'did you mean "{MEANT[place]}"?' if MEANT.get(place) in model.model_fields else ""
+        return f"{place}: unknown key, {meant or nearest(place, model.model_fields)}"
     if error["type"] == "missing":
         return f"{place}: missing"
-    return f"{place}: found {_shown(error['input'])}, expected {error['msg']}"
+    expected = "a table" if error["type"] == "model_type" else error["msg"]
+    return f"{place}: found {_shown(error['input'])}, expected {expected}"
 
 
 def _unbounded(tables: dict[str, Any]) -> Iterator[str]:
-    """A list of tip radii says how many asperities there are; a load alone does not."""
-    lattice, normal = tables.get("asperities"), tables.get("normal")
-    if not isinstance(lattice, Lattice) or normal is None or normal.load is None:
+    """A list of tip radii, or a base that bends away, says how many asperities there are."""
+    lattice, normal, sphere = (tables.get(name) for name in ("asperities", "normal", "sphere"))
+    if not isinstance(lattice, Lattice) or lattice.within is not None:
         return
-    if isinstance(lattice.tip_radius, list) and lattice.within is None:
+    if sphere is not None and math.inf in np.atleast_1d(sphere.radius):
+        yield "[asperities] within: missing, needed with a flat base or a cylinder, without an end"
+    elif isinstance(lattice.tip_radius, list) and normal is not None and normal.load is not None:
         yield "[asperities] within: missing, needed with a list of tip radii under a given load"
+
+
+def _implausible(tables: dict[str, Any]) -> Iterator[str]:
+    """A modulus that no solid has, where units are named."""
+    material, units = tables.get("material"), tables.get("units")
+    if not isinstance(material, Material) or units is None:
+        return
+    unit = units.names.unit("pressure")
+    name = "youngs_modulus" if material.contact_modulus is None else "contact_modulus"
+    value = getattr(material, name)
+    if unit is None or value is None:
+        return
+    if not SOFTEST <= (pascals := value * float(unit.size)) <= HARDEST:
+        yield (
+            f"[material] {name}: found {value:g} {unit.name}, which is {pascals:.3g} Pa, expected "
+            f"{SOFTEST:g} to {HARDEST:g} Pa, as solids have; without [units] no unit is looked at"
+        )
 
 
 def _shown(value: object) -> str:

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
-from convexrough.gradients.adjoint import Holding
-from convexrough.gradients.gradient import Gradient
-from convexrough.shearing.cycle import cycle
-from convexrough.shearing.state import shear
+from convexrough.friction.cycle import cycle
+from convexrough.friction.shear import shear
+from convexrough.gradients.gradient import Gradient, Holding
 
 #: What a scene file may ask the gradient of, and its letter.
 NUMBERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
@@ -138,7 +137,7 @@ def gradient_lines(summary: dict[str, Any]) -> list[str]:
         text = ", ".join(f"{slope:.8g}" for slope in slopes)
         text = f"({text})" if len(slopes) > 1 else text
         rows.append((f"by {word}", f"up to {text}  (asperity {most['asperity']}{known})"))
-    lines = [f"  {name:<18}{text}" for name, text in rows]
+    lines = [f"  {name:<20}{text}" for name, text in rows]
     return ["", f"gradient of the {summary['of']}{under}, {held}", *lines]
 
 

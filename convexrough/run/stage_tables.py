@@ -79,16 +79,16 @@ def _cycle_columns(rows: tuple[Cycled, ...]) -> Columns:
     names = (
         *("force_amplitude", "displacement_amplitude", "displacement_error"),
         *("secant_stiffness", "loss_factor"),
-        *("energy", "energy_normalised", "smooth_normalised", "balance_defect"),
+        *("loss", "loss_normalised", "smooth_normalised", "balance_defect"),
     )
     return {
         "maximum": np.array([row.maximum for row in rows]),
         "minimum": np.array([row.minimum for row in rows]),
         **{name: np.array([getattr(cycle, name) for cycle in cycles]) for name in names},
-        "partial_slip_energy": np.array([each.partial_slip_energies.sum() for each in cycles]),
-        "sliding_energy": np.array([each.sliding_energies.sum() for each in cycles]),
+        "partial_slip_loss": np.array([each.partial_slip_losses.sum() for each in cycles]),
+        "sliding_loss": np.array([each.sliding_losses.sum() for each in cycles]),
         "sliding": np.array([counts(each.status, SHEAR)["sliding"] for each in cycles]),
-        "energy_error": np.array([each.energy_error for each in cycles]),
+        "loss_error": np.array([each.loss_error for each in cycles]),
     }
 
 
@@ -117,8 +117,8 @@ def _history_columns(followed: Followed) -> Columns:
     past = followed.history
     return {
         "fraction": np.array(followed.fractions),
-        "force": past.applied,
+        "force": past.forces,
         "displacement": past.displacements,
-        "energy": past.energy,
-        "energy_error": past.energy_errors,
+        "loss": past.losses,
+        "loss_error": past.loss_errors,
     }

@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike
 
 from convexrough import checks
 from convexrough.contact import Contact
+from convexrough.friction.cycle import Cycle, Loop, cycles, loops
+from convexrough.friction.path import History, history
+from convexrough.friction.shear import ShearState, shear
 from convexrough.progress import Announce
 from convexrough.run.sensitivity import Differentiated, Missing, Sensitivity
 from convexrough.run.varying import Varied, Varying
 from convexrough.scene.rings import one_of_each_ring
-from convexrough.shearing.cycle import Cycle, cycles, loops
-from convexrough.shearing.history import History, history
-from convexrough.shearing.loop import Loop
-from convexrough.shearing.state import ShearState, shear
 
 Fractions = tuple[float, ...]
 

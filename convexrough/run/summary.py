@@ -55,9 +55,9 @@ def summarise(found: Findings) -> Summary:
             {
                 "maximum": maximum,
                 "minimum": minimum,
-                "energy": cycle.energy,
-                "energy_error": cycle.energy_error,
-                "energy_normalised": cycle.energy_normalised,
+                "loss": cycle.loss,
+                "loss_error": cycle.loss_error,
+                "loss_normalised": cycle.loss_normalised,
                 "smooth_normalised": cycle.smooth_normalised,
                 "balance_defect": cycle.balance_defect,
                 "force_amplitude": cycle.force_amplitude,
@@ -74,8 +74,8 @@ def summarise(found: Findings) -> Summary:
         summary["history"] = {
             "fraction": list(fractions),
             "displacement": history.displacements.tolist(),
-            "energy": history.energy.tolist(),
-            "energy_error": history.energy_errors.tolist(),
+            "loss": history.losses.tolist(),
+            "loss_error": history.loss_errors.tolist(),
         }
     if found.gradient is not None:
         summary["gradient"] = gradient_summary(found.gradient)

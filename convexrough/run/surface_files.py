@@ -24,11 +24,21 @@ COLUMNS = {
     "deviation": "deviations",
 }
 
+#: How the units of these columns follow from that of length.
+LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
+LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature"), "1/{}")
+
 
 def write_summits(path: Path, scanned: Scanned, *, figures: bool) -> list[Path]:
     """Write the table that a scene file reads, the curve and the figures beside it; the paths."""
     summits = scanned.summits
-    columns = {name: getattr(summits, field) for name, field in COLUMNS.items()}
+    unit = summits.origin.unit
+    columns = {
+        f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name: getattr(
+            summits, field
+        )
+        for name, field in COLUMNS.items()
+    }
     columns |= {"row": summits.pixels[:, 0], "column": summits.pixels[:, 1]}
     written = [_write_rows(path, [list(columns), *zip(*(each.tolist() for each in columns.values()),
                                                       strict=True)])]  # fmt: skip

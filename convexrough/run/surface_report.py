@@ -30,7 +30,6 @@ class Scanned:
     """A surface, all its summits, those that pruning leaves, and what comes of pressing on them.
 
     curve, contact : None where nobody said how they are pressed; contact also where none was found
-    length_unit : of the scene that they are pressed in, "" where that names none
     """
 
     surface: Surface
@@ -38,7 +37,6 @@ class Scanned:
     summits: Summits
     curve: Provability | None = None
     contact: Contact | None = None
-    length_unit: str = ""
 
     @property
     def certified(self) -> bool:
@@ -222,8 +220,6 @@ def doubts_of_surface(scanned: Scanned) -> Iterator[str]:
                 f"{name.replace('_', ' ')} of all maxima is {counted / expected:.2f} of what the "
                 "spectral moments of a Gaussian surface would give"
             )
-    if scanned.length_unit and not surface.unit:
-        yield f"the scene is in {scanned.length_unit}, and the map in nobody knows what: --unit"
     if scanned.curve is None:
         return
     chosen = summits.origin.prune

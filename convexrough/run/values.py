@@ -5,6 +5,7 @@ Only this module and `schema` know pydantic, which takes 0.1 s to import.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -12,6 +13,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Discriminator,
+    Field,
     Tag,
     ValidationError,
     ValidatorFunctionWrapHandler,
@@ -56,12 +58,26 @@ TipRadius = Annotated[
     Annotated[Positive, Tag("number")] | Annotated[list[Positive], Tag("list")],
     Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
 ]
+_Length = Annotated[
+    float,
+    Field(allow_inf_nan=True),
+    expected("a positive number, or inf where it is flat", lambda value: value > 0),
+    expected(SIZED, lambda value: value == math.inf or is_sized(value)),
+]
+_TwoLengths = Annotated[
+    list[_Length], expected("two radii, along x and along y", lambda value: len(value) == 2)
+]
+Radius = Annotated[
+    Annotated[_Length, Tag("number")] | Annotated[_TwoLengths, Tag("list")],
+    Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
+]
 Seed = Annotated[int, expected("a whole number that is not negative", lambda value: value >= 0)]
 Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
 Chosen = Annotated[
     Literal["all"] | list[Seed], expected('"all" or a list of indices of asperities, from 0')
 ]
 Text = Annotated[str, expected("text in quotes", bool)]
+Switch = Annotated[bool, expected("true or false")]
 Pattern = Annotated[Literal["hexagonal", "square"], expected('"hexagonal", "square" or "file"')]
 Geometry = Annotated[Literal["summit", "closest"], expected('"summit" or "closest"')]
 InfluenceName = Annotated[str, expected(f"one of: {', '.join(KINDS)}", KINDS.__contains__)]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.contact import Contact
-from convexrough.paths.shakedown import Shakedown
+from convexrough.melan.shakedown import Shakedown
 from convexrough.run.varying import Varied
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
@@ -29,17 +29,17 @@ def varied_tables(found: Varied, contact: Contact) -> Iterator[tuple[str, Column
     """The name and the columns of each table."""
     x, y = contact.scene.asperities.positions.T
     if (path := found.path) is not None:
-        m, n = path.forces.shape
+        m, n = path.asperity_forces.shape
         yield (
             "path",
             {
                 "load": path.loads,
-                "force": path.applied,
+                "force": path.forces,
                 "approach": path.approaches,
                 "displacement": path.displacements,
                 "displacement_error": path.displacement_errors,
-                "energy": path.energy,
-                "energy_error": path.energy_errors,
+                "loss": path.losses,
+                "loss_error": path.loss_errors,
                 "front": path.fronts,
                 **{key: (path.status == word).sum(axis=1) for key, word in WORDS.items()},
             },
@@ -50,9 +50,9 @@ def varied_tables(found: Varied, contact: Contact) -> Iterator[tuple[str, Column
                 "point": np.repeat(np.arange(m), n),
                 "x": np.tile(x, m),
                 "y": np.tile(y, m),
-                "load": path.normal_loads.ravel(),
-                "force": path.forces.ravel(),
-                "force_error": path.force_errors.ravel(),
+                "load": path.asperity_loads.ravel(),
+                "force": path.asperity_forces.ravel(),
+                "force_error": path.asperity_force_errors.ravel(),
                 "displacement": path.asperity_displacements.ravel(),
                 "drift": path.drifts.ravel(),
                 "status": path.status.ravel(),
@@ -67,8 +67,8 @@ def varied_tables(found: Varied, contact: Contact) -> Iterator[tuple[str, Column
             {
                 "phase": losses.phases,
                 "factor": losses.factors,
-                "energy": losses.energy,
-                "energy_error": losses.energy_errors,
+                "loss": losses.losses,
+                "loss_error": losses.loss_errors,
                 "smooth": losses.smooth,
                 "level": losses.levels,
                 "sliding": losses.sliding,
@@ -94,11 +94,11 @@ def varied_summary(found: Varied) -> dict[str, Any]:
     if (path := found.path) is not None:
         numbers = {
             "load": path.loads,
-            "force": path.applied,
+            "force": path.forces,
             "displacement": path.displacements,
             "displacement_error": path.displacement_errors,
-            "energy": path.energy,
-            "energy_error": path.energy_errors,
+            "loss": path.losses,
+            "loss_error": path.loss_errors,
             **{key: (path.status == word).sum(axis=1) for key, word in WORDS.items()},
         }
         summary["path"] = {key: each.tolist() for key, each in numbers.items()} | {
@@ -110,9 +110,9 @@ def varied_summary(found: Varied) -> dict[str, Any]:
         summary["steady"] = {
             "level": closed.level,
             "force_level": closed.force_level,
-            "energy": closed.energy,
-            "energy_error": closed.energy_error,
-            "energy_first": closed.energy_first,
+            "loss": closed.loss,
+            "loss_error": closed.loss_error,
+            "loss_first": closed.loss_first,
             **{key: int((closed.status == word).sum()) for key, word in WORDS.items()},
             "order": closed.order,
             "presses": closed.presses,
@@ -121,7 +121,7 @@ def varied_summary(found: Varied) -> dict[str, Any]:
         summary["phase_losses"] = {
             "phase": losses.phases.tolist(),
             "factor": losses.factors.tolist(),
-            "energy": losses.energy.tolist(),
+            "loss": losses.losses.tolist(),
             "smooth": losses.smooth.tolist(),
             "order": losses.order,
         }

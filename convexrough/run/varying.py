@@ -9,10 +9,10 @@ from typing import NamedTuple
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.paths.path import LoadPath, load_path
-from convexrough.paths.phases import PhaseLosses, phase_losses
-from convexrough.paths.shakedown import Shakedown, Theory, shakedown
-from convexrough.paths.steady import Steady, steady
+from convexrough.friction.cycle import Cycle, steady
+from convexrough.friction.path import LoadPath, load_path
+from convexrough.friction.phases import PhaseLosses, phase_losses
+from convexrough.melan.shakedown import Shakedown, Theory, shakedown
 from convexrough.progress import Announce
 
 
@@ -49,7 +49,7 @@ class Varied(NamedTuple):
     """What was found; None where it was not asked for."""
 
     path: LoadPath | None = None
-    steady: Steady | None = None
+    steady: Cycle | None = None
     phase_losses: PhaseLosses | None = None
     shakedown: Shakedown | None = None
 

@@ -5,26 +5,28 @@ from __future__ import annotations
 import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Indices
+from convexrough.compare import listed
+from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
-from convexrough.run.claims import NOISE, power_of_ten, rounded_up
 from convexrough.run.columns import aligned
+from convexrough.run.plausibility import described_modulus
 from convexrough.run.results import beside, write_figures, write_tables
-from convexrough.run.scene_file import UnitNames
 from convexrough.run.summary import Summary, certificate_summary, to_json
 from convexrough.run.verification import Verified
 from convexrough.scene.scene import Scene
-from convexrough.shearing.verdict import ShearVerdict
+from convexrough.tabular.units import UnitNames
+
+#: From this part on errors are said in per cent.
+PERCENT = 1e-4
 
 #: Asperities that a list on the terminal names before it says how many more there are.
 MOST_LISTED = 10
-
-#: How a force is called that is 10 to this power too large.
-PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
 
 def verdict_summary(found: Verified) -> Summary:
@@ -82,16 +84,40 @@ def _columns(claim: Claim, name: str, claimed: NDArray[np.str_]) -> dict[str, ND
 
 def describe_verdict(found: Verified, units: UnitNames) -> list[str]:
     """Aligned lines: of each claim the wrong set, undecided, off, and the total, in this order."""
-    lines = list(found.notes)
+    lines = [*found.notes, *describe_scene(found.verdict.scene, units)]
     for name, claim in found.claims:
         lines += ["", *_describe(claim, found.verdict.scene, name, units)]
     return lines
 
 
+def describe_scene(scene: Scene, units: UnitNames) -> list[str]:
+    """What loads are held against."""
+    modulus = described_modulus(scene.material.contact_modulus, units)
+    return [_line("geometry", scene.geometry), _line("contact modulus", modulus)]
+
+
+def _kind(claim: Claim) -> str:
+    return "shear forces" if isinstance(claim, ShearVerdict) else "loads"
+
+
+def _proved(claim: Claim) -> str:
+    """What is proved of a claim, in a line."""
+    what = "words of all" if isinstance(claim, ShearVerdict) else "active set"
+    if len(claim.wrongly_claimed):
+        return f"{what} wrong"
+    if len(claim.undecided):
+        return f"{what} not proved"
+    size = f"{_bound(100 * claim.error)} %" if claim.error > PERCENT else _bound(claim.error)
+    asked = "" if claim.within is not None else ", no tolerance asked"
+    near = f"{_kind(claim)} {'only ' if asked else ''}to {size} of the largest{asked}"
+    if not claim.near_enough:
+        near += ", not near enough"
+    return f"{what} proved; {near}{'' if claim.total_holds else '; total off'}"
+
+
 def _describe(claim: Claim, scene: Scene, name: str, units: UnitNames) -> list[str]:
     table = _Listing(claim, scene, name, units)
-    kind = "shear forces" if isinstance(claim, ShearVerdict) else "loads"
-    lines = [_line(kind, f"the claim {'holds' if claim.holds else 'does not hold'}")]
+    lines = [_line(_kind(claim), _proved(claim))]
     lines.append(_line("wrong set", str(len(claim.wrongly_claimed) or "none")))
     for what, who in claim.wrong.items():
         if len(who):
@@ -103,29 +129,6 @@ def _describe(claim: Claim, scene: Scene, name: str, units: UnitNames) -> list[s
     if len(claim.suspects):
         lines += [_line("suspects", "likeliest first"), *table.of(claim.suspects)]
     return lines
-
-
-def hints(verified: Verified, units: UnitNames) -> list[str]:
-    """What a wrong verdict may come from."""
-    found, verdict, unit = [], verified.verdict, verified.unit
-    if unit and units.force and unit != units.force:
-        found.append(f"the file has {unit}, the scene {units.force}; nothing is converted")
-    wrong = verdict.wrongly_loaded
-    small = verdict.loads[wrong]
-    if len(small) and 0 < (noise := float(small.max())) <= NOISE * verdict.largest:
-        part = f"{noise:.2g}, {noise / verdict.largest:.1g} of the largest"
-        advice = f"--floor {rounded_up(noise)} counts them as open"
-        found.append(
-            f"{len(small):,} of the loads, on asperities proved open, are at most {part}: {advice}"
-        )
-    expected = verdict.total_prescribed
-    if expected is None and verdict.solution is not None:
-        expected = verdict.solution.load
-    if expected and (power := power_of_ten(verdict.total_given / expected)):
-        named = units.force or "N"
-        example = f", as {PREFIXES[power]}{named} for {named}" if power in PREFIXES else ""
-        found.append(f"the loads are 10^{power} times what they should be: another unit{example}?")
-    return found
 
 
 def reason(found: Verified) -> str:
@@ -155,6 +158,41 @@ def write_verdict(folder: Path, summary: Summary, found: Verified, units: UnitNa
     with beside(path) as temporary:
         temporary.write_text(to_json(summary) + "\n", encoding="utf-8")
     return [path, *written]
+
+
+def write_junit(path: Path, found: Verified) -> None:
+    """Write the findings as a suite of JUnit's, a case for each question."""
+    suite = ElementTree.Element("testsuite", name="convexrough verify")
+    failures = 0
+    for _, claim in found.claims:
+        set_wrong = {what: who for what, who in claim.wrong.items() if len(who)}
+        asked: dict[str, str] = {
+            "active set" if claim is found.verdict else "words": "; ".join(
+                f"{what}: {_named(claim, found.verdict.scene, who)}"
+                for what, who in set_wrong.items()
+            ),
+            "undecided": _named(claim, found.verdict.scene, claim.undecided),
+            "off": "" if claim.near_enough else _off(claim),
+            "total": "" if claim.total_holds else _total(claim, ""),
+        }
+        for name, wrong in asked.items():
+            case = ElementTree.SubElement(
+                suite, "testcase", classname="convexrough.verify", name=f"{_kind(claim)}: {name}"
+            )
+            if wrong:
+                failures += 1
+                ElementTree.SubElement(case, "failure", message=name).text = wrong
+    suite.set("tests", str(len(suite)))
+    suite.set("failures", str(failures))
+    root = ElementTree.Element("testsuites")
+    root.append(suite)
+    with beside(path) as temporary:
+        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+
+
+def _named(claim: Claim, scene: Scene, which: Indices) -> str:
+    points = scene.asperities.positions
+    return listed(f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g})" for i in which)
 
 
 class _Listing:

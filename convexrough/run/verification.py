@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +12,11 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.contact import Contact, solve
 from convexrough.errors import InputError, TableError
+from convexrough.friction.verdict import ShearVerdict, claims_sliding, verify_shear
 from convexrough.normal.claims import Claim
 from convexrough.normal.problem import NormalProblem
-from convexrough.run.claims import Claimed, read_loads, read_shear_forces
+from convexrough.run.claims import PLAIN, Claimed, Manner, read_loads, read_shear_forces
 from convexrough.run.scene_file import SceneFile
-from convexrough.shearing.verdict import ShearVerdict, claims_sliding, verify_shear
 from convexrough.verdict import Verdict, verify_on
 
 #: What a file may call an asperity under shear. "undecided" claims nothing: then the force does.
@@ -28,27 +27,25 @@ WORDS = ("sliding", "partial", "sticking", "open", "undecided")
 class Question:
     """What is asked of a file of loads, and how it is to be read.
 
-    within    : parts of the largest load, or shear force;  floor : [force];  tolerance : [length]
-    columns   : what columns are called in the files
+    within    : parts of the largest load, or shear force;  floor : [force]
     shear, force : a file of shear forces and what they carry [force]; both or neither
     """
 
     within: float | None = None
     floor: float = 0.0
-    tolerance: float | None = None
-    columns: Mapping[str, str] = field(default_factory=dict)
+    how: Manner = PLAIN
     shear: Path | None = None
     force: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("within", "tolerance"):
-            if (value := getattr(self, name)) is not None:
+        for name, value in (("within", self.within), ("tolerance", self.how.tolerance)):
+            if value is not None:
                 checks.positive(f"--{name}", value)
         checks.non_negative("--floor", self.floor)
 
 
 class Verified(NamedTuple):
-    """The verdicts on the claims of files; `notes` say how these were read, `unit` what loads have.
+    """The verdicts on the claims of files; `notes` say how these were read.
 
     sheared : on shear forces, None without these
     """
@@ -56,7 +53,6 @@ class Verified(NamedTuple):
     verdict: Verdict
     sheared: ShearVerdict | None
     notes: list[str]
-    unit: str
 
     @property
     def claims(self) -> list[tuple[str, Claim]]:
@@ -69,25 +65,18 @@ class Verified(NamedTuple):
         return all(claim.holds for _, claim in self.claims)
 
 
-def named_columns(columns: Sequence[str]) -> dict[str, str]:
-    """What columns are called, of NAME=COLUMN each."""
-    called = {}
-    for each in columns:
-        name, _, column = each.partition("=")
-        if name not in ("load", "x", "y", "force", "status") or not column:
-            expected = "NAME=COLUMN, where NAME is load, x, y, force or status"
-            raise InputError("--column", found=each, expected=expected)
-        called[name] = column
-    return called
+def read_files(file: SceneFile, loads: Path, question: Question) -> tuple[Claimed, Claimed | None]:
+    """What files claim, loads and shear forces, in the scene's units."""
+    how = replace(question.how, units=file.units, convert=file.convert)
+    given = read_loads(loads, file.scene, how, question.floor)
+    if question.shear is None:
+        return given, None
+    return given, read_shear_forces(question.shear, file.scene, how)
 
 
 def verify_files(file: SceneFile, loads: Path, question: Question) -> Verified:
     """Judge the claims of files. Errors of reading and judging them name the file."""
-    asked: Any = dict(columns=question.columns, tolerance=question.tolerance)
-    given = read_loads(loads, file.scene, floor=question.floor, **asked)
-    forces = None
-    if question.shear is not None:
-        forces = read_shear_forces(question.shear, file.scene, **asked)
+    given, forces = read_files(file, loads, question)
     try:
         problem = file.problem()
     except InputError as error:
@@ -97,9 +86,9 @@ def verify_files(file: SceneFile, loads: Path, question: Question) -> Verified:
     except InputError as error:
         raise error.within(str(loads)) from error
     if forces is None:
-        return Verified(verdict, None, given.notes, given.unit)
+        return Verified(verdict, None, [given.note])
     sheared = _sheared(problem, verdict, forces, question)
-    return Verified(verdict, sheared, given.notes + forces.notes, given.unit)
+    return Verified(verdict, sheared, [given.note, forces.note])
 
 
 def _sheared(

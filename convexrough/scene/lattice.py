@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -34,11 +35,27 @@ class Lattice(Keeper):
 
     basis   : (2, 2) [length] rows b1 and b2, reduced to rounding
     blur    : [length] bound on how far each coordinate of the points it was found from is off
+    shrink  : by which it is smaller than one whose basis float64 holds exactly, `unshrunk`
     """
 
     origin: Array
     basis: Array
     blur: float
+    shrink: Fraction = Fraction(1)
+    unshrunk: Array | None = None
+
+    def shrunk(self, factor: Fraction) -> Lattice:
+        """Of points nearer to 0 by a factor, also where they are rounded a few times."""
+        assert self.unshrunk is None
+        times = float(factor)
+        blur = 2.0 * times * self.blur
+        return Lattice(times * self.origin, times * self.basis, blur, factor, self.basis)
+
+    @property
+    def exactly(self) -> list[list[Fraction]]:
+        """`basis`, not rounded."""
+        given = self.basis if self.unshrunk is None else self.unshrunk
+        return [[self.shrink * Fraction(x) for x in row] for row in given.tolist()]
 
     @property
     def spacing(self) -> float:

@@ -10,12 +10,14 @@ from convexrough.errors import InputError
 
 @dataclass(frozen=True, init=False)
 class Material:
-    """Two elastically similar bodies.
+    """Both bodies: two like ones, or by `pair` two that differ.
 
-    contact_modulus : E* = E / (2 (1 - nu^2))  [force / length^2]
-    poisson_ratio   : nu, from 0 to 0.5
+    contact_modulus : E*, 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2  [force / length^2]
+    poisson_ratio   : nu, from 0 to 0.5; of a pair the mean, weighted with 1 / G
     hardness        : the mean pressure at which asperities yield [force / length^2], if known:
         nothing is computed from it, a contact beyond it is warned of
+    mismatch        : Dundurs' beta of a pair, 0 of like bodies: the coupling of pressing to shear,
+        which is neglected
 
     >>> steel = cr.Material.from_youngs(210e9, 0.3)
     >>> print(f"{steel.contact_modulus:.4g}")
@@ -25,6 +27,7 @@ class Material:
     contact_modulus: float
     poisson_ratio: float
     hardness: float | None
+    mismatch: float
 
     def __init__(
         self,
@@ -32,6 +35,7 @@ class Material:
         poisson_ratio: float | None = None,
         hardness: float | None = None,
         *,
+        mismatch: float = 0.0,
         youngs_modulus: None = None,
     ) -> None:
         if youngs_modulus is not None:
@@ -41,6 +45,7 @@ class Material:
             ("contact_modulus", checks.positive("contact_modulus", contact_modulus)),
             ("poisson_ratio", checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5)),
             ("hardness", None if hardness is None else checks.positive("hardness", hardness)),
+            ("mismatch", checks.between("mismatch", mismatch, -0.5, 0.5)),
         ):
             object.__setattr__(self, name, value)
 
@@ -53,12 +58,41 @@ class Material:
         ratio = checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5)
         return cls(modulus / (2.0 * (1.0 - ratio**2)), ratio, hardness)
 
+    @classmethod
+    def pair(cls, sphere: Material, base: Material) -> Material:
+        """Two bodies, each given as for two of its kind; the hardness is that of the softer.
+
+        Normal and tangential compliances, of asperities and between them, are those of two like
+        bodies with 2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, but for the
+        coupling of the two by Dundurs' beta (docs/theory/two-bodies.md).
+
+        >>> steel = cr.Material.from_youngs(210e9, 0.3)
+        >>> both = cr.Material.pair(steel, base=cr.Material.from_youngs(70e9, 0.33))
+        >>> print(f"{both.contact_modulus:.4g} {both.poisson_ratio:.4g} {both.mismatch:.3f}")
+        5.861e+10 0.3226 -0.117
+        """
+        for what, body in (("sphere", sphere), ("base", base)):
+            checks.instance(what, body, Material)
+            if body.mismatch:
+                raise InputError(what, found="a pair", expected="one body, as from_youngs makes it")
+        (G, nu), (H, mu) = ((each.shear_modulus, each.poisson_ratio) for each in (sphere, base))
+        softer = [body.hardness for body in (sphere, base) if body.hardness is not None]
+        modulus, other = sphere.contact_modulus, base.contact_modulus
+        part = G / (G + H)  # of 1 / H in 1 / G + 1 / H
+        coupled = ((1.0 - part) * (1.0 - 2.0 * nu) - part * (1.0 - 2.0 * mu)) / 2.0
+        return cls(
+            modulus * (2.0 * other / (modulus + other)),  # exact where both are the same
+            nu + part * (mu - nu),
+            min(softer, default=None),
+            mismatch=coupled / ((1.0 - part) * (1.0 - nu) + part * (1.0 - mu)),
+        )
+
     @property
     def youngs_modulus(self) -> float:
-        """E = 2 (1 - nu^2) E*  [force / length^2]."""
+        """E = 2 (1 - nu^2) E*, of two like bodies in its place  [force / length^2]."""
         return 2.0 * (1.0 - self.poisson_ratio**2) * self.contact_modulus
 
     @property
     def shear_modulus(self) -> float:
-        """G = E / (2 (1 + nu)) = (1 - nu) E*  [force / length^2]."""
+        """G = E / (2 (1 + nu)) = (1 - nu) E*, 2 / G = 1 / G_1 + 1 / G_2  [force / length^2]."""
         return (1.0 - self.poisson_ratio) * self.contact_modulus

@@ -1,17 +1,20 @@
-"""What is pressed on what: a sphere on asperities. No loads, no solving."""
+"""What is pressed on what: a sphere, or another base, on asperities. No loads, no solving."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from convexrough import checks
-from convexrough.arrays import Array, evenly, frozen
+from convexrough.arrays import Array, even, evenly, frozen
 from convexrough.errors import InputError
+from convexrough.numbers.pairs import Pair, two_sum
 from convexrough.record import Record
+from convexrough.scene import base
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.layout import MANY
@@ -25,10 +28,11 @@ Geometry = Literal["summit", "closest"]
 class Scene(Record):
     """A sphere, the asperities it is pressed on, and what both are made of.
 
-    sphere_radius : R [length]
+    sphere_radius : R [length]; inf of a flat base, a pair (Rx, Ry) of an ellipsoid whose axes are
+                    those of x and y, of which one is inf for a cylinder
     friction      : Coulomb's coefficient f; only the shear stages need it
-    geometry      : "summit" (the source paper: an asperity meets the sphere at its summit) or
-                    "closest" (it meets it where the two undeformed paraboloids are closest)
+    geometry      : "closest" (an asperity meets the sphere where the two undeformed paraboloids
+                    are closest) or "summit" (at its summit, as in the source paper)
 
     >>> asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     >>> material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
@@ -37,17 +41,16 @@ class Scene(Record):
     61
     """
 
-    sphere_radius: float
+    sphere_radius: base.Radius
     asperities: Asperities
     material: Material
     friction: float | None = None
-    geometry: Geometry = "summit"
+    geometry: Geometry = "closest"
 
     def __post_init__(self) -> None:
         checks.instance("asperities", self.asperities, Asperities)
         checks.instance("material", self.material, Material)
-        radius = checks.positive("sphere_radius", self.sphere_radius)
-        object.__setattr__(self, "sphere_radius", radius)
+        object.__setattr__(self, "sphere_radius", base.checked(self.sphere_radius))
         if self.friction is not None:
             object.__setattr__(self, "friction", checks.positive("friction", self.friction))
         if not isinstance(self.geometry, str) or self.geometry not in ("summit", "closest"):
@@ -60,12 +63,29 @@ class Scene(Record):
     def __len__(self) -> int:
         return len(self.asperities)
 
+    @property
+    def curved(self) -> list[tuple[float, slice]]:
+        """Each finite radius of the base [length], and the axes (0 is x) along which it is that."""
+        return base.curved(self.sphere_radius)
+
+    @property
+    def curvature(self) -> float:
+        """[1 / length] of the base: 1/R, or the mean (1/Rx + 1/Ry) / 2."""
+        Rx, Ry = base.along(self.sphere_radius)
+        return (1.0 / Rx + 1.0 / Ry) / 2.0
+
+    @property
+    def mean_radius(self) -> float:
+        """[length] of the sphere that curves as the base does, on average; inf where it is flat."""
+        R = self.sphere_radius
+        return 1.0 / self.curvature if isinstance(R, tuple) else R
+
     @cached_property
     def relative_radii(self) -> Array:
-        """(n,) [length]  1/R_i = 1/R + 1/rho_i."""
+        """(n,) [length]  1/R_i = 1/R + 1/rho_i, with the mean `curvature` for 1/R."""
 
         def relative(rho: Array) -> Array:
-            return frozen(1.0 / (1.0 / self.sphere_radius + 1.0 / rho))
+            return frozen(1.0 / (self.curvature + 1.0 / rho))
 
         return evenly(relative, self.asperities.tip_radii)
 
@@ -73,37 +93,67 @@ class Scene(Record):
     def contact_points(self) -> Array:
         """(n, 2) [length] where each asperity would first touch.
 
-        The summit itself, or in the "closest" geometry r_i R / (R + rho_i).
+        The summit itself, or in the "closest" geometry r_i R / (R + rho_i), along each axis.
+        """
+        if self.geometry == "summit" or not self.curved:
+            return self.asperities.positions
+        points = self.asperities.positions.copy()
+        for R, axes in self.curved:
+            points[:, axes] *= (R / self.far_radii(R))[:, None]
+        return frozen(points)
+
+    def far_radii(self, radius: float) -> Array:
+        """(n,) [length] for a radius of the base: R, or R + rho_i in the "closest" geometry."""
+        if self.geometry == "summit":
+            return even(radius, len(self))
+        return frozen(radius + self.asperities.tip_radii)
+
+    @cached_property
+    def contact_tails(self) -> Array | None:
+        """(n, 2) [length] what `contact_points` lack; with it they are known as pairs, to 2^-96.
+
+        None where they lack nothing.
         """
         points = self.asperities.positions
-        if self.geometry == "summit":
-            return points
-        shrink = self.sphere_radius / (self.sphere_radius + self.asperities.tip_radii)
-        return frozen(points * shrink[:, None])
+        if self.contact_points is points:
+            return None
+        tails = np.zeros_like(points)
+        for radius, axes in self.curved:
+            share = Pair.exact(radius) / Pair(*two_sum(radius, self.asperities.tip_radii))
+            for axis in np.arange(2)[axes]:
+                exactly = Pair.exact(points[:, axis]) * share
+                tails[:, axis] = (exactly - Pair.exact(self.contact_points[:, axis])).high
+        return frozen(tails)
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """What the contact points lie on, if that is a lattice."""
-        if self.geometry == "summit":
-            return self.asperities.lattice
-        return Lattice.through(self.contact_points)
+        """What the contact points lie on, if that is the lattice of the summits, shrunk or not."""
+        lattice, radii = self.asperities.lattice, self.asperities.tip_radii
+        if self.contact_points is self.asperities.positions or lattice is None:
+            return lattice
+        if (radii != radii[0]).any() or not isinstance(self.sphere_radius, float):
+            return None
+        radius = Fraction(self.sphere_radius)
+        return lattice.shrunk(radius / (radius + Fraction(float(radii[0]))))
 
     @property
     def point_error(self) -> float:
         """[length] bound on the rounding error of each coordinate of `contact_points`."""
-        if self.geometry == "summit":
+        if self.contact_points is self.asperities.positions:
             return 0.0
         return 3 * 2.0**-53 * float(np.abs(self.contact_points).max())
 
     @property
     def drops(self) -> Array:
-        """(n,) [length] how much further away the sphere's surface is than on the axis.
+        """(n,) [length] how much further away the base is than on the axis.
 
-        r_i^2 / (2 R), or in the "closest" geometry r_i^2 / (2 (R + rho_i)).
+        r_i^2 / (2 R), or in the "closest" geometry r_i^2 / (2 (R + rho_i)); x and y with a radius
+        each where the base has two.
         """
-        x, y = self.asperities.positions.T
-        further = self.asperities.tip_radii if self.geometry == "closest" else 0.0
-        return frozen((x * x + y * y) / (2.0 * (self.sphere_radius + further)))
+        squares, drops = self.asperities.positions**2, np.zeros(len(self))
+        for R, axes in self.curved:
+            drops += squares[:, axes].sum(axis=1) / (2.0 * self.far_radii(R))
+        return frozen(drops)
 
     @property
     def offsets(self) -> Array:
@@ -118,7 +168,8 @@ class Scene(Record):
     def reach(self, approach: float) -> float:
         """Distance from the axis beyond which none of these asperities' kind could touch [length].
 
-        Where even the tallest height and the largest tip radius give a prescribed approach of 0.
+        Where even the tallest height and the largest tip radius give a prescribed approach of 0;
+        infinite on a flat base and on a cylinder.
         """
         return reach(
             approach,
@@ -130,8 +181,17 @@ class Scene(Record):
 
 
 def reach(
-    approach: float, *, sphere_radius: float, tip_radius: float, height: float, geometry: Geometry
+    approach: float,
+    *,
+    sphere_radius: base.Radius,
+    tip_radius: float,
+    height: float,
+    geometry: Geometry,
 ) -> float:
-    """Distance r at which D0 + z = r^2 / (2 R)  (closest: r^2 / (2 (R + rho)))  [length]."""
-    radius = sphere_radius + (tip_radius if geometry == "closest" else 0.0)
-    return float(np.sqrt(2.0 * radius * max(approach + height, 0.0)))
+    """Distance r at which D0 + z = r^2 / (2 R)  (closest: r^2 / (2 (R + rho)))  [length].
+
+    With the larger R where there are two.
+    """
+    radius = max(base.along(sphere_radius)) + (tip_radius if geometry == "closest" else 0.0)
+    depth = approach + height
+    return float(np.sqrt(2.0 * radius * depth)) if depth > 0 else 0.0

@@ -105,7 +105,7 @@ class BristleQP:
             last = newton_step(problem, loads)
             loads, approach = last.loads, last.approach
             iterations += last.iterations
-        return Solution.of(problem, loads, approach, iterations)
+        return Solution.of(problem, loads, approach, iterations, refine=self.newton_step)
 
     def _run(self, program: QuadraticProgram) -> RawAnswer:
         return run_osqp(program, self.name, self.tolerance, self.max_iterations)

@@ -207,7 +207,7 @@ def judged(solver: ConeSolver, problem: NormalProblem, boxes: Boxes, answer: Ans
             advice="try newton_step=True or more iterations",
             iterate=loads,
         )
-    return Solution.of(problem, loads, approach, answer.iterations)
+    return Solution.of(problem, loads, approach, answer.iterations, refine=False)
 
 
 def _pressed_on(problem: NormalProblem, boxes: Boxes, loads: Array, indentation: Array) -> Array:

@@ -61,7 +61,9 @@ def _mean_field(problem: NormalProblem) -> Array:
 
     offsets, coefficients = problem.offsets[::every], problem.coefficients[::every]
     approach = problem.ceiling
-    w = hertz.surface_displacement(middle, *_smooth_contact(problem)) / problem.units.length
+    w = np.zeros(count)
+    if problem.scene.curved:
+        w = hertz.surface_displacement(middle, *_smooth_contact(problem)) / problem.units.length
     for _ in range(30):
         indentation = approach + offsets - rings.between(w)
         loads = hertz.load(indentation, coefficients)
@@ -117,7 +119,7 @@ class _Rings:
 def _smooth_contact(problem: NormalProblem) -> tuple[float, float]:
     """Contact radius and radius of a smooth sphere at the approach, or under the load."""
     scene = problem.scene
-    radius, modulus = scene.sphere_radius, scene.material.contact_modulus
+    radius, modulus = scene.mean_radius, scene.material.contact_modulus
     if problem.load is None:
         approach = max(problem.ceiling, 0.0) * problem.units.length
         return float(np.sqrt(radius * approach)), radius

@@ -18,13 +18,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from convexrough.arrays import Array, Indices, among_zeros, frozen
+from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.residual import Displaced
+from convexrough.normal.refine import refined_loads
 from convexrough.progress import Announce
-from convexrough.solvers.pressing import LastStep, Pressed, Pressing, negligible, on_constraint
+from convexrough.solvers.pressing import Pressed, Pressing, negligible, on_constraint
 from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
@@ -38,7 +38,7 @@ ACCURATE = 1e-12
 
 #: Near the contact: with a gap of at most this part of the largest prescribed approach. Heuristic,
 #: as who is left out is looked at in the end.
-MARGIN = 0.1
+MARGIN = 0.03
 
 
 @dataclass(frozen=True)
@@ -75,21 +75,32 @@ class Newton:
             del indentation  # half of the memory of a large scene is vectors
             state, steps = self._iterate(problem, near, begin, announce)
             iterations += steps
-            if len(near) == len(problem) and state.displaced is None:
-                residual = problem.residual(state.forces, state.approach, state.displacement)
-                return Solution(state.forces, state.approach, iterations, residual)
+            if len(near) == len(problem):
+                return self._ended(problem, state.forces, state, iterations)
             # What do the others feel?
             loads, gap = _everywhere(problem, near, state)
             touched = gap < 0
             touched[near] = False
             if not touched.any():
-                least = np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0))
-                residual = float(least.max(initial=0.0))
-                return Solution(loads, state.approach, iterations, residual, state.displaced)
+                return self._ended(problem, loads, state, iterations)
             indentation = -gap
             indentation[near] = state.unknown
             touched[near] = True  # none leaves, so that this ends
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
+
+    def _ended(
+        self, problem: NormalProblem, loads: Array, state: Pressed, iterations: int
+    ) -> Solution:
+        """The answer; refined where the iteration ended as soon as what is left was linear."""
+        if self._refines(problem):
+            trial = refined_loads(problem, loads).frozen()
+            approach, residual = float(trial.approach.value), float(trial.excess.max())
+            return Solution(trial.loads.high, approach, iterations, residual, True, trial)
+        answer = Solution.of(problem, loads, state.approach, iterations)
+        return replace(answer, refine=not self.tolerance > 0)
+
+    def _refines(self, problem: NormalProblem) -> bool:
+        return problem.influence.sharp and not self.tolerance > 0
 
     def _iterate(
         self,
@@ -110,22 +121,9 @@ class Newton:
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
             state = law.evaluate(indentation)
-            if not problem.influence.sharp:
-                return newton.solve(law, state, stopping, tell=tell)
-            linear = replace(stopping, linear=negligible(indentation))
-            state, steps = newton.solve(law, state, linear, tell=tell)
-            if state.residual <= self.tolerance * state.scale:
-                return state, steps
-            base = Displaced.of(problem, frozen(among_zeros(state.forces, near, len(problem))))
-            if base is None:
-                state, more = newton.solve(law, state, stopping, tell=tell)
-            else:
-                last = LastStep(part, law.farthest, problem, near, base)
-                state = last.at(base)
-                state, more = newton.solve(
-                    last, state, stopping, before=last.before(state), tell=tell
-                )
-            return state, steps + more
+            if self._refines(problem):  # what is left then is linear
+                stopping = replace(stopping, linear=negligible(indentation))
+            return newton.solve(law, state, stopping, tell=tell)
         except SolverError as error:
             if error.iterate is not None:
                 error.iterate = among_zeros(error.iterate, near, len(problem))
@@ -153,7 +151,5 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
 
 def _everywhere(problem: NormalProblem, near: Indices, state: Pressed) -> tuple[Array, Array]:
     """Loads and gaps of all candidates where those that are not near carry nothing."""
-    if state.displaced is not None and state.gaps is not None:
-        return state.displaced.loads, state.gaps
     loads = among_zeros(state.forces, near, len(problem))
     return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)

@@ -1,7 +1,4 @@
-"""The law of contact for Newton's method, and its last step, in many more digits.
-
-docs/theory/newton.md, "The normal map", and docs/theory/last-step.md.
-"""
+"""The law of contact for Newton's method: docs/theory/newton.md, "The normal map"."""
 
 from __future__ import annotations
 
@@ -10,17 +7,15 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from convexrough.arrays import Array, Indices, among_zeros, frozen
+from convexrough.arrays import Array
 from convexrough.convex.newton_step import correct
 from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.residual import Displaced, Gaps, local_rounding, scaled_to
-from convexrough.roundoff import SAFETY
-from convexrough.sphere import hertz
+from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: A residual may be so many times what is not known of it, anyway, both in the 2-norm. A heuristic:
-#: bounds are less sharp by about as much.
-NEGLIGIBLE = 4.0
+#: Newton's method may end where a step leaves this part of the indentations: corrections by
+#: refinement leave its square. A heuristic.
+NEGLIGIBLE = 88 * ROUNDOFF
 
 
 class Pressed(NamedTuple):
@@ -33,8 +28,6 @@ class Pressed(NamedTuple):
     energy: float
     residual: float  # max |F|
     scale: float  # |D0| + max |d_i|
-    displaced: Displaced | None = None  # the loads of all candidates, and A P, where known so well
-    gaps: Array | None = None  # of all candidates
 
 
 @dataclass(frozen=True)
@@ -71,8 +64,6 @@ class Pressing:
         displacement: Array,
         gap: Array,
         approach: float,
-        displaced: Displaced | None = None,
-        gaps: Array | None = None,
     ) -> Pressed:
         energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
         if self.problem.load is not None:  # Phi has the gap less D0
@@ -91,8 +82,6 @@ class Pressing:
             energy,
             residual=float(np.abs(defect).max()),
             scale=abs(approach) + self.farthest,
-            displaced=displaced,
-            gaps=gaps,
         )
 
     def direction(self, state: Pressed, left: float) -> Array:
@@ -132,47 +121,9 @@ class Pressing:
         )
 
 
-@dataclass(frozen=True)
-class LastStep(Pressing):
-    """The same near loads of which A P is known to many digits: what is left is linear.
-
-    whole : the problem of all candidates;  near : which of these the other one is of
-    base  : the loads nearby
-    """
-
-    whole: NormalProblem
-    near: Indices
-    base: Displaced
-
-    def evaluate(self, unknown: Array) -> Pressed:
-        indentation = np.maximum(on_constraint(self.problem, unknown), 0.0)
-        loads = hertz.load(indentation, self.problem.coefficients)
-        everywhere = among_zeros(loads, self.near, len(self.whole))
-        if self.whole.load is not None:
-            everywhere = scaled_to(self.whole.load, everywhere)
-        return self.at(self.base.moved_to(frozen(everywhere)))
-
-    def at(self, displaced: Displaced) -> Pressed:
-        """The state of these loads."""
-        loads = displaced.loads[self.near]
-        weights = None if self.whole.load is None else np.cbrt(displaced.loads)
-        local, _, gaps, approach = Gaps.of(self.whole, displaced, weights)
-        moved, gap = displaced.product.high[self.near], gaps[self.near]
-        return self._pressed(local[self.near], loads, moved, gap, approach, displaced, gaps)
-
-    def before(self, state: Pressed) -> float:
-        """2-norm of a defect whose square would have left this one: so well is it to be solved."""
-        size, enough = float(np.linalg.norm(state.defect)), self.noise(state)
-        return size * float(np.sqrt(size / enough)) if size > enough > 0 else np.inf
-
-    def noise(self, state: Pressed) -> float:
-        """A part of the rounding that is left, which a certificate has to count anyway."""
-        return negligible(state.unknown)
-
-
 def negligible(indentation: Array) -> float:
     """2-norm of a defect that is small beside the rounding of the local term alone."""
-    return NEGLIGIBLE * float(np.linalg.norm(local_rounding(np.maximum(indentation, 0.0))))
+    return NEGLIGIBLE * float(np.linalg.norm(np.maximum(indentation, 0.0)))
 
 
 def on_constraint(problem: NormalProblem, indentation: Array) -> Array:

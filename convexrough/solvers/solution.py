@@ -9,7 +9,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.residual import Displaced
+from convexrough.normal.refine import Trial
 from convexrough.progress import Announce
 from convexrough.record import Record
 
@@ -18,22 +18,34 @@ from convexrough.record import Record
 class Solution(Record):
     """Loads of the candidates and the approach, in the problem's units.
 
-    residual  : problem.residual(loads, approach), recomputed from the loads
-    displaced : these loads and A times them to many digits, where the solver knows that: it saves
-        the certificate some work
+    residual : how far the contact law is from holding, as in `problem.residual`: with a trial, a
+        bound at the loads of all its digits, rounding counted; else recomputed in float64
+    refine   : whether the loads may be corrected to more digits; False where they are to be judged
+        as the solver left them
+    trial    : these loads to more digits, where the solver has them
     """
 
     loads: Array
     approach: float
     iterations: int
     residual: float
-    displaced: Displaced | None = None
+    refine: bool = True
+    trial: Trial | None = None
 
     @classmethod
-    def of(cls, problem: NormalProblem, loads: Array, approach: float, iterations: int) -> Solution:
+    def of(
+        cls,
+        problem: NormalProblem,
+        loads: Array,
+        approach: float,
+        iterations: int,
+        *,
+        refine: bool = True,
+    ) -> Solution:
         """With its residual from the problem, infinite where that is undefined."""
         residual = problem.residual(loads, approach)
-        return cls(loads, approach, iterations, np.inf if np.isnan(residual) else residual)
+        residual = np.inf if np.isnan(residual) else residual
+        return cls(loads, approach, iterations, residual, refine)
 
 
 class Solver(Protocol):

@@ -51,8 +51,10 @@ def _on_hertz_pressure(problem: NormalProblem) -> Array:
 
 
 def _smooth_radius(problem: NormalProblem) -> float:
-    """[length] a of a smooth sphere: at the approach, or under the load."""
-    radius, units = problem.scene.sphere_radius, problem.units
+    """[length] a of a smooth sphere: at the approach, or under the load; inf where it is flat."""
+    radius, units = problem.scene.mean_radius, problem.units
+    if radius == math.inf:
+        return radius
     if problem.load is None:
         return float(np.sqrt(radius * max(problem.ceiling, 0.0) * units.length)) or 1.0
     modulus = problem.scene.material.contact_modulus

@@ -19,7 +19,7 @@ LESS_SINE = tuple(1.0 / factorial(m) for m in range(19, 1, -2))
 
 def local_coefficient(contact_modulus: Number, radius: Number) -> Number:
     """k of the local law  indentation = k load^(2/3),  k = (9 / (16 E*^2 R))^(1/3)."""
-    return np.cbrt(9.0 / (16.0 * contact_modulus**2 * radius))
+    return _cube_root(9.0 / (16.0 * contact_modulus**2 * radius))
 
 
 def indentation(load: Number, coefficient: Number) -> Number:
@@ -35,7 +35,14 @@ def load(indentation: Number, coefficient: Number) -> Number:
 
 def contact_radius(load: Number, contact_modulus: Number, radius: Number) -> Number:
     """a = (3 P R / (4 E*))^(1/3)."""
-    return np.cbrt(3.0 * load * radius / (4.0 * contact_modulus))
+    return _cube_root(3.0 * load * radius / (4.0 * contact_modulus))
+
+
+def _cube_root(value: Number) -> Number:
+    """Of eight times a number it is twice as large to the last bit, on every machine."""
+    mantissa, exponent = np.frexp(value)
+    thirds, rest = np.divmod(exponent, 3)
+    return np.ldexp(np.cbrt(np.ldexp(mantissa, rest)), thirds)
 
 
 def peak_pressure(contact_radius: Number, contact_modulus: Number, radius: Number) -> Number:

@@ -10,6 +10,7 @@ gives one body's displacements and losses, where these are both bodies'.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,18 +22,32 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.record import Record
+from convexrough.scene import base
 from convexrough.scene.scene import Scene
-from convexrough.sphere import hertz, mindlin, surface_shear
+from convexrough.sphere import ellipse, hertz, mindlin, surface_shear
 
 
 def smooth(scene: Scene, *, load: float) -> SmoothSphere:
-    """The sphere of the scene, without asperities, under a normal load P [force].
+    """The base of the scene, without asperities, under a normal load P [force].
+
+    A `SmoothEllipsoid` where it is one. Raises InputError where it is flat or a cylinder, on which
+    no load makes a contact of finite size.
 
     >>> print(f"{cr.smooth(scene, load=contact.load).approach:.4g}")  # the rough one's is 5e-5
     4.184e-05
     """
     checks.instance("scene", scene, Scene)
-    return SmoothSphere(scene, checks.positive("load", load))
+    if (found := smooth_reference(scene, checks.positive("load", load))) is None:
+        expected = "a sphere or an ellipsoid: other bases have no smooth reference"
+        raise InputError("scene", found=base.named(scene.sphere_radius), expected=expected)
+    return found
+
+
+def smooth_reference(scene: Scene, load: float) -> SmoothSphere | None:
+    """`smooth`, or None where there is none."""
+    if isinstance(scene.sphere_radius, tuple):
+        return None if math.inf in scene.sphere_radius else SmoothEllipsoid(scene, load)
+    return SmoothSphere(scene, load) if scene.curved else None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,23 +67,26 @@ class SmoothSphere(Record):
     scene: Scene
     load: float
 
+    @property
+    def radius(self) -> float:
+        """R  [length]."""
+        return self.scene.mean_radius
+
     @cached_property
     def contact_radius(self) -> float:
         """a_H = (3 P R / (4 E*))^(1/3)  [length]."""
-        return float(hertz.contact_radius(self.load, self._modulus, self.scene.sphere_radius))
+        return float(hertz.contact_radius(self.load, self._modulus, self.radius))
 
     @cached_property
     def approach(self) -> float:
         """delta = a_H^2 / R, of two deep points, one in each body [length]."""
-        radius = self.scene.sphere_radius
-        coefficient = hertz.local_coefficient(self._modulus, radius)
+        coefficient = hertz.local_coefficient(self._modulus, self.radius)
         return float(hertz.indentation(self.load, coefficient))
 
     @cached_property
     def peak_pressure(self) -> float:
         """p0 = 2 E* a_H / (pi R)  [force / length^2]."""
-        radius = self.scene.sphere_radius
-        return float(hertz.peak_pressure(self.contact_radius, self._modulus, radius))
+        return float(hertz.peak_pressure(self.contact_radius, self._modulus, self.radius))
 
     def pressure(self, distance: ArrayLike) -> Any:
         """p(r) = p0 sqrt(1 - r^2 / a_H^2) at a distance from the axis [force / length^2]."""
@@ -76,8 +94,7 @@ class SmoothSphere(Record):
 
     def normal_displacement(self, distance: ArrayLike) -> Any:
         """Normal displacement of both surfaces at a distance from the axis [length]."""
-        radius = self.scene.sphere_radius
-        return hertz.surface_displacement(distance, self.contact_radius, radius)
+        return hertz.surface_displacement(distance, self.contact_radius, self.radius)
 
     @property
     def largest_force(self) -> float:
@@ -154,3 +171,49 @@ class SmoothSphere(Record):
         """t = Q / (f P), in [-1, 1]."""
         forces = checks.bearable(what, forces, self.largest_force)
         return np.clip(forces / self.largest_force, -1.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SmoothEllipsoid(SmoothSphere):
+    """A smooth ellipsoid: the same, where the circle of the ellipse's area stands for the ellipse.
+
+    A distance is s sqrt(a b) for a point at s^2 = x^2/a^2 + y^2/b^2, and the stick zone is an
+    ellipse of the same shape. Whatever is tangential rests on the papers' assumption, as that of a
+    rough contact does: c_t, the angular mean, for the ratio of compliances, exact at nu = 0.
+    The normal displacement outside is of spheres alone.
+
+    >>> oval = cr.Scene((1.0, 2.0), scene.asperities, scene.material)
+    >>> "{:.4g} {:.4g}".format(*cr.smooth(oval, load=contact.load).semi_axes)
+    '0.005728 0.009083'
+    """
+
+    _shown = ("semi_axes", "approach", "peak_pressure")
+
+    @property
+    def radius(self) -> float:
+        """Of the sphere with the same approach under every load, 9 P^2 / (16 E*^2 delta^3)."""
+        return 9.0 * self.load**2 / (16.0 * self._modulus**2 * self.approach**3)
+
+    @cached_property
+    def semi_axes(self) -> tuple[float, float]:
+        """Of the ellipse of contact, along x and along y [length]."""
+        return ellipse.semi_axes(self.load, self._modulus, base.along(self.scene.sphere_radius))
+
+    @cached_property
+    def contact_radius(self) -> float:
+        """sqrt(a b), of the circle of the same area [length]."""
+        return math.sqrt(math.prod(self.semi_axes))
+
+    @cached_property
+    def approach(self) -> float:
+        """Of two deep points, one in each body [length]."""
+        return ellipse.approach(self.load, self._modulus, self.semi_axes)
+
+    @cached_property
+    def peak_pressure(self) -> float:
+        """p0 = 3 P / (2 pi a b)  [force / length^2]."""
+        return 1.5 * self.load / (math.pi * math.prod(self.semi_axes))
+
+    def normal_displacement(self, distance: ArrayLike) -> Any:
+        """Not of an ellipsoid: raises InputError."""
+        base.sphere_radius(self.scene.sphere_radius, "normal_displacement")

@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough.arrays import Array, Indices
-from convexrough.errors import FileError, InputError
-from convexrough.text_table import SAMPLE, STYLES, Style, bare, lines_of, sniff, unit
+from convexrough.errors import InputError
+from convexrough.tabular.table import Reading, read_table
+from convexrough.tabular.text import SAMPLE, STYLES, WORKBOOKS, Style, lines_of, sniff, stripped
 
 #: What the third column of a list may be called.
-HEIGHTS = ("height", "z", "h")
+HEIGHTS = ("z", "h")
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
@@ -43,55 +44,46 @@ def read_grid(path: Path) -> Grid:
     """
     comments: list[str] = []
     body: list[tuple[int, str]] = []
-    for number, line in lines_of(path):
+    for number, line in () if path.suffix.lower() in WORKBOOKS else lines_of(path):
         text = line.strip()
         if text.startswith(("#", "%")) or (not body and _SAID.fullmatch(text)):
             comments.append(text)
         elif text:
             body.append((number, line.rstrip("\r\n")))
+            if len(body) == SAMPLE and _style(body) is None:
+                break
+    style = _style(body)
+    return _from_list(path) if style is None else _said(comments, _numbers(path, body, style))
+
+
+def _style(body: Sequence[tuple[int, str]]) -> Style | None:
+    """How the first lines of a matrix are written; None where they are of a list."""
     if not body:
-        raise FileError(f"{path}: empty")
+        return None
     style = sniff([line for _, line in body[:SAMPLE]], STYLES)
-    header = None
-    if any(cell and style.number(cell) is None for cell in style.split(body[0][1])):
-        header = style.split(body.pop(0)[1])
-    if not body:
-        raise FileError(f"{path}: no rows below the header")
-    cells = _numbers(path, body, style)
-    if header is not None or cells.shape[1] == 3:
-        return _from_list(path, header, cells)
-    return _said(comments, cells)
+    first = stripped(style.split(body[0][1]))
+    heads = any(cell and style.number(cell) is None for cell in first)
+    return None if heads or len(first) == 3 else style
 
 
 def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array:
-    """The cells of all lines; numpy reads what is plain, and what is not is read one by one."""
-    lines: Sequence[str] = [line for _, line in body]
-    if style.decimal == ",":
-        lines = [line.replace(",", ".") for line in lines]
-    separator = None if style.separator == " " else style.separator
-    try:
-        return np.loadtxt(lines, delimiter=separator, ndmin=2, dtype=np.float64)
-    except ValueError:
-        return _one_by_one(path, body, style)
-
-
-def _one_by_one(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array:
-    rows: list[list[float]] = []
+    """The cells of all lines; empty ones are holes."""
+    rows: list[Array] = []
     for number, line in body:
-        cells = style.split(line)
-        while cells and not cells[-1]:
-            cells.pop()  # of a separator at the end of the line
-        values = [float("nan") if not cell else style.number(cell) for cell in cells]
-        if None in values:
-            column = values.index(None)
-            where = f"{path}: row {number}, column {column + 1}"
-            raise InputError("height", found=repr(cells[column])[:60], expected="a number",
-                             where=where)  # fmt: skip
+        cells = [cell or "nan" for cell in stripped(style.split(line))]
+        if (values := style.numbers(cells)) is None:
+            found = [style.number(cell) for cell in cells]
+            if None in found:
+                column = found.index(None)
+                where = f"{path}: row {number}, column {column + 1}"
+                shown = repr(cells[column])[:60]
+                raise InputError("height", found=shown, expected="a number", where=where)
+            values = np.array(found, dtype=np.float64)
         if rows and len(values) != len(rows[0]):
             expected = f"{len(rows[0])}, as in the first row"
             where = f"{path}: row {number}"
             raise InputError("cells", found=len(values), expected=expected, where=where)
-        rows.append([value for value in values if value is not None])
+        rows.append(values)
     return np.array(rows)
 
 
@@ -111,21 +103,17 @@ def _said(comments: Sequence[str], heights: Array) -> Grid:
     return Grid(heights, (float(width) / columns, float(height) / rows), unit_x, value_unit)
 
 
-def _from_list(path: Path, header: Sequence[str] | None, cells: Array) -> Grid:
+def _from_list(path: Path) -> Grid:
     """Columns x, y and height on a full or holed grid, in any order of the rows."""
-    names = [bare(name).lower() for name in header or ("x", "y", "z")]
-    third = next((name for name in HEIGHTS if name in names), "")
-    if len(names) != cells.shape[1] or not {"x", "y"} <= set(names) or not third:
-        found = ", ".join(header or names)
-        expected = "columns x, y and height; or a matrix of numbers without a header"
-        raise InputError("columns", found=found[:60], expected=expected, where=str(path))
-    places = [names.index(name) for name in ("x", "y", third)]
-    x, y, z = cells[:, places].T
-    units = [unit(header[place]) if header else "" for place in places]
+    table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
+                       also={"height": HEIGHTS}, holes=("height",),
+                       how=Reading(alike=False))  # fmt: skip
+    x, y, z = (table.columns[name] for name in ("x", "y", "height"))
+    units = [table.units.get(name, "") for name in ("x", "y", "height")]
     if units[0] != units[1]:
         found = f"{units[0] or 'none'} and {units[1] or 'none'}"
         raise InputError("units", found=found, expected="one along x and y", where=str(path))
-    (column, dx), (row, dy) = _steps(path, "x", x), _steps(path, "y", y)
+    (column, dx), (row, dy) = steps(path, "x", x), steps(path, "y", y)
     heights = np.full((int(row.max()) + 1, int(column.max()) + 1), np.nan)
     if heights.size > 4 * len(z) + 100:
         found = f"{len(z):,} points of a grid of {heights.size:,}"
@@ -136,7 +124,7 @@ def _from_list(path: Path, header: Sequence[str] | None, cells: Array) -> Grid:
     return Grid(heights, (dx, dy), units[0], units[2])
 
 
-def _steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:
+def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:
     """Which line of a grid each value is on, and how far apart these are."""
     levels = np.unique(values)
     apart = np.diff(levels)

@@ -26,7 +26,7 @@ def read_instrument(
             from SurfaceTopography import open_topography
             from SurfaceTopography.Exceptions import ReadFileError
     except ImportError as error:
-        advice = "needs SurfaceTopography: pip install 'convexrough[surface]'"
+        advice = "needs SurfaceTopography: pip install SurfaceTopography"
         raise FileError(f"{path}: {advice}") from error
     path.open("rb").close()  # so that a missing file is named as everywhere
     try:

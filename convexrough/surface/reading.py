@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.errors import FileError, InputError
+from convexrough.errors import InputError
 from convexrough.surface.detrend import Trend
 from convexrough.surface.grid import Grid, read_grid
 from convexrough.surface.holes import filled
-from convexrough.surface.length_units import factor, one_unit
 from convexrough.surface.surface import Surface, checked_pixel
+from convexrough.tabular.arrays import named_arrays, reading
+from convexrough.tabular.text import WORKBOOKS
+from convexrough.tabular.units import one_unit
 
 #: Names of files that are text.
-TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz")
+TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 
 #: What the heights are called in an .npz with several arrays.
 HEIGHTS = ("heights", "height", "z")
@@ -78,14 +79,14 @@ def _surface(
     length = one_unit("unit", unit, grid.unit)
     upwards = one_unit("height_unit", height_unit, grid.height_unit)
     if upwards and not length:
-        raise InputError(
-            "unit", found="none", expected=f"that of a pixel, as heights are {upwards}"
-        )
+        expected = f"that of a pixel, as heights are {upwards.name}"
+        raise InputError("unit", found="none", expected=expected)
     heights, holes = _mended(grid.heights, fill)
-    if upwards:
-        heights = heights * factor(upwards, length)
+    if upwards and length:
+        heights = heights * upwards.into(length)
     size = _pixel(grid.pixel, pixel)
-    surface = Surface(heights, size, length, filled=holes, source=str(path))
+    name = length.name if length else ""
+    surface = Surface(heights, size, name, filled=holes, source=str(path))
     if not upwards and not SLOPES[0] <= surface.rms_slope <= SLOPES[1]:
         found = f"rms slope {surface.rms_slope:.3g}"
         expected = f"{SLOPES[0]:g} to {SLOPES[1]:g}; if heights have another unit, give height_unit"
@@ -126,32 +127,21 @@ def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
 def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | None) -> Grid:
     """What is in a file, by its kind."""
     kind = path.suffix.lower()
-    try:
+    with reading(path):
         if kind in TEXT:
             return read_grid(path)
-        if kind in (".npy", ".npz"):
+        if kind in (".npy", ".npz", ".mat"):
             return _arrays(path)
         from convexrough.surface.instruments import read_instrument  # heavy: only when asked
 
         return read_instrument(path, pixel, unit)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except UnicodeError as error:
-        raise FileError(f"{path}: not text: {error}") from error
-    except (ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        if isinstance(error, InputError):
-            raise
-        raise FileError(f"{path}: not an {kind} file: {error}") from error
 
 
 def _arrays(path: Path) -> Grid:
-    """The map of a .npy or .npz file."""
-    with path.open("rb") as raw:
-        loaded = np.load(raw, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            return Grid(_numbers(loaded))
-        with loaded:
-            named = {name: np.asarray(loaded[name]) for name in loaded.files}
+    """The map of a file of arrays."""
+    named = {name: np.asarray(values) for name, values in named_arrays(path).items()}
+    if "" in named:
+        return Grid(_numbers(named[""]))
     maps = [name for name, values in named.items() if values.ndim == 2]
     chosen = next((name for name in HEIGHTS if name in named), maps[0] if len(maps) == 1 else None)
     if chosen is None:

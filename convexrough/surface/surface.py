@@ -15,9 +15,9 @@ from convexrough.errors import InputError
 from convexrough.record import Record
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
 from convexrough.surface.hills import Hills, hills
-from convexrough.surface.length_units import factor, known_unit
 from convexrough.surface.moments import Moments, moments_of
 from convexrough.surface.summits import Origin, Summits, find_summits
+from convexrough.tabular.units import known_unit
 
 #: Pixels longer than wide by more than this show no summits: eight neighbours are none.
 MOST_ASPECT = 10.0
@@ -124,18 +124,18 @@ class Surface(Record, Drawn):
         >>> print(f"{scan.to_unit('mm').size[0]:g}")
         0.256
         """
-        into = known_unit("unit", unit)
-        if not self.unit or not into:
-            found = "none" if not self.unit else "none to convert to"
+        own, into = known_unit("unit", self.unit), known_unit("unit", unit)
+        if own is None or into is None:
+            found = "none" if own is None else "none to convert to"
             raise InputError("unit", found=found, expected="a unit of length of the map")
-        scale = factor(self.unit, into)
+        scale = own.into(into)
         removed = [
             replace(each, height=each.height * scale, curvature=each.curvature / scale)
             for each in self.removed
         ]
         dx, dy = self.pixel
         return replace(self, heights=self.heights * scale, pixel=(dx * scale, dy * scale),
-                       unit=into, removed=tuple(removed))  # fmt: skip
+                       unit=into.name, removed=tuple(removed))  # fmt: skip
 
     def summits(self, prune: float = 0.05, fit: int = 3) -> Summits:
         """The summits, tallest hill first, as asperities about the middle of the map.

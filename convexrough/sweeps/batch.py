@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from convexrough.errors import ConvexroughError
 from convexrough.sweeps.measures import Stages, columns, measure
 from convexrough.sweeps.sources import Press, Source
-from convexrough.sweeps.threads import one_thread
+from convexrough.threads import one_thread
 from convexrough.version import __version__
 
 #: Scenes of a batch, at most, ...

@@ -11,8 +11,9 @@ import numpy as np
 from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.shearing.cycle import Cycle, cycles
-from convexrough.shearing.state import ShearState, onset_of_sliding, shear
+from convexrough.friction.cycle import Cycle, cycles
+from convexrough.friction.onset import onset_of_sliding
+from convexrough.friction.shear import ShearState, shear
 
 #: Quantiles of the onset of sliding over the loaded asperities.
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -126,10 +127,10 @@ MEASURES = {
         lambda it: [state.displacement for state in it.states], "shear", units="length"
     ),
     "onset": Measure(_onset_quantiles, "friction", tuple(f"{part:g}" for part in QUANTILES)),
-    "loss": _of_cycles(lambda cycle: cycle.energy, "work"),
-    "loss_normalised": _of_cycles(lambda cycle: cycle.energy_normalised),
+    "loss": _of_cycles(lambda cycle: cycle.loss, "work"),
+    "loss_normalised": _of_cycles(lambda cycle: cycle.loss_normalised),
     "loss_over_smooth": _of_cycles(
-        lambda cycle: cycle.energy_normalised / (cycle.smooth_normalised or np.nan)
+        lambda cycle: cycle.loss_normalised / (cycle.smooth_normalised or np.nan)
     ),
     "loss_factor": _of_cycles(lambda cycle: cycle.loss_factor),
     "stiffness": _of_cycles(lambda cycle: cycle.secant_stiffness, "stiffness"),

@@ -29,8 +29,9 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.errors import SolverError
+from convexrough.numbers.balls import Ball
 from convexrough.solvers.programs import ConeProgram, RawAnswer, Reduction, run_clarabel
-from convexrough.vector_shear.dual_bound import duality_gap
+from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
 if TYPE_CHECKING:
@@ -104,9 +105,8 @@ class FrictionConic:
     """Settings of the cone program for `shear_vector`, through Clarabel.
 
     tolerance : of Clarabel: duality gap and feasibility. Its word is not relied on
-    accepted  : an answer is accepted if the dual bound made from its forces and its displacement
-        proves its energy to be within this of the least, relatively, and its `residual`, slips
-        included, is at most 1e4 times this; else SolverError
+    accepted  : an answer is accepted if its energy is proved to be within this of the least,
+        relatively, and its `residual`, slips included, is at most 1e4 times this; else SolverError
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionConic())
     >>> state.residual < 1e-5
@@ -126,7 +126,8 @@ class FrictionConic:
             raw = run_clarabel(data, solver, self.tolerance, max_step_fraction=step)
             state = program.invert(raw)
             energy = problem.energy(state.increments, problem.couple(state.increments))
-            gap, residual = duality_gap(problem, state) / energy, problem.residual(state)
+            known = certify_vectors(problem, state, Ball.exact(total / scale))
+            gap, residual = known.excess / energy, problem.residual(state)
             if gap <= self.accepted and residual <= SLIPS * self.accepted:
                 q, rise, slips = state.increments, state.rise, state.slips
                 return VectorState(total, scale * q, scale * rise, scale * slips, state.iterations)

@@ -17,6 +17,7 @@ the Hessian of the energy scaled by its local part: positive definite in the con
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from convexrough.arrays import Array
 from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.shearing.newton import advice
+from convexrough.vector_shear.loaded import Loaded
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
 
@@ -49,8 +50,9 @@ class FrictionNewton:
         """The state of a total increment (2,), |T| < sum P (own units)."""
         law = _Friction(problem, total)
         size = float(np.hypot(*total))
-        scalar = problem.scalar.solve(np.array([size]))
-        start = law.evaluate(scalar.deflections[0][:, None] * (total / size))
+        height = Fraction(size) * Fraction(problem.scalar.units.force)
+        _, deflections = problem.scalar.first_loading(height)
+        start = law.evaluate(deflections[:, None] * (total / size))
         if start is None:
             raise SolverError(
                 "no forces of the prescribed total to start from",
@@ -65,7 +67,7 @@ class FrictionNewton:
         return VectorState(total, state.forces, state.rise, slips, iterations)
 
 
-class _State(NamedTuple):
+class _Iterate(NamedTuple):
     unknown: Array  # (n, 2) eta
     forces: Array  # (n, 2) q(eta)
     coupling: Array  # (n, 2) B q
@@ -91,7 +93,7 @@ class _Friction:
     solver: ClassVar[str] = "friction (newton)"
     unit: ClassVar[str] = "the displacement"
 
-    def evaluate(self, unknown: Array) -> _State | None:
+    def evaluate(self, unknown: Array) -> _Iterate | None:
         """The state at eta, shifted so that forces add up to the total; None where that fails."""
         problem = self.problem
         shifted = _onto_total(problem, unknown, self.total)
@@ -108,22 +110,22 @@ class _Friction:
         defect = level - rise
         residual = float(np.hypot(*defect.T).max())
         energy = problem.energy(q, coupling)
-        return _State(shifted, q, coupling, roots, rise, defect, residual, energy)
+        return _Iterate(shifted, q, coupling, roots, rise, defect, residual, energy)
 
-    def direction(self, state: _State, left: float) -> Array:
+    def direction(self, state: _Iterate, left: float) -> Array:
         """Solved directly: it leaves nothing."""
         return _direction(self.problem, state)
 
-    def gradient(self, state: _State) -> Array:
+    def gradient(self, state: _Iterate) -> Array:
         size = np.hypot(*state.unknown.T)
         bearable = np.minimum(size, self.problem.scalar.ceilings)
         return along(bearable, state.unknown, size) + state.coupling - state.rise
 
-    def energy_rounding(self, state: _State) -> float:
+    def energy_rounding(self, state: _Iterate) -> float:
         # Near gross sliding X is large, and then so is what rounding of the total does.
         return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
 
-    def noise(self, state: _State) -> float:
+    def noise(self, state: _Iterate) -> float:
         """At least that of X, of which eta and B q are parts; mostly more, which is not known.
 
         Then steps go on until one does not halve the residual. But what is left across X on a
@@ -131,11 +133,11 @@ class _Friction:
         """
         return ROUNDOFF * state.scale
 
-    def advice(self, state: _State) -> str:
+    def advice(self, state: _Iterate) -> str:
         return advice(self.problem.scalar, float(np.hypot(*self.total)))
 
 
-def _direction(problem: VectorProblem, state: _State) -> Array:
+def _direction(problem: VectorProblem, state: _Iterate) -> Array:
     """d(eta); with the shift of the kernel added where the matrix is not positive definite."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
@@ -218,3 +220,15 @@ def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | Non
         ):
             return np.asarray(eta + shift)
     return None
+
+
+def advice(scalar: Loaded, total: float) -> str:
+    """What a user might try where no state is found at a total increment."""
+    place = f"this was at {total / float(scalar.loads.sum()):.6g} of gross sliding"
+    number = float((scalar.shells * scalar.stiffest).max())
+    if number < 1:
+        return f"{place}; try a shear force a little smaller"
+    return (
+        f"{place}, of a contact so crowded that the energy need not be convex (convexity number "
+        f"{number:.3g}, convex below 1): press less hard, or on sharper tips"
+    )

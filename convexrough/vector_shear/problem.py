@@ -33,12 +33,13 @@ import numpy as np
 from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.convex.definite import is_definite
-from convexrough.errors import SolverError
-from convexrough.normal.residual import SUM_ROUNDOFFS
-from convexrough.roundoff import ROUNDOFF
-from convexrough.shearing.problem import TangentialProblem
+from convexrough.convex.definite import proved_margin
+from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
 from convexrough.sphere import mindlin
+from convexrough.vector_shear.loaded import Loaded
+
+#: Margins of convexity that Cholesky's factorisation is tried with, the best first.
+MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 
 
 class VectorState(NamedTuple):
@@ -59,7 +60,7 @@ class Shift(NamedTuple):
 
     shares : (n,) S_i, the shift over the least local stiffness; convex where all S_i <= 1
 
-    docs/theory/friction-convexity.md, "Convexity".
+    docs/theory/friction-cones.md, "Convexity".
     """
 
     values: Array
@@ -75,7 +76,7 @@ class VectorProblem:
     kernel : (2n, 2n) B, in the order x_1, y_1, x_2, y_2, ...
     """
 
-    scalar: TangentialProblem
+    scalar: Loaded
     bias: float
     kernel: Array
 
@@ -86,9 +87,9 @@ class VectorProblem:
 
     @classmethod
     def _assemble(cls, contact: Contact) -> VectorProblem:
-        n = int(np.count_nonzero(contact.loads))
-        checks.fits_in_memory("loaded asperities", n, 5 * 4 * 8, power=2)
-        scalar = TangentialProblem.of(contact)
+        checks.fits_in_memory("loaded asperities", len(contact.loads.nonzero()[0]), 160, power=2)
+        scalar = Loaded.of(contact)
+        n = len(scalar)
         nu = contact.scene.material.poisson_ratio
         bias = nu / (2.0 - nu)
         x, y = contact.scene.contact_points[scalar.touching].T
@@ -110,7 +111,7 @@ class VectorProblem:
         """(n,) h_i = (2/3) ceiling_i / P_i = 1 / (2 E* a_i): the local Hessian is at least h_i I.
 
         Its eigenvalues, along q and across, are ceiling/P times deflection'(t) and deflection(t)/t:
-        docs/theory/friction-convexity.md, "Convexity".
+        docs/theory/friction-cones.md, "Convexity".
         """
         h: Array = (2.0 / 3.0) * self.scalar.ceilings / self.scalar.loads
         return h
@@ -125,7 +126,7 @@ class VectorProblem:
     def product_error(self) -> float:
         """(B q)_i as computed is off by at most this times sum_j A_ij |q_j|."""
         entries = self.scalar.influence.entry_error
-        return 4.0 * (entries + (2 * len(self) + SUM_ROUNDOFFS) * ROUNDOFF)
+        return 2.0 * (entries + (2 * len(self) + SUM_ROUNDOFFS) * ROUNDOFF)
 
     def couple(self, increments: Array) -> Array:
         """(n, 2) B q."""
@@ -184,10 +185,9 @@ class VectorProblem:
 
     @cached_property
     def shift(self) -> Shift:
-        """A shift for the cones and the dual bound, confirmed by Cholesky.
+        """A shift for the cones: docs/theory/friction-cones.md, "Convexity".
 
-        By the neighbours' distances, (3) of docs/theory/friction-convexity.md, "Convexity":
-        2 / (2 - nu) of
+        By the neighbours' distances (3), 2 / (2 - nu) of
 
             1 / (pi E* s_i) at nu = 0,    (9/4) (1 - 2 nu / 3) / (pi E* s_i) for 0 < nu <= 1/2.
 
@@ -197,49 +197,28 @@ class VectorProblem:
         factor = 1.0 if nu == 0 else 4.5 * (1.0 - 2.0 * nu / 3.0) / (2.0 - nu)
         by_distance = factor * self.scalar.shells
         shares = by_distance / self.stiffness
-        if shares.max() <= 21 / 25 and self._semidefinite(shares):
+        if shares.max() <= 21 / 25:
             return Shift(by_distance, shares)
-        equal = np.full(len(self), self.least_share + self._rounding)
-        if not self._semidefinite(equal):
-            raise SolverError(
-                "no shift makes the tangential kernel semidefinite", solver="friction"
-            )
+        root = np.repeat(1.0 / np.sqrt(self.stiffness), 2)
+        lowest = float(np.linalg.eigvalsh(self.kernel * root * root[:, None])[0])
+        equal = np.full(len(self), max(-lowest, 0.0) + 1e-14 * (1 + len(self)))
         return Shift(equal * self.stiffness, equal)
 
     @cached_property
-    def least_share(self) -> float:
-        """The least S with B + S diag(h_i I) >= 0: the energy is convex where it is below 1."""
-        return max(float(-np.linalg.eigvalsh(self._scaled)[0]), 0.0)
+    def margin(self) -> float:
+        """A proved mu > 0 with I + H^-1/2 B H^-1/2 >= mu I of the true loads; 0 if none is found.
 
-    @property
-    def _scaled(self) -> Array:
-        """(2n, 2n) B with rows and columns over the roots of the stiffness."""
-        root = np.repeat(1.0 / np.sqrt(self.stiffness), 2)
-        scaled: Array = self.kernel * root * root[:, None]
-        return scaled
-
-    @property
-    def _rounding(self) -> float:
-        """What rounding can hide of an eigenvalue of `_scaled`, which are of the order of 1."""
-        return 1e-14 * (1 + len(self))
-
-    def _semidefinite(self, shares: Array) -> bool:
-        """Whether a shift of these shares makes B semidefinite, up to rounding."""
-        matrix = self._scaled
-        matrix[np.diag_indices(len(matrix))] = np.repeat(shares, 2) + self._rounding
-        return is_definite(matrix)
-
-    @property
-    def slack(self) -> float:
-        """What shares lack of a proof that B + shift >= 0: rounding of the factorisation, and of B.
-
-        As in `convex.definite`, with a trace of at most 2n (the largest share and a little).
+        Asperities not sure to touch are not among the unknowns.
         """
-        n = 2 * len(self)
-        rows = float(np.abs(self._scaled).sum(axis=1).max())
-        trace = n * (float(self.shift.shares.max()) + self._rounding)
-        blur = (self.product_error + 8 * ROUNDOFF) * rows
-        return self._rounding + 1.1 * (blur + (n + 2) * ROUNDOFF * trace)
+        root = np.repeat(np.sqrt(self.scalar.softness), 2)
+        scaled = self.kernel * root * root[:, None]
+        return proved_margin(scaled, MARGINS, self.product_error + 8 * ROUNDOFF, spare=SAFETY)
+
+    @property
+    def reach(self) -> Array:
+        """(n, n) |B_ij v| <= reach_ij |v|."""
+        bound: Array = self.scalar.influence.matrix * ((1.0 + self.bias) * (1 + SAFETY))
+        return bound
 
 
 def along(lengths: Array, vectors: Array, sizes: Array) -> Array:

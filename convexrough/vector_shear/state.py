@@ -9,6 +9,7 @@ by Newton's method or as a second-order cone program. Derived in docs/theory/fri
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -19,11 +20,12 @@ from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact
 from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
+from convexrough.friction.shear import ShearCertificate
+from convexrough.numbers.balls import Ball
 from convexrough.record import Along, Table
-from convexrough.roundoff import ROUNDOFF
-from convexrough.shearing.certificate import ShearCertificate
-from convexrough.vector_shear.dual_bound import duality_gap
-from convexrough.vector_shear.judgement import judge_vectors
+from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.vector_shear.certificate import ROUNDED, VectorBounds, certify_vectors
+from convexrough.vector_shear.loaded import Loaded
 from convexrough.vector_shear.newton import FrictionNewton
 from convexrough.vector_shear.problem import VectorProblem, VectorState
 
@@ -49,8 +51,8 @@ class VectorShearState(Table, Drawn):
         from those of `shear`, taken along the shear force, over the 2-norm of those
     residual     : how far the conditions of the least energy are from holding, dimensionless,
         recomputed from this answer: `VectorProblem.residual`
-    duality_gap  : [force length] bound on the energy of these forces above the least, by a dual
-        point made from the answer alone; infinite where no shift shows the problem to be convex
+    duality_gap  : [force length] bound on the energy of these forces above the least; infinite
+        where the energy is not proved to be convex
     certificate  : what is proved, as in `shear`; errors of vectors are bounds on their lengths
 
     At |Q| = f P exactly, forces are f P_i along Q. A state of several asperities then exists, in
@@ -114,12 +116,12 @@ def shear_vector(
         return _unmoved(contact, solver.name)
     problem = VectorProblem.of(contact)
     scalar = problem.scalar
-    total = Q / friction / scalar.units.force
-    amount = scalar.limited(np.array([float(np.hypot(*total))]))
-    gross = bool(scalar.at_limit(amount)[0])
+    exact = Ball.exact(Q) / friction / scalar.units.force
+    total = exact.value
+    height = scalar.height(size)
     if size == 0.0:
         state = _at_rest(problem)
-    elif gross:
+    elif height == scalar.levels.load:
         state = _gross(problem, total)
     else:
         state = _solved(solver, problem, total)
@@ -129,6 +131,7 @@ def shear_vector(
     def in_scene(values: Array, unit: float) -> Array:
         return frozen(among_zeros(values * unit, scalar.touching, len(scene)))
 
+    known = certify_vectors(problem, state, exact)
     left = np.maximum(1.0 - problem.sizes(state.increments) / scalar.loads, 0.0)
     return VectorShearState(
         contact=contact,
@@ -137,10 +140,10 @@ def shear_vector(
         forces=in_scene(state.increments, unit),
         slips=in_scene(state.slips, travel),
         stick_radii=in_scene(contact.contact_radii[scalar.touching] * np.cbrt(left), 1.0),
-        disagreement=_disagreement(problem, state, amount),
+        disagreement=_disagreement(problem, state, height),
         residual=problem.residual(state),
-        duality_gap=duality_gap(problem, state) * unit * travel,
-        certificate=ShearCertificate.of(scalar, judge_vectors(problem, state, gross=gross)),
+        duality_gap=known.excess * unit * travel,
+        certificate=_certificate(contact, scalar, state, known),
         solver=solver.name,
         iterations=state.iterations,
     )
@@ -208,20 +211,58 @@ def _times(vectors: Array, size: Array | float) -> Array:
     return product
 
 
-def _disagreement(problem: VectorProblem, state: VectorState, amount: Array) -> float:
+def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) -> float:
     """With Ciavarella-Jaeger forces along the total; 0 at rest."""
-    if amount[0] == 0.0:
+    if height == 0:
         return 0.0
-    other = problem.scalar.solve(amount).increments[0]
-    difference = state.increments - other[:, None] * (state.total / np.hypot(*state.total))
-    return float(np.linalg.norm(difference / amount[0]) / np.linalg.norm(other / amount[0]))
+    other, _ = problem.scalar.first_loading(height)
+    total = float(np.hypot(*state.total))
+    difference = state.increments - other[:, None] * (state.total / total)
+    return float(np.linalg.norm(difference / total) / np.linalg.norm(other / total))
+
+
+def _certificate(
+    contact: Contact, scalar: Loaded, state: VectorState, bounds: VectorBounds
+) -> ShearCertificate:
+    """From the bounds on one state, in the scene's units; those on vectors are on their lengths."""
+
+    def in_scene(errors: Array, values: Array, unit: float) -> Array:
+        size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)
+        return scalar.to_scene((errors * (1 + SAFETY) + ROUNDED * size) * unit)
+
+    rise_error = float(bounds.rise + ROUNDED * np.hypot(*state.rise))
+    open_, n = contact.status == "open", len(contact.scene)
+    status = np.full(n, "undecided", dtype="<U12")
+    status[open_] = "open"
+    status[scalar.to_scene(bounds.partial)] = "partial"
+    status[scalar.to_scene(bounds.sliding)] = "sliding"
+    loaded = scalar.to_scene(np.ones(len(scalar), dtype=bool))
+    strays = np.where(loaded, 0.0, scalar.levels.top_error * scalar.force_unit)
+    return ShearCertificate(
+        scope=scalar.scope if bounds.proved else "none",
+        order="proved for one step",
+        status=frozen(status),
+        force_errors=frozen(
+            strays + in_scene(bounds.increments, state.increments, scalar.force_unit)
+        ),
+        slip_errors=frozen(
+            np.where(loaded | open_, 0.0, np.inf)
+            + in_scene(bounds.slips, state.slips, scalar.travel_unit)
+        ),
+        stick_radius_errors=frozen(np.where(open_, 0.0, np.inf)),
+        force_error=0.0,
+        displacement_error=rise_error * scalar.travel_unit,
+    )
 
 
 def _unmoved(contact: Contact, solver: str) -> VectorShearState:
     """Nothing is loaded."""
     n = len(contact.scene)
     zero, none, pairs = frozen(np.zeros(n)), frozen(np.zeros(2)), frozen(np.zeros((n, 2)))
-    certificate = ShearCertificate.of_no_load(contact.certificate)
+    normal = contact.certificate
+    certificate = ShearCertificate(
+        normal.scope, "proved", normal.status, zero, zero, zero, 0.0, 0.0
+    )
     return VectorShearState(
         contact, none, none, pairs, pairs, zero, 0.0, 0.0, 0.0, certificate, solver, 0
     )

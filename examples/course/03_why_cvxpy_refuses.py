@@ -30,7 +30,9 @@ import convexrough as cr
 Array = NDArray[np.float64]
 
 asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0051)
-scene = cr.Scene(1.0, asperities, cr.Material(contact_modulus=1.0, poisson_ratio=0.3))
+scene = cr.Scene(
+    1.0, asperities, cr.Material(contact_modulus=1.0, poisson_ratio=0.3), geometry="summit"
+)
 
 
 def point_forces(points: Array) -> Array:

@@ -164,7 +164,7 @@ assert abs(energy / (delta * f.sum()) + 0.4) < 1e-4
 
 material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
 asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-scene = cr.Scene(1.0, asperities, material)
+scene = cr.Scene(1.0, asperities, material, geometry="summit")
 by_newton = cr.press(scene, approach=5e-5)
 as_solved = cr.press(scene, approach=5e-5, solver=cr.solvers.BristleQP(newton_step=False))
 apart = abs(as_solved.loads - by_newton.loads).max() / by_newton.loads.max()

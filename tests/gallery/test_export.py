@@ -55,6 +55,7 @@ def program(index: Any, name: str, ending: str) -> Any:
     return found
 
 
+@pytest.mark.sample(12)
 @each_case
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # how qpsolvers calls OSQP
 def test_bristle_programs(name: str, pack: Path, index: Any) -> None:
@@ -71,6 +72,7 @@ def test_bristle_programs(name: str, pack: Path, index: Any) -> None:
         judged(name, about, qpsolvers.solve_problem(problem, solver, **given).x, about["off"])
 
 
+@pytest.mark.sample(20)
 @each_case
 def test_cone_programs_by_clarabel(name: str, pack: Path, index: Any) -> None:
     about = program(index, name, "cones.json")
@@ -84,6 +86,7 @@ def test_cone_programs_by_clarabel(name: str, pack: Path, index: Any) -> None:
     assert abs(found.obj_val - about["objective"]) < 1e-7 * max(abs(about["objective"]), 1e-3)
 
 
+@pytest.mark.sample(12)
 @each_case
 def test_cone_programs_by_another_solver(name: str, pack: Path, index: Any) -> None:
     about = program(index, name, "cones.json")

@@ -139,7 +139,7 @@ def test_autograd() -> None:
 def test_without_an_extra(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, extra, None)
     monkeypatch.setitem(sys.modules, "autograd.extend", None)
-    with pytest.raises(ExtraError, match=rf"convexrough\[{extra}\]"):
+    with pytest.raises(ExtraError, match=rf"needs {extra}: pip install {extra}"):
         getattr(of_loss(), f"to_{extra}")()
 
 

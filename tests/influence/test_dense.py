@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import paper, rough, scattered
 
+from convexrough.influence import sliced_matrix
 from convexrough.influence.choice import couple
 from convexrough.influence.coupling import Kind, error_reach, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.shells import shells
+from convexrough.numbers.pairs import Pair
 
 SCALE = 0.37
 
@@ -24,7 +26,7 @@ def shell_radii(points: np.ndarray) -> np.ndarray:
     return SCALE / shells(DenseInfluence.assemble(points, SCALE))
 
 
-def exact_product(points: np.ndarray, scale: float, loads: np.ndarray) -> list[arb]:
+def two_product(points: np.ndarray, scale: float, loads: np.ndarray) -> list[arb]:
     """A P in 60 digits, of points taken as exact."""
     ctx.dps = 60
     x = [[arb(float(c)) for c in point] for point in points]
@@ -47,7 +49,7 @@ def test_rounding_is_a_bound(seed: int, count: int) -> None:
     points = rng.uniform(-1, 1, (count, 2))
     loads = rng.random(count) ** 8 * (rng.choice([-1, 1], count) if seed % 2 else 1)
     operator = DenseInfluence.assemble(points, SCALE)
-    computed, exact = operator.apply(loads), exact_product(points, SCALE, loads)
+    computed, exact = operator.apply(loads), two_product(points, SCALE, loads)
     assert operator.rounding(loads).norm == 0
     # It is asked for with A |P| as computed, which is off itself.
     bounds = operator.rounding(loads).of(operator.apply(np.abs(loads))) * (1 + 1e-12)
@@ -63,6 +65,121 @@ def test_the_sum_in_blocks_is_the_product() -> None:
         operator = DenseInfluence.assemble(points, SCALE)
         assert len(operator) == count
         assert_allclose(operator.apply(loads), SCALE * inverse_distances(points, points) @ loads)
+
+
+def sums(points: np.ndarray, loads: Pair, row: int) -> arb:
+    """sum_j P_j / r_ij in 120 digits."""
+    ctx.dps = 120
+    x, y = (arb(float(c)) for c in points[row])
+    total = arb(0)
+    for j in np.flatnonzero(loads.high):
+        if j != row:
+            u, v = x - arb(float(points[j, 0])), y - arb(float(points[j, 1]))
+            load = arb(float(loads.high[j])) + arb(float(loads.low[j]))
+            total += load / (u * u + v * v).sqrt()
+    return total
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([1, 2, 3, 61, 128, 129, 257, 300, 400]),
+    st.sampled_from([1e-150, 1e-9, 1.0, 1e150]),
+    st.sampled_from([1e-150, 1.0, 1e7, 1e150]),
+    st.sampled_from(["disc", "pairs", "grid"]),
+    st.sampled_from(["plain", "uneven", "signs", "zeros"]),
+)
+def test_sums_are_known(
+    seed: int, count: int, length: float, force: float, layout: str, kind: str
+) -> None:
+    """At all scales; with points in pairs, in ties, and with loads of all sizes and signs."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-1, 1, (count, 2))
+    if layout == "grid":
+        side = int(np.ceil(np.sqrt(count)))
+        points = np.array([divmod(k, side) for k in range(count)], dtype=float)
+    elif layout == "pairs":
+        points[count // 2 :] = points[: count - count // 2] + 1e-6 * points[count // 2 :]
+    high = rng.random(count) * {"uneven": 10.0 ** rng.uniform(-40, 0, count)}.get(kind, 1.0)
+    if kind in ("signs", "zeros"):
+        high *= rng.choice([-1, 1] if kind == "signs" else [0, 0, 1], count)
+    points, high = points * length, high * force
+    loads = Pair(high, high * 2.0**-54 * rng.uniform(-1, 1, count))
+    found = DenseInfluence.assemble(points, SCALE).sums(loads)
+    magnitude = Pair(*np.abs(loads)) if kind == "signs" else loads
+    most = 0.0
+    for row in {0, *rng.integers(0, count, 5).tolist()}:
+        exact = sums(points, loads, row)
+        value = arb(float(found.mid.high[row])) + arb(float(found.mid.low[row]))
+        assert abs(value - exact) <= arb(float(found.radius[row]))
+        most = max(most, float(sums(points, magnitude, row)))
+    if layout == "grid" and 1e-150 < most < 1e150:
+        assert found.radius.max() <= (1e-25 if kind == "uneven" else 1e-26) * most
+
+
+def test_sums_of_many_loads_and_of_many_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stack at once, and rows that are not kept: the same, to what is said of them."""
+    points = rough().contact_points
+    loads = np.random.default_rng(1).random((3, len(points)))
+    one = [DenseInfluence.assemble(points, 1.0).sums(Pair.exact(each)) for each in loads]
+    stack = DenseInfluence.assemble(points, 1.0).sums(Pair.exact(loads))
+    monkeypatch.setattr(sliced_matrix, "KEPT", 20)
+    few = DenseInfluence.assemble(points, 1.0).sums(Pair.exact(loads))
+    for k, each in enumerate(one):
+        for other in (stack[k], few[k]):
+            off = (each - other).size
+            assert (off <= 2.1 * (each.radius + other.radius)).all()
+            assert (other.radius < 1e-25 * other.value).all()
+    assert DenseInfluence.assemble(points[:0], 1.0).sums(Pair.exact(loads[0, :0])).shape == (0,)
+
+
+@pytest.mark.parametrize("made", [False, True])
+@pytest.mark.parametrize("count", [20, 61, 300, 700])
+def test_sums_among_some(count: int, made: bool) -> None:
+    """Out of the matrix of all, if that is made: the same, to what is said of them."""
+    rng = np.random.default_rng(count)
+    points, loads = rng.uniform(-1, 1, (count, 2)), Pair.exact(rng.random(count))
+    operator = DenseInfluence.assemble(points, 1.0)
+    if made:
+        operator.sums(loads)
+    for which in (
+        np.flatnonzero(rng.random(count) < 0.3),
+        np.concatenate((np.arange(5), np.arange(count - 9, count))),
+        rng.permutation(count)[:10],
+    ):
+        found = operator.among(which).sums(loads.at(which))
+        fresh = DenseInfluence.assemble(points[which], 1.0).sums(loads.at(which))
+        assert ((found - fresh).size <= 2.1 * (found.radius + fresh.radius)).all()
+        assert (found.radius < 1e-24 * found.value).all()
+
+
+def test_sums_where_points_are_pairs() -> None:
+    """Of the closest-point geometry as many digits as of summits, and of the true points."""
+    scene = rough("closest")
+    loads = Pair.exact(np.random.default_rng(4).random(len(scene)))
+    found = couple(scene, np.arange(len(scene)), SCALE).sums(loads)
+    ctx.dps = 60
+    tips = [arb(float(rho)) for rho in scene.asperities.tip_radii]
+    R = arb(float(scene.sphere_radius))
+    x, y = ([arb(float(c)) * R / (R + t) for c, t in zip(column, tips, strict=True)]
+            for column in scene.asperities.positions.T)  # fmt: skip
+    for row in range(0, len(scene), 7):
+        total = arb(0)
+        for j in range(len(scene)):
+            if j != row:
+                apart = ((x[row] - x[j]) ** 2 + (y[row] - y[j]) ** 2).sqrt()
+                total += arb(float(loads.high[j])) / apart
+        middle = arb(float(found.mid.high[row])) + arb(float(found.mid.low[row]))
+        assert abs(middle - total) <= arb(float(found.radius[row]))
+    assert (found.radius < 1e-26 * found.value).all()
+
+
+def test_sums_of_what_is_no_number() -> None:
+    points = paper().contact_points
+    for bad in (np.inf, np.nan):
+        loads = np.full(len(points), 1.0)
+        loads[3] = bad
+        assert (DenseInfluence.assemble(points, 1.0).sums(Pair.exact(loads)).radius == np.inf).all()
 
 
 def test_point_error_is_counted() -> None:
@@ -96,9 +213,7 @@ def test_elsewhere(geometry: Any) -> None:
     rows = SCALE * inverse_distances(others, among)
     assert (rows == 0).sum() == 1  # of the first point onto itself
     assert_allclose(coupling.apply(loads), rows @ loads, rtol=1e-14)
-    exact = exact_product(
-        np.concatenate((among, others)), SCALE, np.append(loads, 0 * others[:, 0])
-    )
+    exact = two_product(np.concatenate((among, others)), SCALE, np.append(loads, 0 * others[:, 0]))
     bounds = coupling.rounding(loads).of(coupling.apply(loads))
     for value, true, bound in zip(coupling.apply(loads), exact[len(among) :], bounds, strict=True):
         if true.is_finite():  # a point at itself is infinitely close in these words

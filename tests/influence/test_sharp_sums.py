@@ -14,18 +14,21 @@ from scenes import scattered, solve_exactly
 
 import convexrough as cr
 from convexrough.bench.scenes import APPROACH, scene
+from convexrough.influence import scattered as scattered_points
 from convexrough.influence import sharp_sums as sharp
-from convexrough.influence.convolution import Box
-from convexrough.influence.coupling import Sums
+from convexrough.influence.choice import couple
+from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.near_pairs import Order
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredInfluence
-from convexrough.influence.sliced import Distances, sliced_sums
+from convexrough.influence.sharp_pairs import SharpPairs
 from convexrough.influence.softened import Softened, exact_series
 from convexrough.influence.splitting import Splitting
-from convexrough.normal.certificate import judge
+from convexrough.normal.certificate import certify_on
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.residual import fit
+from convexrough.normal.refine import trial
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import ROUNDOFF
 from convexrough.solvers import Newton
 
@@ -67,8 +70,14 @@ def exact(points: Array, loads: Array, row: int) -> arb:
     return total
 
 
-def value(found: Sums, row: int) -> arb:
-    return (arb(float(found.whole[row])) + arb(float(found.rest[row]))) * arb(found.unit)
+def value(found: Ball, row: int) -> arb:
+    return arb(float(found.mid.high[row])) + arb(float(found.mid.low[row]))
+
+
+def sums(operator: ScatteredInfluence, loads: Array) -> Ball:
+    found = operator.sums(Pair.exact(loads))
+    assert found is not None
+    return found
 
 
 def weight(place: float, node: int, order: int) -> Fraction:
@@ -162,43 +171,19 @@ def test_values_within_the_reach_and_beyond(order: int) -> None:
     product = assembled(order, disc(np.random.default_rng(1), 60))
     unit = 2.0 ** floor(log2(SPACING))
     values = sharp.SoftValues.of(product, unit)
-    assert len(values.heads) == ceil((0.43 / SPACING) ** 2)
+    assert len(values.near.high) == ceil((0.43 / SPACING) ** 2)
     i, j = np.arange(0, 20), np.arange(-14, 15)
-    head, rest = values.sliced(i, j)
-    assert (head == head.astype(np.float32)).all()
+    head, rest = values.at(i, j)
     with ctx.workprec(300):
         for m, n in np.ndindex(head.shape):
             squares = Fraction(SPACING) ** 2 * int(i[m] ** 2 + j[n] ** 2)
             true = soft(KERNELS[order], squares) * arb(unit)
             off = abs(arb(head[m, n]) + arb(rest[m, n]) - true)
-            assert off <= arb(2.0**-70) * true
+            assert off <= arb(values.error) * true
     near = (i[:, None] * SPACING) ** 2 + (j * SPACING) ** 2 < 0.43**2
     assert near.any()
     assert not near.all()
     assert float(np.abs(head).max()) < 1
-
-
-def test_sums_of_loads_known_to_more_than_a_roundoff() -> None:
-    """The rest of the loads counts."""
-    basis = np.array([[1.0, 0.0], [0.5, 0.8660254037844386]])
-    rng = np.random.default_rng(5)
-    loads = rng.random((11, 13))
-    rest = loads * rng.uniform(-1, 1, loads.shape) * 2.0**-54
-    distances = Distances.of(basis, 0.5, 13)
-    found = sliced_sums(Box((11, 13), basis), distances, 0.5, loads, rest)
-    assert found is not None
-    with ctx.workprec(200):
-        true = known = arb(0)
-        for (m, n), load in np.ndenumerate(loads):
-            if (m, n) != (5, 6):
-                i, j = 5 - m, 6 - n
-                x, y = (i * arb(basis[0, k]) + j * arb(basis[1, k]) for k in (0, 1))
-                inverse = 1 / (x * x + y * y).sqrt()
-                known += arb(load) * inverse
-                true += (arb(load) + arb(float(rest[m, n]))) * inverse
-        computed = (arb(found.whole[5, 6]) + arb(found.rest[5, 6])) * arb(found.unit)
-        assert abs(computed - true) <= arb(found.error) * arb(found.unit)
-        assert abs(computed - known) > arb(found.error) * arb(found.unit)
 
 
 def scattered_loads(rng: np.random.Generator, count: int) -> Array:
@@ -216,7 +201,7 @@ def test_loads_on_nodes(order: int, crowded: bool) -> None:
     weights, placed = product.weights, product.order
     assert weights is not None
     lows = sharp._low_weights(product)
-    field, error = sharp._to_nodes(product, lows, loads[placed.places])
+    field, error = sharp._to_nodes(product, lows, Pair.exact(loads[placed.places]))
     plain = weights.to_nodes(loads[placed.places])
     assert field.high.shape == weights.shape
     missed = 0
@@ -236,8 +221,10 @@ def test_loads_on_nodes(order: int, crowded: bool) -> None:
         assert abs(found - true) <= min(error, 1e-19 * total + 1e-20)
         missed += abs(Fraction(float(plain[a, b])) - true) > 1e-19 * total + 1e-20
     assert missed > 2
-    alone = np.bincount(np.unique(placed.cells // 5, axis=0, return_inverse=True)[1])
-    assert sharp._met(product) >= 4 * alone.max()
+    met = np.zeros(weights.shape)
+    for i, j in placed.cells.tolist():
+        met[i : i + order, j : j + order] += 1
+    assert sharp._met(product) == met.max()
 
 
 @pytest.mark.parametrize("order", [4, 12, 26])
@@ -248,7 +235,8 @@ def test_values_at_points(order: int) -> None:
     assert weights is not None
     whole = np.rint(rng.uniform(-1, 1, weights.shape) * 2.0**43)
     rest = rng.uniform(-1, 1, weights.shape) * 2.0**20
-    on_mesh = Sums(whole, rest, 2.0**-40, 0.0, 0.0)
+    nodes = Pair((whole * 2.0**-40).ravel(), (rest * 2.0**-40).ravel())
+    on_mesh = Ball.exact(nodes)
     lows = sharp._low_weights(product)
     exactly, left, unit, rounding = sharp._from_nodes(product, lows, on_mesh)
     assert (exactly == np.rint(exactly)).all()
@@ -288,20 +276,17 @@ def test_sharp_sums_against_ball_arithmetic(layout: str, kind: str) -> None:
     elif kind == "few":
         loads = np.where(rng.random(len(points)) < 0.01, 1e5 * loads, 0.0)
     operator = ScatteredInfluence(points, 0.37)
-    found = operator.sums(loads)
-    assert found is not None
-    assert (found.whole == np.rint(found.whole)).all()
+    found = sums(operator, loads)
     sizes = operator.apply(np.abs(loads)) / 0.37
     with ctx.workprec(200):
         for row in rng.integers(0, len(points), 8).tolist():
             off = abs(value(found, row) - exact(points, loads, row))
-            assert off <= arb(found.error) * arb(found.unit)
+            assert off <= arb(float(found.radius[row]))
             if layout in EVEN:
                 assert float(off.mid()) <= 1e-16 * sizes.max()
     if layout in EVEN:
         plain = operator.rounding(loads).of(0.37 * sizes).max()
-        assert found.error * found.unit * 0.37 < 0.1 * plain
-    assert found.norm >= found.error
+        assert found.radius.max() * 0.37 < 0.1 * plain
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
@@ -311,37 +296,58 @@ def test_interpolation_counts(tolerance: float) -> None:
     points = disc(rng)
     operator = ScatteredInfluence(points, 1.0, tolerance=tolerance)
     loads = rng.random(len(points))
-    found = operator.sums(loads)
-    assert found is not None
+    found = sums(operator, loads)
     worst = 0.0
     with ctx.workprec(200):
         for row in range(0, 4000, 400):
             off = float(abs(value(found, row) - exact(points, loads, row)).mid())
             worst = max(worst, off)
-    assert 1e-4 * found.error * found.unit < worst <= found.error * found.unit
+    assert 1e-4 * found.radius.max() < worst <= found.radius.max()
     product = operator._double
     far = sharp._relative(product) * float(product.apply(loads).max())
     parts = float(product.interpolation(loads).max()) + far
-    assert parts <= found.error * found.unit <= 1.1 * parts
+    assert parts <= found.radius.max() <= 1.1 * parts
 
 
-def test_near_pairs_count_beside_their_own_sum() -> None:
-    """Two points very near: their pair is all of the error, and nothing else is allowed for it."""
+@pytest.mark.parametrize("order", [4, 12, 26])
+@pytest.mark.parametrize("nearest", [1e-9, 1e-2])
+def test_near_pairs(order: int, nearest: float) -> None:
+    """Pairs, some very near, against exact values of L: far within what float64 loses."""
+    rng = np.random.default_rng(7)
+    points, loads = disc(rng, 300), scattered_loads(rng, 300)
+    points[1:100:2] = points[:100:2] + rng.uniform(1, 2, (50, 2)) * nearest
+    points[101] = points[100]
+    product = assembled(order, points)
+    placed, reach = product.order.points, product.splitting.cut
+    lows = loads * rng.uniform(-1, 1, 300) * 2.0**-54
+    found, errors = SharpPairs.of(product)(Pair(loads, lows))
+    sizes = product.near.apply(np.abs(loads)) + product.splitting.kernel.centre * np.abs(loads)
+    assert np.median(errors) < 0.1 * product.near.terms * ROUNDOFF * np.median(sizes)
+    with ctx.workprec(300):
+        known = [arb(x) + arb(y) for x, y in zip(loads.tolist(), lows.tolist(), strict=True)]
+        for row in range(0, 300, 7):
+            total = arb(0)
+            for k in np.flatnonzero(np.hypot(*(placed - placed[row]).T) < reach).tolist():
+                x, y = (Fraction(placed[row, c]) - Fraction(placed[k, c]) for c in (0, 1))
+                squares = x * x + y * y
+                whole = 1 / ball(squares).sqrt() if squares else arb(0)
+                total += (whole - soft(KERNELS[order], squares)) * known[k]
+            here = arb(float(found.high[row])) + arb(float(found.low[row]))
+            assert abs(here - total) <= arb(float(errors[row]))
+
+
+def test_near_pairs_are_as_sharp_as_others() -> None:
+    """Points very near to another: the sums are known to sixteen digits of the largest."""
     rng = np.random.default_rng(7)
     points = disc(rng)
     points[1::2] = points[::2] + rng.uniform(1, 2, (2000, 2)) * 1e-9
-    operator = ScatteredInfluence(points, 1.0)
     loads = rng.random(len(points))
-    found = operator.sums(loads)
-    assert found is not None
-    product = operator._double
-    others = float(product.interpolation(loads).max())
-    worst = 0.0
+    found = sums(ScatteredInfluence(points, 1.0), loads)
+    assert found.radius.max() <= 1e-16 * found.mid.high.max()
     with ctx.workprec(200):
         for row in range(0, 4000, 100):
             off = abs(value(found, row) - exact(points, loads, row))
-            worst = max(worst, float(off.mid()))
-    assert 10 * others < worst <= found.error * found.unit
+            assert off <= arb(float(found.radius[row]))
 
 
 def test_points_that_are_not_known() -> None:
@@ -349,21 +355,46 @@ def test_points_that_are_not_known() -> None:
     points, blur = jittered(rng), 1e-13
     moved = points + rng.choice([-blur, blur], points.shape)
     loads = rng.random(len(points))
-    found = ScatteredInfluence(points, 1.0, blur).sums(loads)
-    exactly = ScatteredInfluence(points, 1.0).sums(loads)
-    assert found is not None
-    assert exactly is not None
+    found = sums(ScatteredInfluence(points, 1.0, blur), loads)
+    exactly = sums(ScatteredInfluence(points, 1.0), loads)
     with ctx.workprec(200):
         offs = [abs(value(found, row) - exact(moved, loads, row)) for row in range(0, 3900, 300)]
     worst = max(float(off.mid()) for off in offs)
-    assert exactly.error * exactly.unit < worst <= found.error * found.unit
+    assert exactly.radius.max() < worst <= found.radius.max()
+
+
+def test_points_that_are_pairs() -> None:
+    """What float64 points lack counts: of the closest-point geometry as little is lost as ever."""
+    rng = np.random.default_rng(8)
+    positions, loads = jittered(rng), rng.random(3900)
+    positions, tips = positions[:3900], rng.uniform(0.01, 0.03, 3900)
+    material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
+    made = cr.Scene(1.0, cr.Asperities(positions, tips), material, geometry="closest")
+    operator = couple(made, np.arange(3900), 1.0, "scattered")
+    found = operator.sums(Pair.exact(loads))
+    plain = ScatteredInfluence(made.contact_points, 1.0).sums(Pair.exact(loads))
+    assert found.radius.max() <= 1.01 * plain.radius.max()
+    with ctx.workprec(200):
+        x, y = ([arb(float(c)) / (1 + arb(float(t))) for c, t in zip(xs, tips, strict=True)]
+                for xs in positions.T)  # fmt: skip
+        for row in range(0, 3900, 800):
+            total = arb(0)
+            for j in range(3900):
+                if j != row:
+                    total += (
+                        arb(float(loads[j])) / ((x[row] - x[j]) ** 2 + (y[row] - y[j]) ** 2).sqrt()
+                    )
+            assert abs(value(found, row) - total) <= arb(float(found.radius[row]))
 
 
 def test_where_there_is_no_mesh() -> None:
+    """Few points go by their matrix; no loads, and no points, cost nothing."""
     points = clustered(np.random.default_rng(9))
-    assert ScatteredInfluence(points[:40], 1.0).sums(np.ones(40)) is None
-    assert ScatteredInfluence(points, 1.0).sums(np.zeros(len(points))) is None
-    assert ScatteredInfluence(points[:0], 1.0).sums(np.zeros(0)) is None
+    few, ones = points[:40], Pair.exact(np.ones(40))
+    dense = DenseInfluence.assemble(few, 1.0).sums(ones)
+    np.testing.assert_array_equal(ScatteredInfluence(few, 1.0).sums(ones).mid, dense.mid)
+    assert not ScatteredInfluence(points, 1.0).sums(Pair.exact(np.zeros(len(points)))).size.any()
+    assert ScatteredInfluence(points[:0], 1.0).sums(Pair.exact(np.zeros(0))).shape == (0,)
 
 
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
@@ -374,7 +405,8 @@ def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
     problem = NormalProblem.assemble(given, approach=APPROACH)
     assert problem.influence.name == "scattered"
     loads = Newton().solve(problem).loads
-    found = fit(problem, loads)
+    pair = Pair.exact(loads)
+    found = trial(problem, pair, problem.product(pair))
     force, length = arb(problem.units.force), arb(problem.units.length)
     touching = np.flatnonzero(loads)
     tip = float(given.asperities.tip_radii[0])
@@ -395,10 +427,10 @@ def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
                     u, v = positions[problem.candidates[n]]
                     r = factor * ((x - u) ** 2 + (y - v) ** 2).sqrt()
                     gap += arb(float(loads[n])) * force / (arb.pi() * modulus * r)
-            off = abs(gap / length - arb(float(found.gap[m])))
-            assert off <= arb(float(found.rounding[m])) + arb(found.component)
-    assert found.component < 2e-14 * problem.approach
-    certificate = judge(problem, problem.to_scene(loads) * problem.units.force)
+            value = arb(float(found.gap.mid.high[m])) + arb(float(found.gap.mid.low[m]))
+            assert abs(gap / length - value) <= arb(float(found.gap.radius[m]))
+    assert found.gap.radius.max() < 2e-14 * problem.approach
+    certificate = certify_on(problem, problem.to_scene(loads) * problem.units.force)
     assert certificate.scope == "local"
     assert certificate.load_error < 1e-11 * loads.max() * problem.units.force
 
@@ -420,17 +452,18 @@ def test_fifty_digits_through_a_mesh(
         return Splitting(Softened(power, 26, 0.4 * extent), 0.01 * extent, 20)
 
     monkeypatch.setattr(Splitting, "choose", classmethod(meshed))
+    monkeypatch.setattr(scattered_points, "FEW", 0)
     first = cr.press(given, approach=approach, influence="scattered")
     control = {"load": first.load} if by_load else {"approach": approach}
     contact = cr.press(given, influence="scattered", **control)
     problem = NormalProblem.assemble(given, influence="scattered", **control)
     loads = contact.loads[problem.candidates] / problem.units.force
-    assert problem.influence.sums(loads) is not None
+    assert problem.influence.sums(Pair.exact(loads)) is not None
     exactly = solve_exactly(given, **control)
     rng = np.random.default_rng(seed)
     for off in (0.0, 1e-15, 1e-12, 1e-6):
         judged = contact.loads * (1 + off * rng.standard_normal(len(given)))
-        certificate = judge(problem, judged)
+        certificate = certify_on(problem, judged)
         assert certificate.scope != "none"
         errors = np.abs(multiprecision.errors(judged, exactly.loads))
         assert (errors <= certificate.load_errors).all()

@@ -30,7 +30,7 @@ def random_points(seed: int, count: int, size: float = 1.0) -> cr.Scene:
     r, angle = 0.01 * np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
     points = np.column_stack((r * np.cos(angle), r * np.sin(angle)))
     tips = size * 0.02 * np.sqrt(61 / count) * rng.lognormal(0, 0.2, count)
-    return cr.Scene(1.0, cr.Asperities(points, tips), MATERIAL, friction=0.5)
+    return cr.Scene(1.0, cr.Asperities(points, tips), MATERIAL, friction=0.5, geometry="summit")
 
 
 def assert_honest(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
@@ -44,7 +44,7 @@ def assert_honest(certificate: cr.Certificate, loads: Array, exact: Any) -> None
     assert drift <= certificate.approach_error
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(2, 20),
@@ -79,21 +79,22 @@ def test_random_points_are_judged_honestly(
         assert_honest(by_load, wrong, exact)
 
 
-def test_random_points_are_proved() -> None:
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("seed", range(6))
+def test_random_points_are_proved(seed: int) -> None:
     """Through a matrix and through a mesh: what used to be undecided is decided."""
-    for seed in range(6):
-        scene = random_points(seed, 300)
-        for kind in ("dense", "scattered"):
-            contact = cr.press(scene, approach=5e-5, influence=kind)
-            certificate = contact.certificate
-            assert contact.crowding > 1.5
-            assert certificate.scope == "local"
-            assert certificate.holds
-            assert certificate.held == (contact.status == "open").sum()
-            assert certificate.load_error < 1e-6 * contact.loads.max()
-            assert "held open" in certificate.meaning
-            sheared = cr.shear(contact, force=0.1 * 0.5 * contact.load)
-            assert sheared.certificate.scope in ("local", "none")
+    scene = random_points(seed, 300)
+    for kind in ("dense", "scattered"):
+        contact = cr.press(scene, approach=5e-5, influence=kind)
+        certificate = contact.certificate
+        assert contact.crowding > 1.5
+        assert certificate.scope == "local"
+        assert certificate.holds
+        assert certificate.held == (contact.status == "open").sum()
+        assert certificate.load_error < 1e-6 * contact.loads.max()
+        assert "held open" in certificate.meaning
+        sheared = cr.shear(contact, force=0.1 * 0.5 * contact.load)
+        assert sheared.certificate.scope in ("local", "none")
 
 
 def all_states(scene: cr.Scene, approach: float) -> list[Any]:
@@ -117,7 +118,7 @@ def all_states(scene: cr.Scene, approach: float) -> list[Any]:
 def test_rivals_are_as_the_certificate_says(distance: float) -> None:
     """Twins, where there are two or three solutions: each is judged, and says true things."""
     points = np.array([[0.0, 0.0], [distance, 0.0], [3e-3, 0.0]])
-    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL)
+    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, geometry="summit")
     approach = 5e-5
     states = all_states(scene, approach)
     assert states
@@ -194,7 +195,7 @@ def test_a_third_beside_a_close_pair_costs_little() -> None:
 def test_who_is_in_the_way() -> None:
     """The pair that can be no least of the energy; else those whose shells meet."""
     points = np.array([[0.0, 0.0], [1.6e-4, 0.0], [2e-3, 0.0], [2.36e-3, 0.0], [5e-3, 0.0]])
-    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL)
+    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, geometry="summit")
     problem = NormalProblem.assemble(scene, approach=5e-5)
     loads = 4 / 3 * 3e-4**3 / scene.relative_radii / problem.units.force  # of discs of 3e-4
     assert list(crowded(problem, loads)) == [0, 1]

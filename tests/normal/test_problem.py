@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -36,6 +37,23 @@ Case = tuple[cr.Scene, float, Kind]
 
 def assembled(scene: cr.Scene, **control: Any) -> NormalProblem:
     return NormalProblem.assemble(scene, **control)
+
+
+def exact_gap(scene: cr.Scene, loads: Any, approach: float) -> Any:
+    """k P^(2/3) + A P - D of loads (n,) as balls of arb, at contact points that are the summits."""
+    a, E, R = scene.asperities, arb(scene.material.contact_modulus), arb(scene.sphere_radius)
+    x, y, heights, tips = (
+        np.array([arb(float(each)) for each in values])
+        for values in (*a.positions.T, a.heights, a.tip_radii)
+    )
+    k = np.array([(9 / (16 * E * E) * (1 / R + 1 / tip)).root(3) for tip in tips])
+    local = k * np.array([P.root(3) ** 2 if P > 0 else arb(0) for P in loads])
+    sunk = [
+        sum(P / (arb.pi() * E * ((x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2).sqrt())
+            for j, P in enumerate(loads) if j != i)
+        for i in range(len(scene))
+    ]  # fmt: skip
+    return local + np.array(sunk) - (arb(approach) + heights - (x * x + y * y) / (2 * R))
 
 
 def phi(problem: NormalProblem, loads: Any) -> float:
@@ -163,7 +181,7 @@ def test_shifted_to_load(indentation: list[float], load: float) -> None:
     assert_allclose(shifted - shifted.max(), depth - depth.max(), atol=1e-15 * shifted.max())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(1, 40),
@@ -207,7 +225,7 @@ def test_manufactured_contacts(
     assert (words[~touching] != "contact").all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(random_cases(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
 def test_newton_converges_from_any_start(drawn: Case, seed: int, size: float) -> None:
     """On every convex scene, to the same answer."""
@@ -221,39 +239,6 @@ def test_newton_converges_from_any_start(drawn: Case, seed: int, size: float) ->
     for control in ({"approach": approach}, {"load": contact.load}):
         again = cr.press(scene, start=start, influence=kind, **control)
         assert_allclose(again.loads, contact.loads, rtol=1e-9, atol=1e-12 * contact.loads.max())
-
-
-@settings(max_examples=60, deadline=None)
-@given(random_cases(crowding=0.95), st.integers(0, 2**32 - 1), st.floats(-9, 0))
-def test_the_duality_gap_bounds_the_suboptimality(drawn: Case, seed: int, size: float) -> None:
-    """For arbitrary feasible loads; and it vanishes at the solution, under both controls."""
-    scene, approach, kind = drawn
-    rng = np.random.default_rng(seed)
-    contact = cr.press(scene, approach=approach)
-    if contact.load == 0 or contact.certificate.scope != "global":
-        return
-    for control in ({"approach": approach}, {"load": contact.load}):
-        problem = assembled(scene, influence=kind, **control)
-        solution = Newton().solve(problem)
-        box = np.maximum(problem.bounds(problem.ceiling), solution.loads)
-        if problem.convexity_number(box) > 1:
-            continue
-        best = phi(problem, solution.loads)
-        wrong = np.abs(solution.loads + 10**size * box * rng.standard_normal(len(problem)))
-        wrong = np.minimum(wrong, box)
-        if problem.load is not None:
-            wrong *= problem.load / wrong.sum()
-        for loads, least in ((solution.loads, 0.0), (wrong, phi(problem, wrong) - best)):
-            if (loads > box).any():
-                continue
-            displacement = problem.influence.apply(loads)
-            gap = problem.duality_gap(loads, displacement, solution.approach, box)
-            assert gap >= least - 1e-15
-        at_best = problem.duality_gap(
-            solution.loads, problem.influence.apply(solution.loads), solution.approach, box
-        )
-        # 32 roundoffs are allowed of terms that add up to at most 2 * 3.3 box * k box^(2/3).
-        assert at_best < 2.5e-14 * float(box @ hertz.indentation(box, problem.coefficients))
 
 
 @pytest.mark.parametrize("kind", OPERATORS)
@@ -296,19 +281,31 @@ def test_every_newton_step_lowers_the_energy(make: Any, kind: Kind) -> None:
 
 
 @pytest.mark.parametrize("kind", operators(paper()))
-def test_newton_residual_is_recomputed(kind: Kind) -> None:
-    problem = assembled(paper(), approach=PAPER_APPROACH, influence=kind)
+def test_the_residual_is_not_below_the_truth(kind: Kind) -> None:
+    """Of loads known to thirty digits it is a bound, and else what float64 makes of the loads."""
+    scene = paper()
+    problem = assembled(scene, approach=PAPER_APPROACH, influence=kind)
     solution = Newton().solve(problem)
-    again = problem.residual(solution.loads, solution.approach)
-    # Of loads whose gaps are known to more digits it is what they say.
-    rounding = 4e-16 * problem.ceiling if problem.influence.sharp else 0.0
-    assert abs(solution.residual - again) <= rounding
-    wrong = solution.loads * 1.01
-    assert problem.residual(wrong, solution.approach) > 1e-3
+    if solution.trial is None:
+        assert solution.residual == problem.residual(solution.loads, solution.approach)
+    else:
+        loads = solution.trial.loads
+        with ctx.workdps(60):
+            force = arb(problem.units.force)
+            exact = np.full(len(scene), arb(0))
+            exact[problem.candidates] = [
+                force * (arb(float(high)) + arb(float(low)))
+                for high, low in zip(*loads, strict=True)
+            ]
+            gap = exact_gap(scene, exact, PAPER_APPROACH)[problem.candidates]
+            wrong = [abs(g) if P > 0 else -g for g, P in zip(gap, loads.high, strict=True)]
+            truth = float(max(wrong) / arb(problem.units.length))
+        assert truth <= solution.residual <= 1e-22 * problem.ceiling
+    assert problem.residual(solution.loads * 1.01, solution.approach) > 1e-3
 
 
 def test_memory_is_asked_before_it_is_taken() -> None:
     asperities = cr.Asperities.hexagonal(spacing=2e-5, tip_radius=1e-4, within=0.0102)
-    scene = cr.Scene(1.0, asperities, MATERIAL)
+    scene = cr.Scene(1.0, asperities, MATERIAL, geometry="summit")
     with pytest.raises(cr.InputError, match=r"asperities that could touch: found 9\.07e\+05"):
         cr.press(scene, approach=PAPER_APPROACH, influence="dense")

@@ -16,7 +16,7 @@ def test_lattices_have_fewer_rivals() -> None:
     for size in np.linspace(3.0, 8.0, 11):
         array = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02 * size, within=0.0102)
         problem = NormalProblem.assemble(
-            cr.Scene(1.0, array, MATERIAL), approach=1e-4, influence="lattice"
+            cr.Scene(1.0, array, MATERIAL, geometry="summit"), approach=1e-4, influence="lattice"
         )
         loads, most = Newton().solve(problem).loads, problem.bounds(problem.ceiling)
         rivals, A = Rivals.of(problem, loads, problem.ceiling), problem.influence

@@ -17,7 +17,7 @@ RATIOS = [0.0, 0.3, 0.5]
 def pressed(
     nu: float, approach: float = PAPER_APPROACH, friction: float | None = 0.5
 ) -> cr.Contact:
-    scene = cr.Scene(1.0, paper().asperities, cr.Material(1.0, nu), friction)
+    scene = cr.Scene(1.0, paper().asperities, cr.Material(1.0, nu), friction, geometry="summit")
     return cr.press(scene, approach=approach)
 
 
@@ -36,16 +36,10 @@ def test_the_losses_cross_earlier_than_by_shear(nu: float) -> None:
         return float(appendix.cycle_energy(contact, t * limit) / hertz.energy(t * limit) - 1)
 
     def over_smooth(t: float) -> float:
-        return float(cr.cycle(contact, maximum=t * limit).energy / hertz.energy(t * limit) - 1)
+        return float(cr.cycle(contact, maximum=t * limit).loss / hertz.energy(t * limit) - 1)
 
     assert brentq(appendix_over_smooth, 0.3, 0.5, xtol=1e-9) == pytest.approx(0.385524, abs=1e-6)
     assert brentq(over_smooth, 0.3, 0.5, xtol=1e-9) == pytest.approx(0.387687, abs=1e-6)
-
-
-@pytest.mark.parametrize(("nu", "expected"), [(0.0, 0.00065), (0.3, 0.0109), (0.5, 0.0206)])
-def test_scatter_of_the_adhered_grows_with_poissons_ratio(nu: float, expected: float) -> None:
-    assert appendix.scatter(sheared(nu, 0.5)) == pytest.approx(expected, rel=0.01)
-    assert appendix.scatter(sheared(nu, -0.5)) == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize("fraction", [0.37, 0.5, 0.8, -0.8, 1.0])
@@ -78,20 +72,10 @@ def test_without_sliding_the_loss_is_that_of_cycle(nu: float) -> None:
     for t in (1e-9, 0.1, 0.35):
         Q = t * 0.5 * contact.load
         cycle = cr.cycle(contact, maximum=Q)
-        assert appendix.cycle_energy(contact, Q) == pytest.approx(cycle.energy, rel=1e-13)
+        assert appendix.cycle_energy(contact, Q) == pytest.approx(cycle.loss, rel=1e-13)
         state = cr.shear(contact, force=-Q)
         assert_array_equal(appendix.slips(state), 0.0)
-        assert_allclose(appendix.energies(state), cycle.energies, rtol=1e-12)
-
-
-def test_energies_split_into_partial_slip_and_sliding() -> None:
-    contact = pressed(0.3)
-    Q = 0.25 * contact.load
-    state, cycle = cr.shear(contact, force=Q), cr.cycle(contact, maximum=Q)
-    sliding = 4 * 0.5 * contact.loads * appendix.slips(state)
-    assert np.count_nonzero(sliding) == 6
-    assert_allclose(appendix.energies(state) - sliding, cycle.partial_slip_energies, rtol=1e-10)
-    assert_allclose(appendix.energies(cr.shear(contact, force=-Q)), appendix.energies(state))
+        assert_allclose(appendix.energies(state), cycle.asperity_losses, rtol=1e-12)
 
 
 def test_a_cycle_costs_by_its_range() -> None:
@@ -115,18 +99,6 @@ def test_at_the_limit_the_last_to_slide_stands_for_the_adhered() -> None:
     assert np.isnan(appendix.scatter(at))
     assert_allclose(appendix.slips(at), appendix.slips(near), rtol=1e-6)
     assert_allclose(appendix.slips(cr.shear(contact, force=-limit)), -appendix.slips(at))
-
-
-def test_one_asperity_moves_with_the_deep_points() -> None:
-    asperities = cr.Asperities([(0.3, -0.1)], 0.02)
-    contact = cr.press(cr.Scene(1.0, asperities, cr.Material(2.0, 0.4), 0.7), load=1e-6)
-    Q = 0.6 * 0.7e-6
-    state = cr.shear(contact, force=Q)
-    assert_allclose(appendix.displacements(state), state.displacement, rtol=1e-13)
-    assert appendix.scatter(state) == 0.0
-    assert_array_equal(appendix.slips(state), 0.0)
-    energy = cr.cycle(contact, maximum=Q).energy
-    assert appendix.cycle_energy(contact, Q) == pytest.approx(energy, rel=1e-13)
 
 
 def test_open_asperities_and_no_shear() -> None:

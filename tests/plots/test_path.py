@@ -49,6 +49,7 @@ def losses() -> cr.PhaseLosses:
     )
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("points", [ONE, TWO, ONE[:1]])
 def test_figures_of_a_path_fit(points: list[tuple[float, float]]) -> None:
     for figure in plots.path_figures(follow("paper", points), **UNITS).values():
@@ -63,7 +64,7 @@ def test_the_path_and_its_memory_are_drawn() -> None:
     last = path.curves[-1]
     vertices = np.array([[float(each) for each in row] for row in (last.levels, last.heights)])
     assert_allclose(lines["memory at 7"], vertices.T / P)
-    assert loop.lines[-1].get_ydata()[-1] == pytest.approx(path.applied[-1] / (0.5 * P))
+    assert loop.lines[-1].get_ydata()[-1] == pytest.approx(path.forces[-1] / (0.5 * P))
     assert cost.lines[0].get_ydata()[-1] == pytest.approx(1.0)
     place = figures["path_stick_slip"].axes[3]
     assert discs(place, "sliding") == int((path.status[3] == "sliding").sum())
@@ -86,11 +87,12 @@ def test_losses_against_phase_are_drawn() -> None:
     fits(figure)
     (axes,) = figure.axes
     half, _, whole, *_ = (line.get_ydata() for line in axes.lines)
-    unit = (found.energy / found.factors**3).max()
-    assert_allclose(half, found.energy[:7] * 8 / unit)
-    assert_allclose(whole, found.energy[7:] / unit)
+    unit = (found.losses / found.factors**3).max()
+    assert_allclose(half, found.losses[:7] * 8 / unit)
+    assert_allclose(whole, found.losses[7:] / unit)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["constant", "about a mean", "ellipse", "elastic", "vector"])
 def test_limits_are_drawn(name: str) -> None:
     found = limits()[name]
@@ -102,6 +104,7 @@ def test_limits_are_drawn(name: str) -> None:
     assert f"{found.kind}: {found.factor:.5g}" in said.get_text()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["constant", "about a mean", "ellipse"])
 def test_the_map_changes_at_the_limits(name: str) -> None:
     """Along the ray of the path, or up at its mean, one more slides at each asperity's factor."""
@@ -129,7 +132,7 @@ def many() -> cr.Scene:
     asperities = cr.Asperities.hexagonal(
         spacing=1.7e-4, tip_radius=1.36e-3, within=8.5e-3, height_std=2e-7, seed=3
     )
-    return cr.Scene(1.0, asperities, MATERIAL, friction=0.5)
+    return cr.Scene(1.0, asperities, MATERIAL, friction=0.5, geometry="summit")
 
 
 def test_many_asperities_are_a_mosaic() -> None:
@@ -144,7 +147,7 @@ def test_many_asperities_are_a_mosaic() -> None:
     colours = np.asarray(place.images[0].get_array())
     shown = colours[..., 3] > 0.5
     dark = np.abs(colours - to_rgba(LOOKS["sliding"][0])).max(axis=-1) < 0.02
-    sliding = (path.status[1] == "sliding").sum() / np.count_nonzero(path.normal_loads[1])
+    sliding = (path.status[1] == "sliding").sum() / np.count_nonzero(path.asperity_loads[1])
     assert dark.sum() / shown.sum() == pytest.approx(sliding, abs=0.05)
     limit = cr.shakedown(scene, loads=load, force_amplitudes=[0.1 * load, -0.1 * load])
     for figure in plots.shakedown_figures(limit, **UNITS).values():

@@ -2,7 +2,6 @@
 
 import dataclasses
 from functools import cache
-from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -16,8 +15,6 @@ from scenes import MATERIAL, PAPER_APPROACH, paper, rough
 import convexrough as cr
 from convexrough import fields, plots
 from convexrough.paper.figures import paper_figures
-from convexrough.plots import cycle as loops
-from convexrough.plots import style
 from convexrough.plots.shear import SLIDING
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
@@ -29,7 +26,7 @@ def pressed(name: str) -> cr.Contact:
     scenes = {
         "paper": paper(),
         "rough": rough(),
-        "one": cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL),
+        "one": cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL, geometry="summit"),
         "nothing": paper(),
     }
     scene = dataclasses.replace(scenes[name], friction=0.5)
@@ -72,6 +69,7 @@ def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
 # --- nothing collides -----------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "shares"),
     [("paper", [0.1, 0.37, 0.5]), ("paper", [-0.5, 0.1, 0.2, 1.0]), ("one", [0.5]),
@@ -81,6 +79,7 @@ def test_stick_slip_fits_to_print(name: str, shares: list[float]) -> None:
     fits(plots.shear_figures(states(name, shares), **UNITS)["stick_slip"])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "maximum", "minimum"),
     [("paper", [0.1, 0.37, 0.5], None), ("paper", [0.9, 0.5], [-0.1, -0.9]),
@@ -91,6 +90,7 @@ def test_cycles_fit_to_print(name: str, maximum: Any, minimum: Any) -> None:
         fits(figure)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "shares"),
     [("one", [0.5]),
@@ -100,21 +100,23 @@ def test_histories_fit_to_print(name: str, shares: list[float]) -> None:
     fits(plots.history_figures(past(name, shares), **UNITS)["history"])
 
 
-def test_figures_of_the_paper_fit_to_print() -> None:
-    for figure in of_paper("paper").values():
-        fits(figure)
-    for stem in ("fig4_rings", "fig7_asperities"):
-        fits(of_paper("one")[stem])
+@pytest.mark.parametrize("stem", ["fig4_rings", "fig7_asperities"])
+@pytest.mark.parametrize("name", ["one", "paper"])
+def test_rings_of_the_paper_fit_to_print(name: str, stem: str) -> None:
+    fits(of_paper(name)[stem])
 
 
-def test_saved_without_a_warning() -> None:
-    of_paper("paper")["fig5_traction"].savefig(file := BytesIO(), format="png", dpi=200)
-    assert 30_000 < len(file.getvalue()) < 1_000_000
+@pytest.mark.parametrize(
+    "stem", ["fig3_pressure", "fig5_traction", "fig6_section", "fig8_loops", "fig9_energy"]
+)
+def test_figures_of_the_paper_fit_to_print(stem: str) -> None:
+    fits(of_paper("paper")[stem])
 
 
 # --- stick-slip map -------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["paper", "rough"])
 def test_a_disc_for_every_word(name: str) -> None:
     shown = states(name, [0.1, 0.37, 0.5, 0.7])
@@ -149,27 +151,10 @@ def test_doubt_is_marked(scope: str, count: int) -> None:
     fits(plots.shear_figures([state] * 3)["stick_slip"])
 
 
-def test_at_most_twelve_states() -> None:
-    shown = states("one", list(np.linspace(0, 1, 30)))
-    titles = [axes.get_title() for axes in plots.shear_figures(shown)["stick_slip"].axes]
-    assert len(titles) == 12
-    assert "= 0:" in titles[0]
-    assert "= 1:" in titles[-1]
-
-
-def test_many_asperities_stay_pixels() -> None:
-    asperities = cr.Asperities.hexagonal(spacing=8e-4, tip_radius=6.4e-3, within=8.5e-3)
-    dense = cr.press(cr.Scene(1.0, asperities, MATERIAL, friction=0.5), approach=PAPER_APPROACH)
-    state = cr.shear(dense, force=0.25 * dense.load)
-    figure = plots.shear_figures([state])["stick_slip"]
-    assert discs(figure.axes[0], "stick") > style.DENSE
-    figure.savefig(file := BytesIO(), format="svg", dpi=200)
-    assert len(file.getvalue()) < 500_000
-
-
 # --- cycles ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("maximum", "minimum"), [(0.5, -0.5), (0.9, -0.1), (0.1, -0.9), (1.0, -1.0), (0.6, 0.2)]
 )
@@ -179,33 +164,11 @@ def test_drawn_loops_close_on_the_loss(maximum: float, minimum: float) -> None:
     sphere = smooth(cycle.contact.scene, load=cycle.contact.load)
     unit = sphere.energy_scale / (sphere.largest_force * sphere.displacement(sphere.largest_force))
     for line, loss in zip(
-        whole.lines, (cycle.energy_normalised, cycle.smooth_normalised), strict=True
+        whole.lines, (cycle.loss_normalised, cycle.smooth_normalised), strict=True
     ):
         x, q = np.asarray(line.get_data(), dtype=float)
         assert_allclose([x[0], q[0]], [x[-1], q[-1]], atol=1e-12)
         assert np.trapezoid(q, x) == pytest.approx(unit * loss, rel=2e-3)
-
-
-def test_the_smooth_loop_is_its_closed_form() -> None:
-    sphere = smooth(contact("paper").scene, load=contact("paper").load)
-    q = np.linspace(1.0, -1.0, 41) * 0.6 * limit("paper")
-    x = loops.smooth_loop(sphere, np.append(q, q[-2::-1]))
-    assert_allclose(x[:41], sphere.branch(q, q[0]), rtol=1e-12, atol=1e-15 * x[0])
-    assert_allclose(x[40:], -x[:41], rtol=1e-12, atol=1e-12 * x[0])
-
-
-def test_drawn_loops_are_those_of_the_cycle() -> None:
-    (cycle,) = steady("rough", [0.2], [-0.8])
-    drawn, computed = cycle.loop(60), cycle.loop(400)
-    down = np.argmin(drawn.forces) + 1, np.argmin(computed.forces) + 1
-    for i in np.flatnonzero(cycle.contact.loads):
-        seen = np.interp(
-            computed.forces[: down[1]][::-1],
-            drawn.forces[: down[0]][::-1],
-            drawn.asperity_forces[: down[0], i][::-1],
-        )
-        expected = computed.asperity_forces[: down[1], i][::-1]
-        assert_allclose(seen, expected, atol=1e-3 * limit("rough"))
 
 
 def test_chosen_asperities_are_named_by_distance() -> None:
@@ -229,7 +192,7 @@ def test_the_loss_is_that_of_the_cycles() -> None:
     assert_allclose(e, mindlin.loss(t), rtol=1e-12)
     x, w = np.asarray(points.get_data(), dtype=float)
     assert_allclose(x, [0.1, 0.37, 0.5], rtol=1e-12)  # no loss at 0
-    assert_allclose(w, [cycles[i].energy_normalised for i in (1, 3, 0)], rtol=1e-12)
+    assert_allclose(w, [cycles[i].loss_normalised for i in (1, 3, 0)], rtol=1e-12)
     y = np.asarray(ratio.lines[1].get_ydata(), dtype=float)
     assert_allclose(y, w / mindlin.loss(x), rtol=1e-12)
     assert "loss" not in plots.cycle_figures(cycles[:1])
@@ -245,28 +208,23 @@ def test_the_path_passes_through_every_step() -> None:
     X0 = sphere.displacement(sphere.largest_force)
     ends, energies = (np.asarray(axes.collections[1].get_offsets()) for axes in (path, cost))
     assert_allclose(ends[1:, 0], done.displacements / X0, rtol=1e-9, atol=1e-15)
-    assert_allclose(ends[1:, 1], done.applied / limit("paper"), rtol=1e-12)
+    assert_allclose(ends[1:, 1], done.forces / limit("paper"), rtol=1e-12)
     assert_allclose(energies[:, 0], range(6))
-    assert_allclose(energies[1:, 1], done.energy / sphere.energy_scale, rtol=1e-9)
+    assert_allclose(energies[1:, 1], done.losses / sphere.energy_scale, rtol=1e-9)
     numbers = {text.get_text() for text in path.texts}
     assert numbers == {"0", "1, 5", "2", "3", "4"}  # the loop closes on its first point
 
 
 def test_long_histories_are_drawn_as_they_are() -> None:
     rng = np.random.default_rng(5)
-    done = past("one", rng.uniform(-1, 1, 3000))
+    done = past("one", rng.uniform(-1, 1, 300))
     path, *_ = plots.history_figures(done)["history"].axes
     (lines,) = path.collections
-    assert len(lines.get_paths()) == 3000
+    assert len(lines.get_paths()) == 300
     assert not path.texts
 
 
 # --- the paper's figures --------------------------------------------------------------------------
-
-
-def test_figures_3_to_9() -> None:
-    stems = [stem.split("_")[0] for stem in of_paper("paper")]
-    assert stems == [f"fig{k}" for k in range(3, 10)]
 
 
 def test_rings_have_the_letters_of_the_paper() -> None:
@@ -297,15 +255,6 @@ def test_the_traction_drawn_is_the_field() -> None:
     assert_allclose(q[slipping], fp[slipping], rtol=1e-9)
 
 
-def test_the_section_shows_cattaneo_and_mindlin() -> None:
-    (axes,) = of_paper("paper")["fig6_section"].axes
-    drawn = {line.get_label(): np.asarray(line.get_data(), dtype=float) for line in axes.lines}
-    x, q = drawn["smooth sphere: $q$"]
-    c = 0.5 ** (1 / 3)
-    inner = np.where(np.abs(x) < c, np.sqrt(np.maximum(c**2 - x**2, 0)), 0)
-    assert_allclose(q, np.sqrt(1 - x**2) - inner, atol=1e-7)
-
-
 def test_each_ring_stops_where_it_slides() -> None:
     left, right = of_paper("paper")["fig7_asperities"].axes
     onsets = cr.onset_of_sliding(contact("paper")) / limit("paper")
@@ -325,16 +274,11 @@ def test_the_crossing_is_marked_where_it_is() -> None:
     t, w = (float(np.ravel(v)[0]) for v in mark.get_data())
     (cycle,) = steady("paper", [t])
     assert t == pytest.approx(0.3877, abs=1e-4)
-    assert cycle.energy_normalised == pytest.approx(cycle.smooth_normalised, rel=3e-4)
-    assert w == pytest.approx(cycle.energy_normalised, rel=1e-3)
+    assert cycle.loss_normalised == pytest.approx(cycle.smooth_normalised, rel=3e-4)
+    assert w == pytest.approx(cycle.loss_normalised, rel=1e-3)
     said = " ".join(text.get_text() for text in zoom.texts)
     assert "0.388" in said
     assert "paper's\ngraph: about 0.37" in said
-
-
-def test_one_sphere_crosses_nothing() -> None:
-    _, zoom = of_paper("one")["fig9_energy"].axes
-    assert not zoom.texts
 
 
 # --- nothing touches ------------------------------------------------------------------------------
@@ -357,9 +301,3 @@ def test_no_contact_is_said() -> None:
 def test_nothing_to_show() -> None:
     assert plots.shear_figures([]) == {}
     assert plots.cycle_figures([]) == {}
-
-
-def test_units_are_said_where_given() -> None:
-    figures = plots.cycle_figures(steady("one", [0.5, 0.8]), length_unit="$mm", force_unit="N")
-    assert r"N \$mm)" in figures["loss"].axes[0].get_ylabel()
-    assert "N" not in plots.cycle_figures(steady("one", [0.5, 0.8]))["loss"].axes[0].get_ylabel()

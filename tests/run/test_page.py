@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
@@ -17,9 +17,9 @@ from convexrough.paper import example
 from convexrough.run import page as slider
 from convexrough.run.page import page_data, slider_page
 from convexrough.run.report import describe
-from convexrough.run.scene_file import UnitNames
 from convexrough.run.stages import Findings
 from convexrough.run.summary import summarise
+from convexrough.tabular.units import UnitNames
 
 UNITS = UnitNames("m", "N")
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -57,7 +57,7 @@ def many() -> cr.Contact:
     rough = cr.Asperities.hexagonal(
         spacing=0.0004, tip_radius=0.0032, within=0.0102, height_std=3e-7, seed=7
     )
-    return pressed(cr.Scene(1.0, rough, cr.Material(1.0, 0.3), friction=0.5))
+    return pressed(cr.Scene(1.0, rough, cr.Material(1.0, 0.3), friction=0.5, geometry="summit"))
 
 
 # What is in the file.
@@ -82,7 +82,7 @@ def test_states_are_those_of_shear_and_cycle(contact: cr.Contact) -> None:
         state = cr.shear(contact, force=states["fraction"][k] * limit)
         cycle = cr.cycle(contact, maximum=states["fraction"][k] * limit)
         assert states["length"][k] == float(f"{state.displacement:.5g}")
-        assert states["loss"][k] == float(f"{cycle.energy_normalised:.5g}")
+        assert states["loss"][k] == float(f"{cycle.loss_normalised:.5g}")
         assert float(states["displacement_error"][k]) >= cycle.displacement_error
         assert states["sliding"][k] == (state.status == "sliding").sum()
         assert states["undecided"][k] == (state.status == "undecided").sum()
@@ -114,24 +114,6 @@ def test_of_thousands_some_can_be_followed(many: cr.Contact) -> None:
     assert len(data["followed"]["disc"]) == slider.MOST_FOLLOWED
     assert data["left_out"] == ["200 of the asperities can be followed."]
     assert len(text.encode()) < 2_000_000
-
-
-def test_of_more_some_are_drawn_at_fewer_forces(
-    many: cr.Contact, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(slider, "MOST_DRAWN", 300)
-    monkeypatch.setattr(slider, "FORCES", {100: 101, 1000: 51})
-    data = data_of(many)
-    assert len(data["discs"]["x"]) == len(data["stick"][0]) == 300
-    assert len(data["stick"]) == len(data["states"]["fraction"]) == 21
-    drawn, _, forces = data["left_out"]
-    assert drawn == f"300 of {data['touching']:,} touching asperities are drawn, by lot and larger."
-    a_H = cr.smooth(many.scene, load=many.load).contact_radius
-    covered, whole = np.square(data["discs"]["radius"]).sum(), np.square(many.contact_radii / a_H)
-    assert covered == pytest.approx(whole.sum(), rel=0.1)
-    assert forces == "There are 21 forces."
-    sliding = (cr.shear(many, force=0.25 * many.load).status == "sliding").sum()
-    assert data["states"]["sliding"][10] == sliding  # of all
 
 
 # What the command line writes.
@@ -212,9 +194,10 @@ def follow(shown: Opened, index: int) -> None:
     shown.page.locator("#follow").select_option(label=label)
 
 
+@in_browser
 def test_in_metres_the_list_has_room_for_both_coordinates(browser: Browser, tmp_path: Path) -> None:
     tiny = cr.Asperities.hexagonal(spacing=25e-6, tip_radius=2e-4, within=1.02e-4)
-    scene = cr.Scene(0.01, tiny, cr.Material(1e11, 0.3), friction=0.5)
+    scene = cr.Scene(0.01, tiny, cr.Material(1e11, 0.3), friction=0.5, geometry="summit")
     text = page_of(cr.press(scene, approach=5e-7), UnitNames("m", "N"))
     (tmp_path / "slider.html").write_text(text, encoding="utf-8")
     shown = Opened(browser, tmp_path / "slider.html")
@@ -248,7 +231,7 @@ def assert_shown(shown: Opened, contact: cr.Contact, fraction: float, index: int
     assert shown.number("x") == float(f"{state.displacement:.5g}")
     assert shown.number("x_part") == float(f"{state.displacement / X0:.5g}")
     assert shown.number("x_error") >= steady.displacement_error
-    assert shown.number("w") == float(f"{steady.energy_normalised:.5g}")
+    assert shown.number("w") == float(f"{steady.loss_normalised:.5g}")
     assert shown.number("w_smooth") == float(f"{steady.smooth_normalised:.5g}")
     slide = (state.status == "sliding").sum()
     assert shown.text("said").startswith(f"{slide} of 37 slide")
@@ -291,17 +274,6 @@ def test_the_keyboard_moves_the_force(opened: Opened, contact: cr.Contact) -> No
 
 
 @in_browser
-def test_the_mouse_moves_the_force(opened: Opened, contact: cr.Contact) -> None:
-    box = opened.page.locator("#force").bounding_box()
-    assert box is not None
-    for part in (0.2, 0.8):
-        opened.page.mouse.click(box["x"] + part * box["width"], box["y"] + box["height"] / 2)
-        fraction = float(opened.text("fraction"))
-        assert fraction == pytest.approx(part, abs=0.03)
-        assert_shown(opened, contact, fraction, 36)
-
-
-@in_browser
 def test_an_asperity_is_followed_by_mouse_and_keyboard(opened: Opened, contact: cr.Contact) -> None:
     opened.page.locator("#map circle.stick").first.click()
     assert opened.page.locator("h2 .who").inner_text() == "0"
@@ -311,49 +283,3 @@ def test_an_asperity_is_followed_by_mouse_and_keyboard(opened: Opened, contact: 
     assert opened.page.locator("h2 .who").inner_text() == "36"
     follow(opened, 7)
     assert_shown(opened, contact, 0.5, 7)
-
-
-@in_browser
-def test_the_certificate_is_in_sight(opened: Opened) -> None:
-    said = opened.text("certificate")
-    assert re.search(r"^certificate +global: the scene has exactly one solution$", said, re.M)
-    assert re.search(r"^load error +\S+ N", said, re.M)
-
-
-@in_browser
-def test_it_plays_and_pauses(opened: Opened) -> None:
-    play, before = opened.page.locator("#play"), opened.text("fraction")
-    play.click()
-    assert play.inner_text() == "Pause"
-    expect(opened.page.locator("#fraction")).not_to_have_text(before)
-    play.click()
-    stopped = opened.text("fraction")
-    opened.page.wait_for_timeout(300)
-    assert (play.inner_text(), opened.text("fraction")) == ("Play", stopped)
-
-
-@in_browser
-def test_who_wants_less_motion_gets_none(
-    browser: Browser, contact: cr.Contact, tmp_path: Path
-) -> None:
-    (tmp_path / "slider.html").write_text(page_of(contact), encoding="utf-8")
-    shown = Opened(browser, tmp_path / "slider.html", reduced_motion="reduce")
-    assert not shown.page.locator("#play").is_visible()
-    shown.close()
-
-
-@in_browser
-@pytest.mark.parametrize("size", ["none", "many"])
-def test_from_none_to_thousands(
-    browser: Browser, many: cr.Contact, tmp_path: Path, size: str
-) -> None:
-    shown_contact = many if size == "many" else pressed(example.scene(), approach=0.0)
-    (tmp_path / "slider.html").write_text(page_of(shown_contact), encoding="utf-8")
-    shown = Opened(browser, tmp_path / "slider.html")
-    touching = (shown_contact.loads > 0).sum()
-    assert shown.page.locator("#map circle.stick").count() == touching
-    shown.page.locator("#map").click()
-    shown.page.locator("#force").focus()
-    shown.page.keyboard.press("ArrowRight")
-    assert shown.text("said").startswith(f"{shown.page.locator('#map circle.sliding').count()} of ")
-    shown.close()

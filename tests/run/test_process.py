@@ -1,6 +1,5 @@
 """The command as a process: `python -m`, interrupts, and an output that nobody takes."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -22,12 +21,6 @@ def module(*arguments: str, cwd: Path, stdout: int) -> subprocess.CompletedProce
     return subprocess.run(
         command, cwd=cwd, stdout=stdout, stderr=subprocess.PIPE, text=True, check=False
     )
-
-
-def test_python_m(tmp_path: Path) -> None:
-    done = module("--version", cwd=tmp_path, stdout=subprocess.PIPE)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("convexrough, version ")
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -78,14 +71,6 @@ def test_a_full_standard_output(tmp_path: Path, arguments: tuple[str, ...]) -> N
     assert done.returncode == 1
     assert done.stderr == "convexrough: error: standard output: No space left on device\n"
     assert len(arguments) == 1 or (tmp_path / "a-results" / "summary.json").exists()
-
-
-def test_a_standard_output_that_nobody_reads(tmp_path: Path) -> None:
-    reading, writing = os.pipe()
-    os.close(reading)
-    done = module("--help", cwd=tmp_path, stdout=writing)
-    os.close(writing)
-    assert (done.returncode, done.stderr) == (1, "")
 
 
 def test_no_standard_output_at_all(tmp_path: Path) -> None:

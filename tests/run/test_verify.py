@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from drawn import fits, words
 from scene_files import HEXAGONAL, scene_text, write_loads
-from scenes import scattered
 
 import convexrough as cr
+from convexrough.friction.verdict import verify_shear
 from convexrough.plots.verdict import verdict_figures
 from convexrough.run.scene_file import read_scene
-from convexrough.shearing.verdict import verify_shear
 
-MORE = '[units]\nlength = "m"\nforce = "N"\n[friction]\ncoefficient = 0.5\n'
+MORE = '[units]\nlength = "mm"\nforce = "N"\n[friction]\ncoefficient = 0.5\n'
 
 
 @pytest.fixture
@@ -44,10 +43,19 @@ def test_what_is_right(command: Any, contact: cr.Contact) -> None:
         outcome = command("verify", scene, claim(contact), "--within", "1e-10")
         assert (outcome.status, outcome.err) == (0, "")
         lines = [line for line in outcome.out.splitlines() if line]
-        assert [line[:18].strip() for line in lines[1:6]] == [
-            *("loads", "wrong set", "undecided", "loads off", "total off")
+        assert [line[:18].strip() for line in lines[1:8]] == [
+            *(
+                "geometry",
+                "contact modulus",
+                "loads",
+                "wrong set",
+                "undecided",
+                "loads off",
+                "total off",
+            )
         ]
-        assert [line[18:22] for line in lines[1:6]] == ["the ", *["none"] * 4]
+        assert re.search(r" active set proved; loads to \S+e-1\d of the largest$", lines[3])
+        assert [line[18:22] for line in lines[4:8]] == ["none"] * 4
 
 
 def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
@@ -59,7 +67,7 @@ def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
     heads = [" ".join(line) for line in lines]
     places = [
         next(i for i, line in enumerate(heads) if line.startswith(each))
-        for each in ("loads the", "wrong set 2", "claimed open, proved to touch: 1",
+        for each in ("loads active set wrong", "wrong set 2", "claimed open, proved to touch: 1",
                      "claimed to touch, proved open: 1", "undecided none", "loads off",
                      "total off none prescribed", "suspects", "the loads as given, by themselves")
     ]  # fmt: skip
@@ -95,33 +103,6 @@ def test_json(command: Any, contact: cr.Contact) -> None:
     assert rows[36]["load_error"] >= rows[36]["solution"] > 0
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_a_new_users_trial(command: Any, tmp_path: Path, seed: int) -> None:
-    """The smallest load left out, and a spurious one: what certify alone let pass."""
-    scene, approach = scattered(seed, 25, 0.3, 0.3)
-    contact = cr.press(scene, approach=approach)
-    a = scene.asperities
-    rows = np.column_stack((a.positions, a.heights, a.tip_radii)).tolist()
-    lines = ["x,y,height,tip_radius", *(",".join(map(repr, row)) for row in rows)]
-    (tmp_path / "summits.csv").write_text("\n".join(lines))
-    (tmp_path / "a.toml").write_text(
-        f"[sphere]\nradius = {scene.sphere_radius!r}\n[material]\npoisson_ratio = 0.3\n"
-        f"contact_modulus = {scene.material.contact_modulus!r}\n[asperities]\npattern = 'file'\n"
-        f"path = 'summits.csv'\ngeometry = '{scene.geometry}'\n[normal]\napproach = {approach!r}\n"
-    )
-    touching, apart = np.flatnonzero(contact.loads), np.flatnonzero(contact.loads == 0)
-    i = int(touching[np.argmin(contact.loads[touching])])
-    assert command("verify", "a.toml", claim(contact)).status == 0
-    wrong = [({i: 0.0}, "wrongly_open", i)]
-    wrong += [({int(j): 1e-4 * contact.loads.max()}, "wrongly_loaded", int(j)) for j in apart[:1]]
-    for changes, kind, guilty in wrong:
-        outcome = command("verify", "a.toml", claim(contact, changes), "--json")
-        assert outcome.status == 3
-        verdict = json.loads(outcome.out)["verdict"]
-        assert verdict[kind] == [guilty]
-        assert verdict["suspects"][0] == guilty
-
-
 @pytest.mark.parametrize("scene", ["a.toml", "b.toml"])
 def test_loads_in_another_unit(command: Any, contact: cr.Contact, scene: str) -> None:
     outcome = command("verify", scene, claim(contact, factor=1e3))
@@ -132,22 +113,6 @@ def test_loads_in_another_unit(command: Any, contact: cr.Contact, scene: str) ->
     if scene == "b.toml":
         assert "ratio 1000\n" in outcome.out
         assert "total of the loads off" in outcome.err
-
-
-def test_a_total_that_is_off(command: Any, contact: cr.Contact) -> None:
-    loads = claim(contact, factor=1 + 1e-5)
-    assert command("verify", "b.toml", loads).status == 3
-    assert command("verify", "b.toml", loads, "--within", "1e-4").status == 0
-
-
-def test_loads_not_within(command: Any, contact: cr.Contact) -> None:
-    loads = claim(contact, {3: contact.loads[3] * (1 + 1e-5)})
-    assert command("verify", "a.toml", loads).status == 0
-    assert command("verify", "a.toml", loads, "--within", "1e-3").status == 0
-    outcome = command("verify", "a.toml", loads, "--within", "1e-6", "--json")
-    assert outcome.status == 3
-    assert json.loads(outcome.out)["verdict"]["off"] == [3]
-    assert "warning: not certified: 1 loads off" in outcome.err
 
 
 def test_noise(command: Any, contact: cr.Contact) -> None:
@@ -167,10 +132,10 @@ def test_noise(command: Any, contact: cr.Contact) -> None:
 
 def test_units_in_the_header(command: Any, contact: cr.Contact) -> None:
     path = Path(claim(contact))
-    path.write_text(path.read_text().replace("x,load,y", "x [m],load [mN],y [m]"))
+    text = path.read_text()
+    path.write_text(text.replace("x,load,y", "x [mm],load [N],y [mm]"))
     outcome = command("verify", "a.toml", str(path))
-    assert "x [m], y [m], load [mN]" in outcome.out
-    assert "hint: the file has mN, the scene N; nothing is converted" in outcome.err
+    assert "load [N], x [mm], y [mm], matched by position" in outcome.out
 
 
 def test_columns_and_tolerance(command: Any, contact: cr.Contact) -> None:
@@ -199,7 +164,7 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     asked = ("verify", "a.toml", claim(contact), "--force", repr(force), "--shear")
     outcome = command(*asked, shear_file(contact, state.forces))
     assert (outcome.status, outcome.err) == (0, "")
-    assert "shear forces      the claim holds" in outcome.out
+    assert "shear forces      words of all proved; shear forces only to " in outcome.out
     spoiled = state.forces.copy()
     spoiled[4] = 0.5 * contact.loads[4]
     outcome = command(*asked, shear_file(contact, spoiled), "--json")
@@ -212,24 +177,6 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     assert (row["shear_claimed"], row["shear_status"]) == ("sliding", "partial")
     assert row["force_error"] >= spoiled[4] - state.forces[4]
     assert "total of the forces off" in outcome.err
-
-
-def test_words_of_shear_forces(command: Any, contact: cr.Contact) -> None:
-    force = 0.25 * contact.load
-    state = cr.shear(contact, force=force)
-    asked = ("verify", "a.toml", claim(contact), "--force", repr(force), "--json", "--shear")
-    assert command(*asked, shear_file(contact, state.forces, state.status)).status == 0
-    said = np.where(state.status == "sliding", "partial", state.status)
-    said[0] = "sliding"
-    outcome = command(*asked, shear_file(contact, state.forces, said))
-    found = json.loads(outcome.out)["shear_verdict"]
-    assert outcome.status == 3
-    assert found["wrongly_sliding"] == [0]
-    assert found["wrongly_sticking"] == np.flatnonzero(state.status == "sliding").tolist()
-    said[0] = "rolling"
-    outcome = command(*asked, shear_file(contact, state.forces, said))
-    assert outcome.status == 2
-    assert "forces.csv: column status: found 'rolling', expected sliding, partial" in outcome.err
 
 
 def test_wrong_use(command: Any, contact: cr.Contact) -> None:
@@ -278,14 +225,6 @@ def test_the_figure(contact: cr.Contact) -> None:
         assert {"36", "50", "claimed open, proved to touch (1)"} < said
         fits(figures["verdict"])
     assert {"4", "claimed to slide, proved not to (1)", "sliding", "partial slip"} < said
-
-
-def test_the_figure_of_many(monkeypatch: pytest.MonkeyPatch, contact: cr.Contact) -> None:
-    monkeypatch.setattr("convexrough.plots.verdict.MOSAIC", 10)
-    figure = verdict_figures(cr.verify(contact.scene, contact.loads, approach=5e-5))["verdict"]
-    (image,) = figure.axes[0].images
-    assert set(np.unique(image.get_array().compressed())) == {0, 1}
-    assert "loads: the claim holds" in {text.get_text() for text in words(figure)}
 
 
 def test_the_page_has_every_option_and_exit_status(command: Any) -> None:

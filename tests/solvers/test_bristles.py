@@ -63,7 +63,7 @@ def test_names_tell_the_last_step() -> None:
 @pytest.mark.parametrize("bristles", [1, 2, 5])
 def test_exact_where_the_contact_ends_on_an_edge(bristles: int) -> None:
     """A single asperity fills its box, and the force on each cell is then the mean of Hertz's."""
-    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], tip_radii=0.02), MATERIAL)
+    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], tip_radii=0.02), MATERIAL, geometry="summit")
     reference, prescribed = pressed(scene, PAPER_APPROACH, "approach")
     assert abs(errors(reference, prescribed, BristleQP(bristles, False))[0]) < 1e-10
 
@@ -119,7 +119,7 @@ def test_osqp_never_sees_an_indefinite_matrix(found: tuple[cr.Scene, float]) -> 
 def test_a_box_cut_to_the_convex_range(control: str, matrices: list[Any]) -> None:
     """The a priori bounds are not convex, the contact is: answered, and certified."""
     wide = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.03)
-    scene, approach = cr.Scene(1.0, wide, MATERIAL), 5e-4
+    scene, approach = cr.Scene(1.0, wide, MATERIAL, geometry="summit"), 5e-4
     problem = NormalProblem.assemble(scene, approach=approach)
     assert problem.convexity_number(problem.bounds(problem.ceiling)) > 1.5
     reference, prescribed = pressed(scene, approach, control)

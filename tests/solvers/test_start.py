@@ -35,14 +35,16 @@ def test_no_other_size_of_the_start_has_less_energy() -> None:
 def test_nothing_where_the_smooth_sphere_would_touch(prescribed: dict[str, Any]) -> None:
     ring = np.exp(2j * np.pi * np.arange(6) / 6)
     positions = 0.01 * np.column_stack((ring.real, ring.imag))
-    tall = cr.Scene(1.0, cr.Asperities(positions, 0.02, 6e-5), MATERIAL)
+    tall = cr.Scene(1.0, cr.Asperities(positions, 0.02, 6e-5), MATERIAL, geometry="summit")
     assert cr.press(tall, **prescribed).certificate.holds
 
 
 def test_the_mean_field_is_close_on_a_fine_lattice(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where only some asperities are looked at."""
     fine = cr.Asperities.hexagonal(spacing=0.0025 / 15, tip_radius=0.02 / 15, within=0.01)
-    problem = NormalProblem.assemble(cr.Scene(1.0, fine, MATERIAL), approach=5e-5)
+    problem = NormalProblem.assemble(
+        cr.Scene(1.0, fine, MATERIAL, geometry="summit"), approach=5e-5
+    )
     for sample in (mean_field.SAMPLE, 2000):
         monkeypatch.setattr(mean_field, "SAMPLE", sample)
         loads = hertz.load(start_indentation(problem), problem.coefficients)

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import convexrough as cr
 from convexrough.errors import SolverError
-from convexrough.surface import Provability, crowded, model_errors, provability
+from convexrough.surface import Provability, crowded, provability
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384)
 
@@ -70,14 +70,6 @@ def test_what_trust_needs(change: dict[str, object], trusted: bool) -> None:
     assert (curve.trusted_from == 0.1) == trusted
 
 
-def test_where_nothing_is_left_the_curve_ends() -> None:
-    curve = provability(MAP.summits(0.0), press, levels=[0.1, 0.95, 1.0])
-    assert curve.prune[-1] in (0.95, 1.0)
-    pruned = MAP.summits(0.1)
-    with pytest.raises(cr.InputError, match=r"prune: found 0\.05, expected a number from 0\.1"):
-        provability(pruned, press, levels=[0.05])
-
-
 def test_a_solver_that_fails_is_a_level_without_trust() -> None:
     def fails(asperities: cr.Asperities) -> cr.Contact:
         if len(asperities) > 100:
@@ -110,18 +102,3 @@ def test_crowded_pairs_are_all_of_them(above: float) -> None:
         assert_allclose(value, expected[min(i, j), max(i, j)], rtol=1e-12)
     if expected:
         assert_allclose(values[0], contact.crowding, rtol=1e-12)
-
-
-def test_the_largest_model_error_is_that_of_the_contact() -> None:
-    contact = press(MAP.summits(0.0))
-    errors = model_errors(contact)
-    assert_allclose(errors.max(), contact.model_error, rtol=1e-6)
-    assert (errors[contact.loads == 0] == 0).all()
-    assert (errors[contact.loads > 0] > 0).all()
-
-
-def test_who_touches_alone_is_in_nobodys_way() -> None:
-    one = cr.press(cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), cr.Material(1, 0.3)), approach=1e-5)
-    pairs, values = crowded(one)
-    assert len(pairs) == len(values) == 0
-    assert model_errors(one).tolist() == [0.0]

@@ -55,13 +55,6 @@ def test_matrices(tmp_path: Path, separator: str, ending: str) -> None:
     assert_array_equal(raw(path, pixel=1.0).heights, HEIGHTS)
 
 
-def test_decimal_commas_and_fortran(tmp_path: Path) -> None:
-    german = matrix(separator=";").replace(".", ",")
-    assert_array_equal(raw(text(tmp_path, german), pixel=1.0).heights, HEIGHTS)
-    fortran = "\n".join(" ".join(f"{v:.17e}".replace("e", "D") for v in row) for row in HEIGHTS)
-    assert_array_equal(raw(text(tmp_path, fortran), pixel=1.0).heights, HEIGHTS)
-
-
 def test_what_gwyddion_writes(tmp_path: Path) -> None:
     head = "# Channel: Height\n# Width: 18.0 µm\n# Height: 21.0 µm\n# Value units: nm\n"
     surface = raw(text(tmp_path, head + matrix(1e2 * HEIGHTS, "\t")))
@@ -78,17 +71,6 @@ def test_lists(tmp_path: Path, header: str) -> None:
     named = "µm" in header
     assert surface.unit == ("mm" if named else "")
     assert_allclose(surface.heights, HEIGHTS * (1e-3 if named else 1), rtol=1e-14)
-
-
-def test_lists_with_holes(tmp_path: Path) -> None:
-    rows = np.column_stack((X.ravel(), Y.ravel(), HEIGHTS.ravel()))[np.arange(63) != 30]
-    path = text(tmp_path, "x,y,z\n" + matrix(rows, ","), "list.csv")
-    with pytest.raises(cr.InputError, match=r"found 1 holes \(nan\) in 63 pixels, expected none"):
-        raw(path)
-    surface = raw(path, fill=True)
-    assert surface.filled == 1
-    around = HEIGHTS[[2, 4, 3, 3], [3, 3, 2, 4]]
-    assert_allclose(surface.heights[3, 3], around.mean())
 
 
 def test_a_file_is_levelled_unless_asked(tmp_path: Path) -> None:
@@ -125,7 +107,7 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         ("# Value units: V\n" + matrix(), {"pixel": 1.0, "unit": "m"}, "height_unit: found 'V'"),
         (matrix().replace("\n", "\nx ", 1), {"pixel": 1.0}, "row 2, column 1: height: found 'x'"),
         (matrix() + "1 2\n", {"pixel": 1.0}, "row 8: cells: found 2, expected 9, as in the first"),
-        ("a b c\n" + matrix(), {"pixel": 1.0}, "columns: found a, b, c, expected columns x, y and"),
+        ("a b c\n" + matrix(), {"pixel": 1.0}, "columns: found a, b, c, expected a column 'x'"),
         (
             "x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n",
             {},
@@ -135,7 +117,7 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
         ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
         ("", {}, "empty"),
-        ("x,y,z\n", {}, "no rows below the header"),
+        ("x,y,z\n", {}, "rows: found none below the header"),
         ("1 2 3 4\n", {"pixel": 1.0}, "shape"),
     ],
 )
@@ -143,34 +125,15 @@ def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -
     path = text(tmp_path, content)
     with pytest.raises(cr.ConvexroughError, match=message) as caught:
         cr.surface.read(path, **options)
-    assert str(caught.value).count(str(path)) == 1
-
-
-def test_wrong_arrays(tmp_path: Path) -> None:
-    def refused(name: str, message: str, **options: Any) -> None:
-        with pytest.raises(cr.ConvexroughError, match=message) as caught:
-            raw(tmp_path / name, **options)
-        assert str(caught.value).count(str(tmp_path / name)) == 1
-
-    refused("missing.npy", "cannot be read: No such file")
-    np.save(tmp_path / "one.npy", HEIGHTS[0])
-    refused("one.npy", "expected rows and columns", pixel=1.0)
-    np.save(tmp_path / "words.npy", np.array([["a"]]))
-    refused("words.npy", "found an array of <U1", pixel=1.0)
-    np.save(tmp_path / "object.npy", np.array([[None]]), allow_pickle=True)
-    refused("object.npy", "not an .npy file", pixel=1.0)
-    np.savez(tmp_path / "two.npz", a=HEIGHTS, b=HEIGHTS)
-    refused("two.npz", 'arrays: found a, b, expected one called "heights"', pixel=1.0)
-    (tmp_path / "no.npz").write_bytes(b"PK\x03\x04 rubbish")
-    refused("no.npz", "not an .npz file", pixel=1.0)
-    (tmp_path / "no.csv").write_bytes(b"PK\x03\x04 rubbish")
-    refused("no.csv", "an archive or an Excel workbook", pixel=1.0)
+    assert all(line.count(str(path)) == 1 for line in str(caught.value).splitlines())
 
 
 def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     (tmp_path / "a.gwy").write_bytes(b"GWYP")
-    with pytest.raises(cr.FileError, match=r"a.gwy: needs SurfaceTopography: .*\[surface\]"):
+    with pytest.raises(
+        cr.FileError, match=r"a\.gwy: needs SurfaceTopography: pip install SurfaceTopography"
+    ):
         cr.surface.read(tmp_path / "a.gwy")
 
 

@@ -39,7 +39,7 @@ def test_summits_are_asperities_that_know_their_map() -> None:
 
 
 def test_the_scene_takes_them() -> None:
-    scene = cr.Scene(1e4, MAP.summits(), cr.Material(1.0, 0.3))
+    scene = cr.Scene(1e4, MAP.summits(), cr.Material(1.0, 0.3), geometry="summit")
     contact = cr.press(scene, load=10.0)
     assert contact.certificate.holds
     moved = dataclasses.replace(contact.scene, sphere_radius=2e4)
@@ -81,15 +81,6 @@ def test_wrong_questions(options: dict[str, object], message: str) -> None:
         MAP.summits(**options)  # type: ignore[arg-type]
 
 
-def test_no_summit_is_left() -> None:
-    y, x = np.mgrid[:9, :9]
-    ridge = cr.surface.Surface(x + 0.01 * y**2, 1.0)
-    with pytest.raises(cr.InputError, match=r"none of 1 maxima: 0 pruned, 1 at the edge"):
-        ridge.summits()
-    with pytest.raises(cr.InputError, match="prune"):
-        MAP.summits(0.1).pruned(0.05)
-
-
 def test_the_map_has_the_moments_of_its_spectrum() -> None:
     """Amplitudes are not random: variances are those of the waves to rounding, of every seed."""
     exact = cr.surface.self_affine_moments(0.8, 0.1, 32.0, pixels=256)
@@ -101,26 +92,6 @@ def test_the_map_has_the_moments_of_its_spectrum() -> None:
         around = np.pad(surface.heights, ((0, 0), (1, 1)), mode="wrap")
         slopes = np.gradient(around, axis=1)[:, 1:-1]
         assert np.mean(slopes**2) < exact.m2  # differences see less than derivatives
-
-
-def test_differences_approach_the_spectrum() -> None:
-    """m2 and m4 by differences are of second order in the pixel: the same waves, seen closer."""
-    exact = cr.surface.self_affine_moments(0.8, 0.1, 32.0, pixels=128, cutoff=8.0)
-    errors = []
-    for finer in (1, 2, 4):
-        surface = cr.surface.self_affine(
-            0.8, 0.1, 32.0, 7, pixels=128 * finer, pixel=1 / finer, cutoff=8.0
-        )
-        found = cr.surface.Surface(np.tile(surface.heights, (6, 6)), 1 / finer).moments
-        errors.append((found.m2 / exact.m2 - 1, found.m4 / exact.m4 - 1))
-    orders = np.diff(np.log2(np.abs(errors)), axis=0)
-    assert_allclose(orders, -2.0, atol=0.3)
-
-
-def test_more_pixels_are_the_same_surface() -> None:
-    coarse = cr.surface.self_affine(0.7, 0.2, 20.0, 3, pixels=64, cutoff=9.0)
-    fine = cr.surface.self_affine(0.7, 0.2, 20.0, 3, pixels=192, pixel=1 / 3, cutoff=9.0)
-    assert_allclose(fine.heights[::3, ::3], coarse.heights, atol=1e-12 * coarse.max_height)
 
 
 def test_summits_are_as_a_gaussian_surface_has_them() -> None:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import least_squares
 
 import convexrough as cr
 from convexrough.surface.holes import filled
@@ -46,26 +45,6 @@ def test_a_sphere_is_removed_and_said(radius: float) -> None:
     assert_allclose(rough.rms_height, NOISE.std(), rtol=1e-2)
 
 
-@pytest.mark.parametrize("radius", [22.0, -60.0])
-def test_no_sphere_fits_better(radius: float) -> None:
-    """Of heights far from any sphere, against a general optimiser in centre and radius."""
-    x, y = grid()
-    sign = np.sign(radius)
-    heights = sign * np.sqrt(radius**2 - x**2 - y**2) + 1e3 * NOISE * (np.cos(x) + y / 10) / 3
-    surface = cr.surface.Surface(heights, (0.5, 0.7)).detrend("sphere")
-
-    def misfit(where: np.ndarray) -> np.ndarray:
-        x0, y0, z0, curvature = where
-        r = 1 / curvature
-        inside = np.maximum(r * r - (x - x0) ** 2 - (y - y0) ** 2, 1e-9)
-        return (heights - z0 - np.sign(r) * np.sqrt(inside)).ravel()
-
-    start = [0.0, 0.0, 0.0, 1 / radius]
-    best = least_squares(misfit, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    assert_allclose(surface.removed[0].curvature, best.x[3], rtol=1e-5)
-    assert_allclose(surface.rms_height, np.sqrt(np.mean(best.fun**2)), rtol=1e-9)
-
-
 def test_another_unit_is_the_same_surface() -> None:
     x, y = grid()
     cap = np.sqrt(50**2 - x**2 - y**2) + NOISE
@@ -81,15 +60,6 @@ def test_another_unit_is_the_same_surface() -> None:
         cr.surface.Surface(cap, 1.0).to_unit("m")
 
 
-def test_removals_are_remembered_in_their_order() -> None:
-    x, y = grid()
-    cap = np.sqrt(50**2 - x**2 - y**2) + 0.1 * x + NOISE
-    both = cr.surface.Surface(cap, (0.5, 0.7)).detrend("plane").detrend("sphere")
-    assert [each.kind for each in both.removed] == ["plane", "sphere"]
-    assert "radius" in str(both.removed[1])
-    assert both.summits(0.3).origin.removed == both.removed
-
-
 def test_moments_of_plain_waves() -> None:
     """z = A sin(q x): m2 = A^2 q^2 / 4 as the mean of x and y, up to the differences."""
     x, _ = grid((200, 2000), (0.01, 0.01))
@@ -99,14 +69,6 @@ def test_moments_of_plain_waves() -> None:
     assert_allclose(surface.moments.m2, 0.3**2 * q**2 / 4, rtol=2e-3)
     assert_allclose(surface.moments.m4, 0.3**2 * q**4 / 4, rtol=2e-3)
     assert surface.moments.slope_ratio == 0.0
-
-
-def test_the_bandwidth_of_one_wavelength() -> None:
-    """Waves of one length in all directions: alpha is the least there is, 1.5."""
-    moments = cr.surface.self_affine_moments(0.5, 0.1, 64.0, pixels=1024, cutoff=512 / 10.0)
-    narrow = cr.surface.Moments(1.0, 0.5, 3 / 8)  # q = 1: means of cos^2 and cos^4
-    assert narrow.bandwidth == 1.5
-    assert moments.bandwidth > 1.5
 
 
 @pytest.mark.parametrize(

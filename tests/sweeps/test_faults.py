@@ -1,6 +1,6 @@
 """Whatever is killed, and whenever: nothing is half-written, and resuming gives the same table.
 
-A few kills in every run of the tests; with --full, 30 of the command and 30 of its workers.
+One kill in every run of the tests; with --full, 30 of the command and 30 of its workers.
 """
 
 import os
@@ -31,7 +31,7 @@ def whole() -> cr.SweepTable:
 
 
 def kills(request: pytest.FixtureRequest) -> int:
-    return 30 if request.config.getoption("--full") else 3
+    return 30 if request.config.option.full else 1
 
 
 def begun(folder: Path, *arguments: str) -> subprocess.Popen[str]:
@@ -64,7 +64,7 @@ def test_the_command_is_killed_at_any_moment(
     assert begun(tmp_path).communicate()[1] == ""
     usual = time.monotonic() - began
     shutil.rmtree(tmp_path / "a-sweep")
-    delays = random.Random(16)
+    delays = random.Random(request.config.option.seed)
     known = killed = 0
     while killed < kills(request):
         process = begun(tmp_path, "--resume")
@@ -95,7 +95,7 @@ def test_the_command_is_killed_at_any_moment(
 def test_workers_are_killed_at_any_moment(
     request: pytest.FixtureRequest, tmp_path: Path, whole: cr.SweepTable
 ) -> None:
-    delays = random.Random(17)
+    delays = random.Random(request.config.option.seed)
     killed = 0
     while killed < kills(request):
         process = begun(tmp_path)
@@ -112,6 +112,7 @@ def test_workers_are_killed_at_any_moment(
         shutil.rmtree(tmp_path / "a-sweep")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("delay", [0.3, 1.0, 2.0, None])
 def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, delay: float | None) -> None:
     """None: until the first rows are there."""
@@ -186,9 +187,9 @@ def test_a_full_disk(tmp_path: Path, whole: cr.SweepTable) -> None:
 
 def test_parts_of_a_job_array_at_the_same_time(tmp_path: Path, whole: cr.SweepTable) -> None:
     (tmp_path / "a.toml").write_text(toml(CONTENTS))
-    jobs = [started(tmp_path, "a.toml", "--workers", "1", "--part", f"{k}/3") for k in (1, 2, 3)]
+    jobs = [started(tmp_path, "a.toml", "--workers", "1", "--part", f"{k}/2") for k in (1, 2)]
     said = [job.communicate() for job in jobs]
-    assert [job.returncode for job in jobs] == [0, 0, 0], said
+    assert [job.returncode for job in jobs] == [0, 0], said
     assert same(cr.open_sweep(tmp_path / "a-sweep"), whole)
 
 

@@ -12,7 +12,7 @@ from scenes import MATERIAL
 from sweep_files import SMALL, numbers, same, sweeping, tables, toml
 
 import convexrough as cr
-from convexrough.sweeps import measures, parts, running
+from convexrough.sweeps import measures, running
 from convexrough.sweeps.statistics import quantiles
 
 
@@ -42,7 +42,7 @@ def test_rows_are_those_of_single_scenes(here: Executor) -> None:
             spacing=0.0025, tip_radius=0.02, within=0.0102,
             height_std=rows["asperities.height_std"][i], seed=int(rows["seed"][i]),
         )  # fmt: skip
-        scene = cr.Scene(1.0, asperities, MATERIAL, 0.5)
+        scene = cr.Scene(1.0, asperities, MATERIAL, 0.5, geometry="summit")
         contact = cr.press(scene, load=rows["normal.load"][i])
         P, proof = 0.5 * contact.load, contact.certificate
         first, second = cr.cycles(contact, P * np.array([0.37, 0.5]), P * np.array([-0.37, 0.1]))
@@ -63,10 +63,10 @@ def test_rows_are_those_of_single_scenes(here: Executor) -> None:
             "onset_0": np.nanmin(onsets),
             "onset_0.5": np.nanquantile(onsets, 0.5),
             "onset_1": np.nanmax(onsets),
-            "loss_0.37": first.energy,
-            "loss_0.1_0.5": second.energy,
-            "loss_normalised_0.37": first.energy_normalised,
-            "loss_over_smooth_0.1_0.5": second.energy_normalised / second.smooth_normalised,
+            "loss_0.37": first.loss,
+            "loss_0.1_0.5": second.loss,
+            "loss_normalised_0.37": first.loss_normalised,
+            "loss_over_smooth_0.1_0.5": second.loss_normalised / second.smooth_normalised,
             "loss_factor_0.37": first.loss_factor,
             "stiffness_0.1_0.5": second.secant_stiffness,
         }
@@ -76,7 +76,7 @@ def test_rows_are_those_of_single_scenes(here: Executor) -> None:
 
 def test_scenes_made_in_python(here: Executor) -> None:
     base = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    scenes = [cr.Scene(R, base, MATERIAL, 0.5) for R in (0.9, 1.0, 1.1)]
+    scenes = [cr.Scene(R, base, MATERIAL, 0.5, geometry="summit") for R in (0.9, 1.0, 1.1)]
     loads = [1e-7, 2e-7, 3e-7]
     table = cr.sweep(scenes, load=loads, cycle=[0.3], measure=["approach", "loss"], executor=here)
     assert table.columns[1:5] == ["normal.load", "seed", "status", "message"]
@@ -84,7 +84,7 @@ def test_scenes_made_in_python(here: Executor) -> None:
     for i, scene in enumerate(scenes):
         contact = cr.press(scene, load=loads[i])
         row = {name: values[i] for name, values in table.read(["approach", "loss_0.3"]).items()}
-        loss = cr.cycle(contact, maximum=0.3 * 0.5 * contact.load).energy
+        loss = cr.cycle(contact, maximum=0.3 * 0.5 * contact.load).loss
         assert row == {"approach": contact.approach, "loss_0.3": loss}
 
 
@@ -102,15 +102,8 @@ def test_scenes_made_in_python(here: Executor) -> None:
 def test_wrong_arguments(arguments: dict[str, Any], said: str) -> None:
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     with pytest.raises(cr.InputError) as caught:
-        cr.sweep([cr.Scene(1.0, asperities, MATERIAL)], **arguments)
+        cr.sweep([cr.Scene(1.0, asperities, MATERIAL, geometry="summit")], **arguments)
     assert said in str(caught.value)
-
-
-def test_controls_belong_to_scenes() -> None:
-    with pytest.raises(cr.InputError, match=r"load: found given, expected in the tables"):
-        cr.sweep(SMALL, load=1e-7)
-    with pytest.raises(cr.InputError, match=r"scenes: found none"):
-        cr.sweep([], load=1e-7, measure=["load"])
 
 
 def test_a_scene_that_fails_has_a_row_that_says_why(here: Executor) -> None:
@@ -144,17 +137,6 @@ def test_parquet_and_npz_hold_the_same(
     assert kinds == [{".parquet"}, {".npz"}]
     assert same(parquet, npz)
     assert same(parquet, cr.sweep(ALL, executor=here))
-
-
-def test_names_of_parts_are_hashes_of_what_is_in_them(here: Executor, tmp_path: Path) -> None:
-    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
-    assert table.folder is not None
-    first, *rest = table.folder.parts()
-    assert rest
-    table.read()
-    first.path.write_bytes(first.path.read_bytes()[:-1])
-    with pytest.raises(cr.FileError, match="damaged: not what was written"):
-        table.read()
 
 
 def test_data_frames(here: Executor, tmp_path: Path) -> None:
@@ -195,18 +177,6 @@ def test_a_part_of_a_sweep(here: Executor, tmp_path: Path) -> None:
     assert numbers(second, "scene") == [list(range(5, 10))]
 
 
-def test_more_parts_than_scenes(here: Executor, tmp_path: Path) -> None:
-    few = sweeping(over={"normal.load": [1e-7, 2e-7]})
-    assert len(cr.sweep(few, executor=here, part=(1, 5))) == 0
-    table = cr.sweep(few, executor=here, out=tmp_path / "a", part=(1, 5))
-    assert (len(table), table.complete) == (0, False)
-    assert "0 of 2 scenes" in repr(table)
-    assert len(table.read()["contacts"]) == 0
-    assert all(len(values) == 0 for values in quantiles(table).values())
-    with pytest.raises(cr.InputError, match="found nothing to draw"):
-        table.plot()
-
-
 def test_other_versions_are_refused(here: Executor, tmp_path: Path) -> None:
     cr.sweep(SMALL, executor=here, out=tmp_path / "a")
     manifest = tmp_path / "a/manifest.json"
@@ -215,29 +185,6 @@ def test_other_versions_are_refused(here: Executor, tmp_path: Path) -> None:
     manifest.write_text(json.dumps(said))
     with pytest.raises(cr.FileError, match=r"was begun with scipy 1\.0 instead of "):
         cr.sweep(SMALL, executor=here, out=tmp_path / "a", resume=True)
-
-
-def test_labels_have_the_units_of_the_scene(here: Executor) -> None:
-    named = {**SMALL, "units": {"length": "mm", "force": "N"}}
-    axes = cr.sweep(named, executor=here).plot("loss_0.37", "asperities.height_std")
-    assert axes.get_xlabel() == "asperities: height std (mm)"
-    assert axes.get_ylabel() == "loss at Q/(fP) = 0.37 (N mm)"
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
-        "load 1e-07", "load 3e-07"
-    ]  # fmt: skip
-
-
-def test_columns_in_words() -> None:
-    words = {
-        "contacts": "contacts",
-        "words_contact": "contact",
-        "certificate_load_error": "load error",
-        "onset_0.25": "onset of sliding, Q/(fP), quantile 0.25",
-        "displacement_0.5": "displacement at Q/(fP) = 0.5",
-        "loss_normalised_0.37": "loss normalised at Q/(fP) = 0.37",
-        "loss_factor_0.1_0.5": "loss factor, Q/(fP) from 0.1 to 0.5",
-    }
-    assert {name: measures.said(name) for name in words} == words
 
 
 def test_scenes_computed_twice_are_there_once(here: Executor, tmp_path: Path) -> None:
@@ -298,13 +245,6 @@ def test_the_parts_are_plain_parquet(here: Executor, tmp_path: Path) -> None:
     assert sorted(rows["scene"].to_pylist()) == list(range(16))
 
 
-def test_a_table_is_printed_on_one_screen(here: Executor, tmp_path: Path) -> None:
-    lines = repr(cr.sweep(SMALL, executor=here, out=tmp_path / "a")).split("\n")
-    assert lines[:3] == [
-        "SweepTable", "  rows      16 of 16 scenes", "  status    16 certified"
-    ]  # fmt: skip
-
-
 def test_the_command(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(toml(SMALL))
     status, out, err = command("sweep", "a.toml", "--workers", "1")
@@ -326,17 +266,6 @@ def test_failed_scenes_are_named_and_change_the_status(command: Any, tmp_path: P
     status, _, err = command("sweep", "a.toml", "--workers", "1")
     assert status == 4
     assert err.startswith("convexrough: warning: scene 1: a.toml: [asperities] tip_radius")
-
-
-def test_missing_scenes_are_found_between_and_around_parts() -> None:
-    def part(first: int, stop: int) -> parts.Part:
-        return parts.Part(Path(), first, stop, "")
-
-    some = [part(5, 7), part(2, 4), part(6, 9)]
-    assert parts.missing(some, range(12)) == [range(2), range(4, 5), range(9, 12)]
-    assert parts.missing(some, range(3, 8)) == [range(4, 5)]
-    assert parts.missing([], range(3, 8)) == [range(3, 8)]
-    assert [numbers for _, numbers in parts.once(some)] == [range(2, 4), range(5, 7), range(7, 9)]
 
 
 def test_a_contact_with_nothing_loaded_has_numbers_all_the_same(here: Executor) -> None:

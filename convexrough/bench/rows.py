@@ -1,0 +1,156 @@
+"""What was measured, a row each, and what follows from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from convexrough.bench.scenes import WORDS, Family
+from convexrough.version import __version__
+
+#: A point has to be this much faster before it counts as faster: what timing can tell.
+NOISE = 0.1
+
+#: Exponents of time are fitted from so many asperities on: below, fixed costs count.
+FITTED_FROM = 10_000
+
+
+@dataclass(frozen=True)
+class Row:
+    """One task on one scene.
+
+    task    : "solve" is one point of the diagram of time against error, by `solver` as `setting`
+        says; the others are "from nothing", "sweep" and those of `convexrough.bench.measure.TASKS`
+    outcome : "refused": the scene is not one for this solver; and `message` why
+    seconds : [s] the least of `runs`; of a sweep, of one scene
+    product : [s] the unit of `products`, the least of 8 warm plain products; nan off a lattice
+    error   : max |P - P_ref| / max P_ref;  bound : what is proved of it
+    memory  : [bytes] by which that of the process rose at most, None where unknown
+    """
+
+    task: str
+    family: Family
+    asperities: int
+    outcome: Literal["answered", "refused", "failed"] = "answered"
+    message: str = ""
+    solver: str = "newton"
+    setting: str = "default"
+    touching: int = 0
+    seconds: float = math.nan
+    runs: int = 0
+    product: float = math.nan
+    iterations: int = 0
+    error: float = math.nan
+    bound: float = math.nan
+    memory: int | None = None
+
+    @property
+    def default(self) -> bool:
+        """Of the default solver, as it is set by default."""
+        return (self.solver, self.setting) == ("newton", "default")
+
+    @property
+    def products(self) -> float:
+        """The time in plain products of the same size."""
+        return self.seconds / self.product
+
+    @property
+    def known(self) -> bool:
+        """An answer, and its error."""
+        return self.outcome == "answered" and math.isfinite(self.error)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """All that was measured."""
+
+    machine: dict[str, Any]
+    quick: bool
+    rows: tuple[Row, ...]
+    seconds: float
+
+    def panels(self) -> dict[tuple[Family, int], list[Row]]:
+        """What came of every solver, by the scenes on which they were tried."""
+        found: dict[tuple[Family, int], list[Row]] = {}
+        for row in self.rows:
+            if row.task == "solve":
+                found.setdefault((row.family, row.asperities), []).append(row)
+        return found
+
+    def presses(self, family: Family, least: int = 0) -> list[Row]:
+        """Answered presses of a family, of so many asperities and more."""
+        wanted = "press", family, "answered"
+        rows = [row for row in self.rows if (row.task, row.family, row.outcome) == wanted]
+        return [row for row in rows if row.asperities >= least]
+
+    def exponent(self, family: Family) -> float:
+        """Of the time of presses against the number of asperities; nan for fewer than two sizes."""
+        large = self.presses(family, FITTED_FROM)
+        return exponent([row.asperities for row in large], [row.seconds for row in large])
+
+    def summary(self) -> dict[str, Any]:
+        """For programs. Errors are relative to the largest load, times in seconds."""
+        return {
+            "schema": 2,
+            "version": __version__,
+            "quick": self.quick,
+            "machine": self.machine,
+            "seconds": self.seconds,
+            "exponents": {family: self.exponent(family) for family in WORDS},
+            "verdicts": self.verdicts(),
+            "rows": [asdict(row) for row in self.rows],
+        }
+
+    def verdicts(self) -> list[str]:
+        """Whether the default solver is on the frontier, and how its time grows."""
+        lines = []
+        for (family, n), rows in self.panels().items():
+            beaten = [f"{row.solver}, {row.setting}" for row in better_than_default(rows)]
+            said = f"not on the frontier: {'; '.join(beaten)}" if beaten else "on the frontier"
+            lines.append(f"{n:,} asperities ({family}): the default solver is {said}.")
+        for family in WORDS:
+            if math.isfinite(b := self.exponent(family)):
+                sizes = [row.asperities for row in self.presses(family, FITTED_FROM)]
+                lines.append(f"The time of a press grows as n^{b:.2f} from {min(sizes):,} to "
+                             f"{max(sizes):,} asperities ({family}).")  # fmt: skip
+        return lines
+
+
+def frontier(rows: Iterable[Row]) -> list[Row]:
+    """The points than which no other is at least as fast and as accurate, and better in one."""
+    points = [row for row in rows if row.known]
+
+    def dominated(row: Row) -> bool:
+        return any(
+            other.seconds <= row.seconds
+            and other.error <= row.error
+            and (other.seconds, other.error) != (row.seconds, row.error)
+            for other in points
+        )
+
+    return [row for row in points if not dominated(row)]
+
+
+def better_than_default(rows: Iterable[Row]) -> list[Row]:
+    """The points that are faster than the default by more than noise, and at least as accurate.
+
+    Where the default has no answer: every point.
+    """
+    points = [row for row in rows if row.known]
+    default = next((row for row in points if row.default), None)
+    if default is None:
+        return points
+    limit = default.seconds / (1.0 + NOISE)
+    return [row for row in points if row.seconds < limit and row.error <= default.error]
+
+
+def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
+    """b of the least-squares fit  log cost = a + b log size; nan for fewer than two sizes."""
+    if len(set(sizes)) < 2:
+        return math.nan
+    slope, _ = np.polyfit(np.log(sizes), np.log(costs), 1)
+    return float(slope)

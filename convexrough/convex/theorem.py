@@ -1,0 +1,58 @@
+r"""One theorem: how far the solution of a convex problem can be from any trial point.
+
+Let F(x) = phi'(x) + A x - b on a box K of the reals, with phi a sum of convex functions of one
+component each and A symmetric. Let x* in K solve the problem: F(x*) - beta* is 0 inside K, at
+least 0 on lower faces and at most 0 on upper faces, and sum x* = T. Where no total is prescribed,
+beta* = 0. On a box that holds x and x* let the Hessian be at least mu H, with H diagonal and
+positive and mu > 0. Then for every x in K with sum x = T and every beta (0 without a total),
+
+    || x - x* ||_H  <=  || e ||_{H^-1} / mu,                                                   (1)
+
+where e_i is the distance of F_i(x) - beta from what the place of x_i in K allows: its absolute
+value inside K, and its part of the wrong sign on a face. So |x_i - x*_i| is at most the right side
+of (1) over h_i^(1/2).
+
+Proof. Let d = x - x* and let v(x) be F(x) - beta less the residual of size e, so that -v(x) lies in
+the normal cone of K at x, as -(F(x*) - beta*) does at x*. Normal cones are monotone:
+(v(x) - F(x*) + beta*)'d <= 0, hence
+
+    (F(x) - F(x*))'d  <=  sum e_i |d_i| + (beta - beta*) sum d_i,
+
+whose last term is 0. The left side is at least mu || d ||_H^2 by the Hessian's bound along the
+segment from x* to x, and the sum on the right is at most || e ||_{H^-1} || d ||_H.
+
+A component that is fixed, or known from elsewhere, takes no part: e_i = 0 and d_i = 0. Where x_i is
+a vector that is bounded in length, the same holds with lengths in place of absolute values.
+Where F(x) is a ball, e is the upper end of what its numbers leave, and (1) holds for the true data.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array
+from convexrough.numbers.balls import Ball
+from convexrough.roundoff import SAFETY
+
+
+def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
+    """(n,) e of components inside K (True), or on a lower face, from F - beta as balls."""
+    wrong = np.maximum(-residual.lower, 0.0)
+    return np.where(inside, np.maximum(residual.upper, wrong), wrong)
+
+
+def distance(excess: Array, stiffness: Array, margin: float) -> float:
+    """|| e ||_{H^-1} / mu, the right side of (1).
+
+    excess : (n,) e;  stiffness : (n,) the diagonal of H, infinite where x is fixed;  margin : mu
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        largest = float(excess.max(initial=0.0))
+        if largest == 0.0:
+            return 0.0
+        squared = float(np.sum((excess / largest) ** 2 / stiffness))
+    found = largest * math.sqrt(squared) / margin * (1 + SAFETY + len(excess) * 2.0**-52)
+    return found if math.isfinite(found) else math.inf

@@ -1,0 +1,120 @@
+"""The elastic energy of one asperity after a step, as pieces that are exact in cones.
+
+W(T) = the integral of its own deflection over its force is convex, and made of a stuck piece and
+one for each sign and each old layer that the front may end in:
+docs/theory/without-order.md, "The step as one cone program".
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.friction.curve import MemoryCurve
+from convexrough.sphere import hertz
+
+#: Places of the variables of a piece: its weight, y1, ..., y5 and z.
+LIFT, Y3, Y5, Z = 7, 3, 5, 6
+
+#: Layers thinner than this part of the load are no pieces: they carry less than the solver leaves.
+THIN = 1e-9
+
+
+class Piece(NamedTuple):
+    """A part of W. Forces are over the load N_b of the asperity, displacements over k N_b^(2/3).
+
+    With L = N / N_b from low to high,  T = force - rate L,  deflection = own - rate L^(2/3)  and
+    W = own T + (3/5) rate^2 L^(5/3) + energy. A stuck piece has rate 0: |T - force| <= high, and
+    W = own (T - force) + (T - force)^2 softness / 2 + energy.
+    """
+
+    low: float
+    high: float
+    rate: float
+    force: float
+    own: float
+    energy: float
+    softness: float = 0.0
+
+    def forces(self) -> tuple[float, float]:
+        """Where it begins and ends, in growing order."""
+        if self.rate == 0.0:
+            return self.force - self.high, self.force + self.high
+        ends = self.force - self.rate * self.low, self.force - self.rate * self.high
+        return min(ends), max(ends)
+
+    def deflection(self, force: float) -> float:
+        if self.rate == 0.0:
+            return self.own + self.softness * (force - self.force)
+        level = max((self.force - force) / self.rate, 0.0)
+        return self.own - self.rate * float(np.cbrt(level)) ** 2
+
+    def distance(self, force: float) -> float:
+        """By how much a force is outside."""
+        low, high = self.forces()
+        return max(low - force, force - high, 0.0)
+
+    def objective(self, shift: float) -> Array:
+        """(LIFT,) W less shift T^2 / 2 in the weight, y1, ..., y5 and z; t^6 = y5 - z."""
+        found = np.zeros(LIFT)
+        found[0] = self.energy - shift * self.force**2 / 2.0
+        if self.rate == 0.0:
+            found[Y3] = self.own - shift * self.force
+            found[Y5] = (self.softness - shift) / 2.0
+            return found
+        found[0] += self.own * self.force
+        found[Y3] = self.rate * (shift * self.force - self.own)
+        found[Y5] = self.rate**2 * (0.6 - shift / 2.0)
+        found[Z] = self.rate**2 * shift / 2.0
+        return found
+
+    def cost(self, force: float) -> float:
+        """W, without `energy`."""
+        if self.rate == 0.0:
+            return (self.own + 0.5 * self.softness * (force - self.force)) * (force - self.force)
+        level = max((self.force - force) / self.rate, 0.0)
+        return self.own * force + 0.6 * self.rate**2 * float(np.cbrt(level)) ** 5
+
+
+def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[Piece]:
+    """Those of an asperity with this curve, once its indentation has become `own` > 0."""
+    load = float(hertz.load(own, k))
+    base = min(float(curve.load), own)
+    kept = curve.go(*_below(curve, base))[0] if base < float(curve.load) else curve
+    s = np.array([float(each) for each in kept.levels])
+    N, xi = hertz.load(s, k) / load, np.array([float(each) for each in kept.heights]) / own
+    slopes = [float(each) for each in kept.slopes]
+    T = np.concatenate(([0.0], np.cumsum(np.array(slopes) * np.diff(N))))
+    top, moved = float(N[-1]), float(xi[-1])
+    found = []
+    start = {1: (float(T[-1]), 0.0), -1: (float(T[-1]), 0.0)}  # force and energy reached so far
+    if own > base * (1 + THIN):
+        softness = (1.0 - base / own) / (1.0 - top)
+        stuck = Piece(0.0, 1.0 - top, 0.0, float(T[-1]), moved, 0.0, softness)
+        found.append(stuck)
+        for sign, end in zip((-1, 1), stuck.forces(), strict=True):
+            start[sign] = end, stuck.cost(end)
+    for sign in (1, -1):
+        force, energy = start[sign]
+        for j in reversed(range(len(slopes))):
+            low, high = float(N[j]), float(N[j + 1])
+            rate = sign - slopes[j]  # c (1 - c th)
+            if high - low <= THIN or abs(rate) <= THIN:
+                continue
+            level = float(T[j]) - slopes[j] * low + sign
+            reached = float(xi[j]) - slopes[j] * low ** (2 / 3) + sign
+            piece = Piece(low, high, rate, level, reached, 0.0)
+            piece = piece._replace(energy=energy - piece.cost(force))
+            found.append(piece)
+            force = piece.forces()[1 if sign > 0 else 0]
+            energy = piece.cost(force) + piece.energy
+    return found
+
+
+def _below(curve: MemoryCurve, level: float) -> tuple[float, float]:
+    """The point of a curve at a level."""
+    s = [float(each) for each in curve.levels]
+    heights = [float(each) for each in curve.heights]
+    return level, float(np.interp(level, s, heights))

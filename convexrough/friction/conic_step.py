@@ -1,0 +1,199 @@
+"""The general step as one second-order cone program: a check of Newton's method and of the rules.
+
+Of each asperity, W(T) = the integral of its own deflection over its force after the step is convex,
+and made of pieces: a stuck one, and one for each sign and each old layer that the front may end in.
+Each is exact in the cones of `convexrough.convex.cones`, and their hull is W: piece j has a weight
+w_j, which stands for the 1 in its cones, and weights, forces and energies add up. Derived in
+docs/theory/without-order.md, "The step as one cone program". Own displacements are over c_t f, and
+forces over f.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from convexrough.arrays import Array, Indices
+from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, power_cones
+from convexrough.errors import SolverError
+from convexrough.friction.conic_pieces import LIFT, Y3, Y5, Piece, pieces_of
+from convexrough.friction.general_step import Bundle, Stepper
+from convexrough.friction.levels import Snapshot
+from convexrough.influence import couple
+from convexrough.influence.shells import shells
+from convexrough.solvers.programs import ConeProgram, RawAnswer, run_clarabel
+from convexrough.sphere import hertz
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+
+#: What Clarabel is asked for, and its share of the way to the boundary of the cones in a step.
+TOLERANCE, STEP = 1e-11, 0.9
+
+
+class ConicStepper(Stepper):
+    """Steps by the cone program, through Clarabel."""
+
+    def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
+        program = StepProgram.accept(self, now, level, total)
+        raw = run_clarabel(program.apply(), "conic step", TOLERANCE, max_step_fraction=STEP)
+        forces, x = program.invert(raw)
+        own = np.maximum(level.indentations, 0.0)
+        targets = program.deflections(forces)
+        pairs = zip(now.curves, own.tolist(), targets.tolist(), strict=True)
+        curves = [old.go(top, target)[0] for old, top, target in pairs]
+        moved = x - self.A @ (forces - now.carried)
+        work = now.work + 0.5 * (float(now.carried.sum()) + total) * x
+        return Bundle(
+            now.load, level, tuple(curves), forces, now.positions + moved, now.rise + x, work
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class StepProgram:
+    """One step, of the n asperities that touch after it.
+
+    total  : of their forces;  which : (n,) their indices in the scene
+    loads, own : (n,) N_b and the indentations;  parts : (n,) p_i, of the step during which each
+        touches;  shells : (n,) make the coupling semidefinite
+    pieces : all of them, with the place of their asperity among the n
+    """
+
+    stepper: Stepper
+    now: Bundle
+    total: float
+    which: Indices
+    loads: Array
+    own: Array
+    parts: Array
+    shells: Array
+    pieces: tuple[tuple[int, Piece], ...]
+
+    @classmethod
+    def accept(cls, stepper: Stepper, now: Bundle, level: Snapshot, total: float) -> StepProgram:
+        """Raises SolverError where no shells that the cones allow make the coupling convex."""
+        which = np.flatnonzero(level.loads > 0)
+        k, own = stepper.coefficients[which], level.indentations[which]
+        gaps = np.maximum(-now.level.indentations[which], 0.0)
+        scene = stepper.levels.scene
+        scale = 1.0 / (np.pi * scene.material.contact_modulus)
+        pieces = [
+            (place, piece)
+            for place, i in enumerate(which)
+            for piece in pieces_of(now.curves[i], float(own[place]), float(k[place]))
+        ]
+        program = cls(
+            stepper=stepper,
+            now=now,
+            total=total,
+            which=which,
+            loads=hertz.load(own, k),
+            own=own,
+            parts=own / (own + gaps),
+            shells=shells(couple(scene, which, scale, "dense")) if len(which) > 1 else 0.0 * own,
+            pieces=tuple(pieces),
+        )
+        if 1.5 * program.shifts.max(initial=0.0) > FIVE_CONES_LIMIT:
+            raise SolverError("too dense for a convex program", solver="conic step")
+        return program
+
+    @property
+    def energies(self) -> Array:
+        """(n,) what W / p is counted in."""
+        return np.asarray(self.loads * self.own / self.parts)
+
+    @property
+    def shifts(self) -> Array:
+        """(n,) D_i in the units of the pieces: two thirds of S_i."""
+        return np.asarray(self.shells * self.loads * self.parts / self.own)
+
+    def apply(self) -> ConeProgram:
+        """Unknowns: T_i / N_i, and of each piece its weight and its lift.
+
+        A stuck piece has the force above its middle in the place of y3, the square over the weight
+        in that of y5, and no other.
+        """
+        from scipy import sparse  # 0.1 s to import: only when solving
+
+        n, N, unit = len(self.which), self.loads, float(self.energies.max())
+        A = self.stepper.A[np.ix_(self.which, self.which)] + np.diag(self.shells)
+        width = n + LIFT * len(self.pieces)
+        linear = np.zeros(width)
+        around = self.stepper.A[self.which] @ self.now.carried
+        linear[:n] = -N * (self.now.deflections[self.which] / self.parts + around) / unit
+        for place, (i, piece) in enumerate(self.pieces):
+            at = n + LIFT * place
+            linear[at : at + LIFT] = piece.objective(self.shifts[i]) * (self.energies[i] / unit)
+        quadratic = sparse.block_diag(
+            (np.triu(A * N * (N[:, None] / unit)), sparse.csc_matrix((width - n,) * 2))
+        )
+        equalities = self._equalities(width)
+        cones, constant = self._cones(width)
+        balance = np.zeros(1 + 2 * n)
+        balance[0], balance[1 : n + 1] = self.total / N.sum(), 1.0
+        return ConeProgram(
+            quadratic=sparse.csc_matrix(quadratic),
+            linear=linear,
+            constraints=sparse.csc_matrix(sparse.vstack((equalities, cones))),
+            constant=np.append(balance, constant),
+            equalities=len(balance),
+        )
+
+    def _equalities(self, width: int) -> csc_matrix:
+        """The total; the weights of each asperity add up to 1; and forces of pieces to its own."""
+        from scipy.sparse import csc_matrix
+
+        n = len(self.which)
+        rows = np.zeros((1 + 2 * n, width))
+        rows[0, :n] = self.loads / self.loads.sum()
+        rows[n + 1 + np.arange(n), np.arange(n)] = -1.0
+        for place, (i, piece) in enumerate(self.pieces):
+            weight = n + LIFT * place
+            rows[1 + i, weight] = 1.0
+            rows[n + 1 + i, weight] = piece.force
+            rows[n + 1 + i, weight + Y3] = 1.0 if piece.rate == 0.0 else -piece.rate
+        return csc_matrix(rows)
+
+    def _cones(self, width: int) -> tuple[csc_matrix, Array]:
+        """Each piece within its bounds, and its lift in the cones."""
+        from scipy.sparse import csc_matrix, lil_matrix, vstack
+
+        n, five = len(self.which), 1.5 * self.shifts.max() > FOUR_CONES_LIMIT
+        starts = n + LIFT * np.arange(len(self.pieces))
+        stuck = np.array([piece.rate == 0.0 for _, piece in self.pieces])
+        bounds = lil_matrix((3 * len(starts), width))
+        squares = lil_matrix((3 * int(stuck.sum()), width))
+        for place, (at, (_, piece)) in enumerate(zip(starts, self.pieces, strict=True)):
+            low = -piece.high if piece.rate == 0.0 else piece.low
+            bounds[3 * place, at] = -(piece.high - low) / 2.0
+            bounds[3 * place + 1, at] = (piece.high + low) / 2.0
+            bounds[3 * place + 1, at + Y3] = -1.0
+        for row, at in zip(range(0, squares.shape[0], 3), starts[stuck], strict=True):
+            squares[row, at] = squares[row, at + Y5] = squares[row + 1, at + Y5] = -1.0
+            squares[row + 1, at] = 1.0
+            squares[row + 2, at + Y3] = -2.0
+        moving = starts[~stuck]
+        names = range(1 if five else 2, LIFT)
+        lifts = power_cones([moving + name for name in names], width, ones=moving)
+        rows = vstack((bounds, squares, lifts.matrix))
+        plain = np.zeros(3 * (len(starts) + int(stuck.sum())))
+        return csc_matrix(rows), np.append(plain, lifts.constant)
+
+    def invert(self, raw: RawAnswer) -> tuple[Array, float]:
+        """(N,) forces of all asperities of the scene, and the rise."""
+        n, unit = len(self.which), float(self.energies.max())
+        forces = np.zeros(len(self.now.carried))
+        forces[self.which] = np.clip(raw.x[:n], -1.0, 1.0) * self.loads
+        return forces, float(-raw.multipliers[0]) * unit / float(self.loads.sum())
+
+    def deflections(self, forces: Array) -> Array:
+        """(N,) own deflections under these forces, by the piece that each force lies on."""
+        found = np.zeros(len(forces))
+        for place, i in enumerate(self.which):
+            part = float(forces[i] / self.loads[place])
+            mine = [piece for k, piece in self.pieces if k == place]
+            nearest = min(mine, key=lambda piece: piece.distance(part))
+            found[i] = self.own[place] * min(max(nearest.deflection(part), -1.0), 1.0)
+        return found

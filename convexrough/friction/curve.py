@@ -1,0 +1,205 @@
+"""The memory curve: the tangential state under varying normal load, as plane geometry.
+
+The state after any path of the total load P and T = Q / f is one polygon from (0, 0) to the
+present point, no steeper than 45 degrees: heights Th(s) over levels 0 <= s <= P. It is also the
+path without slip to the same state. A straight segment of the path changes it by one of three
+rules:
+
+- where P rises and T follows no faster, everything sticks: the segment is appended;
+- where the path runs back along the curve, nothing slips: the curve gets shorter;
+- else the contact slips, with sign c = +-1, from the top down to the *front* L: below L the curve
+  is kept, and a straight line of slope c joins it to the new point.
+
+Derived in docs/theory/paths.md, "The rules". Nothing here knows elasticity. All numbers are
+rational, as float64 numbers are, and every rule is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from convexrough.drawn import Drawn
+from convexrough.errors import InputError
+from convexrough.frames import Variables
+from convexrough.record import Along, Table, in_words
+
+
+class Piece(NamedTuple):
+    """A front on its way down through one old layer, while the load changes in proportion.
+
+    sign   : c of the slip;  slope : th of the layer; a loss is proportional to 1 - c th
+    top, bottom : levels L of the front;  load_before, load_after : P there
+    """
+
+    sign: int
+    slope: Fraction
+    top: Fraction
+    bottom: Fraction
+    load_before: Fraction
+    load_after: Fraction
+
+
+@dataclass(frozen=True, repr=False)
+class MemoryCurve(Table, Drawn):
+    """A state: vertices (levels[k], heights[k]) from the origin, slopes[k] from k to k + 1.
+
+    front : level L down to which the contact slipped last; None where all of it stuck last
+
+    >>> curve, _ = cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)
+    >>> float(curve.front), float(curve.heights[-1])
+    (0.75, 0.25)
+    """
+
+    _along: ClassVar[Along] = {("vertex",): ("levels", "heights"), ("layer",): ("slopes",)}
+
+    levels: tuple[Fraction, ...] = (Fraction(0),)
+    heights: tuple[Fraction, ...] = (Fraction(0),)
+    slopes: tuple[Fraction, ...] = ()
+    front: Fraction | None = None
+
+    @classmethod
+    def pressed(cls, load: Fraction | float) -> MemoryCurve:
+        """The state pressed to a load without shear."""
+        return cls().go(load, 0)[0]
+
+    @property
+    def load(self) -> Fraction:
+        """P."""
+        return self.levels[-1]
+
+    @property
+    def height(self) -> Fraction:
+        """T."""
+        return self.heights[-1]
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        """Rounded: fractions are long."""
+        for name, (_, values) in self._variables().items():
+            yield name, in_words(values)
+        yield "front", "none" if self.front is None else in_words(float(self.front))
+
+    def _variables(self) -> Variables:
+        return {
+            name: (along, np.array([float(value) for value in getattr(self, name)]))
+            for along, names in self._along.items()
+            for name in names
+        }
+
+    def _attributes(self) -> dict[str, Any]:
+        return {} if self.front is None else {"front": float(self.front)}
+
+    @property
+    def bends(self) -> list[tuple[Fraction, Fraction]]:
+        """(s_k, th_(k-1) - th_k) at each vertex; below the origin and above the top the slope is 0.
+
+        The state is the sum of these bends times the normal solutions at their levels.
+        """
+        slopes = (Fraction(0), *self.slopes, Fraction(0))
+        bends = [below - above for below, above in pairwise(slopes)]
+        return list(zip(self.levels, bends, strict=True))
+
+    def go(
+        self, load: Fraction | float, height: Fraction | float
+    ) -> tuple[MemoryCurve, list[Piece]]:
+        """The state after a straight segment of the path to (P, T), and the pieces that cost.
+
+        Raises InputError where |T| > P: that would be gross sliding.
+        """
+        load, height = Fraction(load), Fraction(height)
+        if abs(height) > load:
+            expected = f"at most the load, {float(load)}, in size"
+            raise InputError("T", found=float(height), expected=expected)
+        curve, pieces = self, list[Piece]()
+        while (curve.load, curve.height) != (load, height):
+            curve, more = curve._stroke(load, height)
+            pieces += more
+        return curve, pieces
+
+    def _stroke(self, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
+        """As much of the segment as one of the rules covers."""
+        rise, shear = load - self.load, height - self.height
+        if rise > 0 and abs(shear) <= rise:
+            return self._with(shear / rise, load, height), []
+        if rise >= 0:
+            return self._slip(1 if shear > 0 else -1, load, height)
+        lean = shear - self.slopes[-1] * rise  # over the old curve, or under it
+        sign = 1 if lean > 0 else -1
+        if lean == 0:
+            return self._run_back(load, height), []
+        return self._slip(sign, *self._crossing(sign, load, height))
+
+    def _run_back(self, load: Fraction, height: Fraction) -> MemoryCurve:
+        """Along the top layer, to the point or to the end of the layer."""
+        last = len(self.slopes) - 1
+        below = self._cut(last)
+        if load <= self.levels[last]:
+            return below
+        return below._with(self.slopes[last], load, height)
+
+    def _crossing(self, sign: int, load: Fraction, height: Fraction) -> tuple[Fraction, Fraction]:
+        """Where a falling segment meets the old curve again, all above which is forgotten then.
+
+        Or its end, where it does not.
+        """
+        direction = (height - self.height) / (load - self.load)
+        over = Fraction(0)  # sign times (path - old curve), on the way down
+        for k in reversed(range(len(self.slopes))):
+            high, end = self.levels[k + 1], max(self.levels[k], load)
+            before = over
+            over = before - sign * (direction - self.slopes[k]) * (high - end)
+            if over <= 0 < before:
+                level = high - (high - end) * before / (before - over)
+                return level, self.heights[k] + self.slopes[k] * (level - self.levels[k])
+            if end == load:
+                break
+        return load, height
+
+    def _slip(self, sign: int, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
+        """With a sign, down to the front; within a layer P moves in proportion to it.
+
+        The line of slope c that ends at the moving point meets the lower end of a layer when a part
+        of the segment is done. Layers that have this slope already are passed at once.
+        """
+        rise = load - self.load
+        rate = (height - self.height) - sign * rise
+        pieces: list[Piece] = []
+        done, front, k = Fraction(0), Fraction(0), 0
+        for k in reversed(range(len(self.slopes))):
+            if self.slopes[k] == sign:
+                continue
+            front, high = self.levels[k], self.levels[k + 1]
+            part = (self.heights[k] - self.height + sign * (self.load - front)) / rate
+            if part > 1:
+                front = high - (high - front) * (1 - done) / (part - done)
+            at, done = done, min(part, Fraction(1))
+            if front < high:
+                loads = self.load + at * rise, self.load + done * rise
+                pieces.append(Piece(sign, self.slopes[k], high, front, *loads))
+            if done == 1:
+                break
+        curve = self._cut(k)
+        if front > curve.load:
+            at_front = curve.height + self.slopes[k] * (front - curve.load)
+            curve = curve._with(self.slopes[k], front, at_front)
+        if load > front:
+            curve = curve._with(Fraction(sign), load, height)
+        return replace(curve, front=front), pieces
+
+    def _cut(self, vertex: int) -> MemoryCurve:
+        """The curve up to a vertex."""
+        kept = slice(vertex + 1)
+        return MemoryCurve(self.levels[kept], self.heights[kept], self.slopes[:vertex])
+
+    def _with(self, slope: Fraction, load: Fraction, height: Fraction) -> MemoryCurve:
+        """One layer more, up to a point; layers of equal slope are one."""
+        kept = len(self.slopes)
+        if kept and self.slopes[-1] == slope:
+            kept -= 1
+        below = self._cut(kept)
+        return MemoryCurve((*below.levels, load), (*below.heights, height), (*below.slopes, slope))

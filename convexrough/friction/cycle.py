@@ -1,0 +1,551 @@
+"""Closed paths, repeated: steady cycles, what they cost, and their loops.
+
+With m+ and m- the least P + T and P - T along a closed path, T = Q / f, the memory curve passes
+through the point  L* = (m+ + m-) / 2, T* = (m+ - m-) / 2  for ever: below L* nothing slips again,
+and above it the state repeats, whatever was before. At constant load L* = P - (max - min) / 2 f,
+and the loss is 8 c_t f^2 times the error of the trapezoid rule on the curve of approach against
+load, between L* and P (docs/theory/losses.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.contact import Contact
+from convexrough.drawn import Drawn
+from convexrough.errors import InputError
+from convexrough.frames import Variables
+from convexrough.friction.curve import MemoryCurve
+from convexrough.friction.general_step import followed
+from convexrough.friction.levels import FrictionLevels, rounded
+from convexrough.friction.loss import losses, shared, trapezoid_loss
+from convexrough.friction.onset import indices
+from convexrough.friction.order import Order
+from convexrough.friction.path import (
+    Point,
+    follow,
+    levels_needed,
+    point_at,
+    points_of,
+    pressed_for,
+)
+from convexrough.friction.shear import level_at
+from convexrough.friction.state import displacements_of, states_of, stick_radii, worded
+from convexrough.influence import Kind
+from convexrough.progress import Announce
+from convexrough.record import Along, Table
+from convexrough.scene.scene import Scene
+from convexrough.sphere import mindlin
+from convexrough.sphere.smooth import smooth_reference
+
+if TYPE_CHECKING:
+    from convexrough.gradients.gradient import Gradient, Holding
+
+#: Cells that all fronts of a cycle together are cut into where the load varies, to share its loss
+#: out: about 0.1 %.
+CELLS = 64
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Cycle(Table, Drawn):
+    """A closed path of P and Q, repeated. Arrays are (n,), in the scene's order.
+
+    contact          : pressed with the highest load of the path
+    loads, forces    : (m,) P and Q at the points of the path [force]
+    loss             : energy lost in each cycle but the first, both bodies [force length]
+    loss_first       : lost on the way from the start through the first cycle
+    loss_error, loss_first_error : proved bounds on |loss - solution|, infinite without proof
+    status           : "stuck" where a cycle has no slip, "partial" where a disc sticks for ever,
+        "sliding" once in each direction per cycle, "intermittent" where contact is lost in the
+        cycle, "open" all along, or "undecided"
+    slips            : [length] of gross slip, in each direction per cycle; nan where intermittent
+    stick_radii      : [length] of the disc that sticks for ever
+    slip_errors, stick_radius_errors : [length] proved bounds
+    level, force_level : L* and f T* [force]
+    balance_defect   : relative difference to the loss by the trapezoid rule; nan where P varies
+    loss_normalised  : loss / W0, W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) of the highest load
+    smooth_normalised : the same for the smooth sphere, e((max - min) / 2 f P); nan where P varies,
+        and both where the base has no smooth reference
+    displacement_amplitude : X_a, half the range of X at the points [length]
+    displacement_error : proved bound on |X_a - solution| [length], infinite without proof
+    order            : "proved" that no indentation falls with the load between L* and P, so that
+        loss and words hold; "proved for one step": no loss is proved; "fails": general steps answer
+    presses          : how many normal problems were solved
+
+    >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
+    >>> print(f"{cycle.loss_factor:.4f}", f"{cycle.secant_stiffness:.4g}")
+    0.0488 0.009131
+    """
+
+    _shown = ("secant_stiffness", "loss_factor")
+    _along: ClassVar[Along] = {
+        ("asperity",): (
+            *("status", "partial_slip_losses", "sliding_losses", "slips", "slip_errors"),
+            *("stick_radii", "stick_radius_errors"),
+        ),
+        ("point",): ("loads", "forces"),
+    }
+
+    contact: Contact
+    loads: Array
+    forces: Array
+    loss: float
+    loss_error: float
+    loss_first: float
+    loss_first_error: float
+    status: NDArray[np.str_]
+    slips: Array
+    slip_errors: Array
+    stick_radii: Array
+    stick_radius_errors: Array
+    level: float
+    force_level: float
+    balance_defect: float
+    loss_normalised: float
+    smooth_normalised: float
+    displacement_amplitude: float
+    displacement_error: float
+    order: Order
+    presses: int
+
+    @property
+    def scene(self) -> Scene:
+        """What is pressed."""
+        return self.contact.scene
+
+    @property
+    def maximum(self) -> float:
+        """The largest Q [force]."""
+        return float(self.forces.max())
+
+    @property
+    def minimum(self) -> float:
+        """The least Q [force]."""
+        return float(self.forces.min())
+
+    @property
+    def partial_slip_losses(self) -> Array:
+        """(n,) [force length] of each asperity's partial slip per cycle: as `asperity_losses`."""
+        return self._shares[0]
+
+    @property
+    def sliding_losses(self) -> Array:
+        """(n,) [force length] of each asperity's gross slip per cycle: as `asperity_losses`."""
+        return self._shares[1]
+
+    @property
+    def asperity_losses(self) -> Array:
+        """(n,) [force length] lost at each asperity per cycle; to about 0.1 % where P varies.
+
+        Takes two normal solutions for each of 64 cells there. nan where order fails.
+        """
+        return frozen(self.partial_slip_losses + self.sliding_losses)
+
+    @cached_property
+    def _shares(self) -> tuple[Array, Array]:
+        n = len(self.scene)
+        if self.contact.load == 0.0:
+            return frozen(np.zeros(n)), frozen(np.zeros(n))
+        levels = self.contact.keep(FrictionLevels)
+        if self.order == "fails" and levels.proved:
+            return frozen(np.full(n, np.nan)), frozen(np.full(n, np.nan))
+        points = [
+            point_at(Fraction(load), force, self.scene)
+            for load, force in zip(self.loads.tolist(), self.forces.tolist(), strict=True)
+        ]
+        return shared(levels, _Closed(MemoryCurve(), points).later, CELLS)
+
+    @property
+    def force_amplitude(self) -> float:
+        """Q_a [force], half the range of Q."""
+        return (self.maximum - self.minimum) / 2.0
+
+    @property
+    def secant_stiffness(self) -> float:
+        """Q_a / X_a [force / length]; nan where nothing moves."""
+        moved = self.displacement_amplitude
+        return self.force_amplitude / moved if moved > 0 else np.nan
+
+    @property
+    def loss_factor(self) -> float:
+        """W / (2 pi U), U = Q_a X_a / 2 (Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34, 954).
+
+        nan where nothing moves.
+        """
+        stored = self.force_amplitude * self.displacement_amplitude / 2.0
+        return self.loss / (2.0 * np.pi * stored) if stored > 0 else np.nan
+
+    def gradient(self, *, holding: Holding | None = None) -> Gradient:
+        """Derivatives of the loss with respect to the scene.
+
+        holding : as in `Contact.gradient`; the forces are held, also where a displacement was
+            prescribed: `Gradient` says how to hold that; the loads, too, where they vary
+
+        Raises InputError in gross sliding where several asperities slide last, or the approach is
+        held: there is no derivative.
+
+        >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
+        >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
+        5.907e-10 -9.964e-07
+        """
+        from convexrough.gradients.losses import cycle_gradient  # a floor above: when asked
+
+        return cycle_gradient(self, holding=holding)
+
+    def loop(
+        self,
+        points: int = 200,
+        announce: Announce | None = None,
+        asperities: ArrayLike | None = None,
+    ) -> Loop:
+        """The loop through about `points` points, as many down as up, denser at the ends.
+
+        announce   : told in a line how far long work has come
+        asperities : indices of those whose own loops to keep, default all
+
+        Raises InputError where the load varies.
+        """
+        return loops([self], points, announce, asperities)[0]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Loop(Table):
+    """Points of a closed loop, from the maximum to the minimum and back.
+
+    asperities : (k,) indices of those whose own loops follow
+    forces : (m,) Q [force];  displacements : (m,) X [length], both bodies
+    asperity_forces : (m, k) Q_i [force]
+    asperity_displacements : (m, k) X_i + slip_i [length]
+
+    >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
+    >>> len(loop.forces), loop.asperity_forces.shape
+    (101, (101, 61))
+    """
+
+    _shown = ("area",)
+    _along: ClassVar[Along] = {
+        ("point",): ("forces", "displacements"),
+        ("point", "asperity"): ("asperity_forces", "asperity_displacements"),
+    }
+
+    asperities: Indices
+    forces: Array
+    displacements: Array
+    asperity_forces: Array
+    asperity_displacements: Array
+
+    def _variables(self) -> Variables:
+        return super()._variables() | {"asperity": (("asperity",), self.asperities)}
+
+    @property
+    def area(self) -> float:
+        """[force length] of the polygon through the points: the loss, from inside."""
+        return float(np.trapezoid(self.forces, self.displacements))
+
+
+def cycle(
+    contact: Contact,
+    *,
+    maximum: float | None = None,
+    minimum: float | None = None,
+    displacement: float | None = None,
+    announce: Announce | None = None,
+) -> Cycle:
+    """The steady cycle between two shear forces [force]; `minimum` defaults to -maximum.
+
+    displacement : amplitude of X [length] of a symmetric cycle, instead of its forces
+    announce     : told in a line how far long work has come
+
+    Raises InputError where the scene has no friction, the minimum exceeds the maximum, or either
+    exceeds f P in size, or the displacement that of gross sliding.
+
+    >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
+    >>> print(f"{cycle.loss:.4g}", (cycle.status == "sliding").sum())
+    1.367e-13 6
+    """
+    upper = None if maximum is None else [maximum]
+    lower = None if minimum is None else [minimum]
+    moved = None if displacement is None else [displacement]
+    return cycles(contact, upper, lower, displacement=moved, announce=announce)[0]
+
+
+def cycles(
+    contact: Contact,
+    maximum: ArrayLike | None = None,
+    minimum: ArrayLike | None = None,
+    *,
+    displacement: ArrayLike | None = None,
+    announce: Announce | None = None,
+) -> list[Cycle]:
+    """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives.
+
+    >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2, 0.4]))
+    >>> print([f"{cycle.loss_normalised:.2g}" for cycle in several])
+    ['0.00021', '0.0028', '0.048']
+    """
+    checks.instance("contact", contact, Contact)
+    limit = checks.friction(contact.scene.friction) * contact.load
+    checks.exactly_one("maximum", maximum, "displacement", displacement)
+    if displacement is not None:
+        if minimum is not None:
+            expected = "none beside a displacement, whose cycles are symmetric"
+            raise InputError("minimum", found=minimum, expected=expected)
+        amplitudes = checks.array("displacement", displacement, sign="not negative")
+        return [_moved(contact, float(each), announce) for each in amplitudes]
+    assert maximum is not None  # exactly_one
+    upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
+    lower = -upper
+    if minimum is not None:
+        lower = checks.array("minimum", minimum, length=len(upper))
+        lower = checks.bearable("minimum", lower, limit)
+    if (upper < lower).any():
+        i = int(np.argmax(upper < lower))
+        expected = f"at least the minimum, {lower[i]:g}; by default that is its negative"
+        raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
+    return [
+        _between(contact, high, low, announce)
+        for high, low in zip(upper.tolist(), lower.tolist(), strict=True)
+    ]
+
+
+def steady(
+    scene: Scene,
+    *,
+    loads: ArrayLike,
+    forces: ArrayLike,
+    influence: Kind | None = None,
+    announce: Announce | None = None,
+) -> Cycle:
+    """The steady state of a closed path of P and Q, |Q| <= f P, straight between its points.
+
+    loads, forces : (m,) P and Q at its points [force]; from the last it goes back to the first
+    influence, announce : as in `load_path`
+
+    Raises what `load_path` raises.
+
+    >>> P = contact.load
+    >>> settled = cr.steady(scene, loads=[P, P / 2], forces=[0.3 * P, -0.1 * P])
+    >>> f"{settled.level / P:.4f}", int((settled.status == "sliding").sum())
+    ('0.3500', 12)
+    """
+    points = points_of(scene, loads, forces)
+    contact = pressed_for(scene, [load for load, _ in points], influence, announce)
+    P, Q = (np.array(each, dtype=np.float64) for each in (loads, forces))
+    if contact.load == 0.0:
+        return _still(contact, P, Q)
+    return _cycle(contact, MemoryCurve(), points, P, Q)
+
+
+class _Closed:
+    """The memory curves and pieces of a closed path: on the way, in the first cycle, and later."""
+
+    def __init__(self, start: MemoryCurve, points: Sequence[Point]) -> None:
+        begun, costs = follow(start, [*points, points[0]])
+        self.curves, later = follow(begun[-1], [*points[1:], points[0]])
+        self.first = [piece for cost in costs for piece in cost]
+        self.later = [p for cost in later for p in cost if p.slope * p.sign != 1]
+        plus, minus = min(p + t for p, t in points), min(p - t for p, t in points)
+        self.still, self.force_level = (plus + minus) / 2, (plus - minus) / 2
+        self.least = min(load for load, _ in points)
+
+
+def _between(contact: Contact, maximum: float, minimum: float, announce: Announce | None) -> Cycle:
+    forces = np.array([maximum, minimum])
+    if contact.load == 0.0:
+        return _still(contact, np.zeros(2), forces)
+    levels = contact.keep(FrictionLevels)
+    if announce is not None:
+        announce("pressing at the level of a cycle")
+    points = [point_at(levels.load, force, contact.scene) for force in (maximum, minimum)]
+    loads = np.full(2, float(levels.load))
+    return _cycle(contact, MemoryCurve.pressed(levels.load), points, loads, forces)
+
+
+def _moved(contact: Contact, displacement: float, announce: Announce | None) -> Cycle:
+    if contact.load == 0.0:
+        return _still(contact, np.zeros(2), np.zeros(2))
+    levels = contact.keep(FrictionLevels)
+    height = levels.load - level_at("displacement", levels, displacement)
+    Q = float(height * Fraction(checks.friction(contact.scene.friction)))
+    points = [(levels.load, height), (levels.load, -height)]
+    start, loads = MemoryCurve.pressed(levels.load), np.full(2, float(levels.load))
+    return _cycle(contact, start, points, loads, np.array([Q, -Q]))
+
+
+def _cycle(
+    contact: Contact, start: MemoryCurve, points: list[Point], loads: Array, forces: Array
+) -> Cycle:
+    levels, closed = contact.keep(FrictionLevels), _Closed(start, points)
+    pieces = [*closed.first, *closed.later]
+    needed = levels_needed(closed.curves, pieces) | {closed.still, closed.least}
+    order = levels.order(needed)
+    spent = losses(levels, [closed.first, closed.later]) * levels.loss_unit
+    (first, loss), (first_error, error) = rounded(spent)
+    moved, moved_error = _amplitude(levels, closed.curves)
+    rest, top, bottom = (levels.at(each) for each in (closed.still, levels.load, closed.least))
+    sliding = bottom.touching & rest.open
+    intermittent = top.touching & bottom.open
+    words = {
+        "intermittent": intermittent,
+        "sliding": sliding,
+        "partial" if closed.later else "stuck": rest.touching & top.touching,
+    }
+    slips, slip_errors = rounded(
+        (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
+    )
+    constant = all(load == levels.load for load, _ in points)
+    height = (max(t for _, t in points) - min(t for _, t in points)) / 2
+    defect = np.nan
+    if constant:
+        other = float((trapezoid_loss(top, rest) * 4.0 * levels.loss_unit).value) if height else 0.0
+        defect = abs(other - loss) / (loss or 1.0)
+    if order != "proved":
+        error = first_error = np.inf
+    if order == "fails" and levels.proved:
+        first, loss, moved = _stepped(levels, start, points)
+    if order == "fails":
+        moved_error, words, slip_errors = np.inf, {}, slip_errors + np.inf
+    radii, radius_errors = stick_radii(levels, rest)
+    everywhere = {name: levels.to_scene(which) for name, which in words.items()}
+    slides = everywhere.get("sliding", np.zeros(len(levels.scene), dtype=bool))
+    lost, kept = levels.to_scene(intermittent), levels.to_scene(bottom.touching)
+    doubtful = levels.to_scene(~(rest.touching | rest.open))
+    slip_errors = np.where(slides | doubtful, slip_errors, 0.0) if words else slip_errors
+    reference = smooth_reference(contact.scene, contact.load)
+    whole = reference.energy_scale if reference else np.nan  # W0
+    found = Cycle(
+        contact=contact,
+        loads=frozen(loads),
+        forces=frozen(forces),
+        loss=float(loss),
+        loss_error=float(error),
+        loss_first=float(first),
+        loss_first_error=float(first_error),
+        status=worded(levels, top, **words),
+        slips=frozen(np.where(lost, np.nan, np.where(kept, slips, 0.0))),
+        slip_errors=frozen(slip_errors),
+        stick_radii=radii,
+        stick_radius_errors=frozen(radius_errors + (np.inf if order == "fails" else 0.0)),
+        level=float(closed.still),
+        force_level=float(levels.coefficient.value) * float(closed.force_level),
+        balance_defect=defect,
+        loss_normalised=float(loss) / whole,
+        smooth_normalised=float(mindlin.loss(float(height / levels.load)))
+        if constant and reference
+        else np.nan,
+        displacement_amplitude=moved,
+        displacement_error=moved_error,
+        order=order,
+        presses=levels.presses,
+    )
+    if constant and order != "fails":
+        found.__dict__["_shares"] = shared(levels, closed.later, 1)
+    return found
+
+
+def _amplitude(levels: FrictionLevels, curves: Sequence[MemoryCurve]) -> tuple[float, float]:
+    """Half the range of X of these curves, and a bound on its error."""
+    found = displacements_of(levels, curves)
+    high, low = int(np.argmax(found.value)), int(np.argmin(found.value))
+    value, error = rounded((found[high] - found[low]) * 0.5)
+    return float(value), float(error)
+
+
+def _stepped(
+    levels: FrictionLevels, start: MemoryCurve, points: list[Point]
+) -> tuple[float, float, float]:
+    """By general steps: what the first cycle and the way there cost, the second, and its X_a."""
+    m = len(points)
+    found = followed(levels, start, [*points, *points, points[0]])
+    X = found.states.displacements[m:]
+    spent = found.losses
+    return float(spent[m]), float(spent[2 * m] - spent[m]), float(np.ptp(X)) / 2.0
+
+
+def _still(contact: Contact, loads: Array, forces: Array) -> Cycle:
+    """Where nothing is loaded."""
+    zero = frozen(np.zeros(len(contact.scene)))
+    return Cycle(
+        contact,
+        frozen(loads),
+        frozen(forces),
+        *(0.0,) * 4,
+        contact.status,
+        *(zero,) * 4,
+        *(0.0,) * 7,
+        "proved",
+        0,
+    )
+
+
+def loops(
+    cycles: Sequence[Cycle],
+    points: int = 200,
+    announce: Announce | None = None,
+    asperities: ArrayLike | None = None,
+) -> list[Loop]:
+    """The loops of several cycles of one contact at constant load, which share their levels.
+
+    points : of the loop of the widest range, about; narrower ones have fewer
+    asperities : as in `Cycle.loop`
+
+    >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2]))
+    >>> [len(loop.forces) for loop in cr.loops(several, points=40)]
+    [23, 41]
+    """
+    if not isinstance(points, int) or points < 4:
+        raise InputError("points", found=points, expected="a whole number, at least 4")
+    if not cycles:
+        return []
+    contact = cycles[0].contact
+    if any(np.ptp(each.loads) > 0 for each in cycles):
+        raise InputError("cycles", found="a load that varies", expected="cycles at constant load")
+    chosen = indices("asperities", asperities, len(contact.scene))
+    widest = max(each.force_amplitude for each in cycles)
+    shared = widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))
+    return [
+        _loop(each, shared[1:][shared[1:] < each.force_amplitude], chosen, announce)
+        for each in cycles
+    ]
+
+
+def _loop(cycle: Cycle, way: Array, chosen: Indices, announce: Announce | None) -> Loop:
+    """Through the points where Q has gone by twice as much as `way` says, down and up again."""
+    high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
+    way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
+    forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))
+    forces[len(way) - 1], forces[-1] = low, high
+    if contact.load == 0.0:
+        none = frozen(np.zeros((len(forces), len(chosen))))
+        return Loop(chosen, frozen(forces), frozen(np.zeros(len(forces))), none, none)
+    levels, f = contact.keep(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
+    P, top, bottom = levels.load, *(point_at(levels.load, Q, contact.scene)[1] for Q in (high, low))
+    drops = [2 * Fraction(each) / f for each in way.tolist()]
+    heights = [max(top - drop, bottom) for drop in drops]
+    heights += [min(bottom + drop, top) for drop in drops[1:]]
+    heights[len(way) - 1], heights[-1] = bottom, top
+    ways = [(P, height) for height in heights]
+    begin = follow(MemoryCurve.pressed(P), [(P, top), (P, bottom), (P, top)])[0][-1]
+    if announce is not None:
+        announce(f"{len(way) - 1} levels of a loop")
+    if cycle.order == "fails" and levels.proved:
+        points = [(P, top), (P, bottom), *ways]
+        found = followed(levels, MemoryCurve.pressed(P), points, 1).states
+        moved = found.displacements[2:]
+        fields = (each[2:][:, chosen] for each in (found.forces, found.asperity_displacements))
+    else:
+        found = states_of(levels, follow(begin, ways)[0], chosen)
+        moved = found.displacements
+        fields = (each for each in (found.forces, found.asperity_displacements))
+    loaded = contact.loads[chosen] > 0
+    mine = [frozen(np.where(loaded, each, 0.0)) for each in fields]
+    return Loop(chosen, frozen(forces), frozen(np.array(moved)), *mine)

@@ -1,0 +1,313 @@
+"""The general step: no order of indentations assumed, each asperity with a memory of its own.
+
+Every asperity keeps its own curve in the plane of its indentation and its deflection over c_t f. A
+straight step to (P, T) presses at P, where the indentations become delta_i, and then solves
+
+    eta_i + (A (T_i(eta_i) - T_i before))_i = x,    sum T_i(eta_i) = T
+
+for what each asperity must take up, by Newton's method. Where indentations are ordered one step per
+segment is exact; else it is of second order in the step. Derived in docs/theory/without-order.md,
+"The general step".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, frozen
+from convexrough.errors import SolverError
+from convexrough.friction.curve import MemoryCurve
+from convexrough.friction.levels import FrictionLevels, Snapshot
+from convexrough.friction.state import States, worded
+from convexrough.influence import couple
+from convexrough.sphere import hertz
+
+#: The residual of a step, over the largest indentation, that ends it; a thousand times that is
+#: accepted where rounding leaves no less.
+ACCURATE = 1e-14
+
+#: Newton steps, halvings of each, and halvings of the step itself before giving up.
+ITERATIONS, HALVINGS, CUTS = 60, 30, 6
+
+#: Steps per segment.
+FEWEST, MOST = 4, 64
+
+#: What twice as many may change of a loss and of displacements, and a loss too small, beside the
+#: largest, to ask for.
+SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """The state after a step: own curves, T_i (n,) and positions (n,) own + drift over c_t f.
+
+    load : P, by name;  rise : X / (c_t f);  work : of T along the rise, over c_t f^2
+    """
+
+    load: Fraction
+    level: Snapshot
+    curves: tuple[MemoryCurve, ...]
+    carried: Array
+    positions: Array
+    rise: float = 0.0
+    work: float = 0.0
+
+    @property
+    def deflections(self) -> Array:
+        """(n,) own deflection over c_t f."""
+        return np.array([float(curve.height) for curve in self.curves])
+
+
+class Stepper:
+    """Steps of one scene; small scenes, as it works with the matrix."""
+
+    def __init__(self, levels: FrictionLevels) -> None:
+        scene = levels.scene
+        checks.fits_in_memory("asperities", len(scene), 24.0, 2)
+        modulus = scene.material.contact_modulus
+        self.levels = levels
+        self.coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
+        everyone = np.arange(len(scene))
+        self.A = couple(scene, everyone, 1.0 / (np.pi * modulus), "dense").matrix
+
+    def start(self, curve: MemoryCurve) -> Bundle:
+        """A state without shear, at the load of a curve."""
+        level = self.levels.snapshot(curve.load)
+        own = tuple(MemoryCurve.pressed(max(each, 0.0)) for each in level.indentations)
+        zero = np.zeros(len(own))
+        return Bundle(curve.load, level, own, zero, zero)
+
+    def along(
+        self, start: MemoryCurve, points: Sequence[tuple[Fraction, Fraction]], steps: int
+    ) -> list[Bundle]:
+        """The states after each point, each segment in so many steps."""
+        now, found = self.start(start), list[Bundle]()
+        load, height = start.load, start.height
+        for target, shear in points:
+            grading = 1 if load else 3  # indentations grow as L^(2/3)
+            for k in range(steps):
+                part = Fraction(k + 1, steps) ** grading
+                now = self.step(
+                    now, load + part * (target - load), height + part * (shear - height)
+                )
+            load, height = target, shear
+            found.append(now)
+        return found
+
+    def step(self, now: Bundle, load: Fraction, height: Fraction, cuts: int = CUTS) -> Bundle:
+        """One straight step; in two halves where Newton's method does not get there."""
+        level = self.levels.snapshot(load)
+        if load == 0:
+            nothing = self.start(MemoryCurve())
+            return replace(nothing, work=now.work - now.rise * float(now.carried.sum()) / 2)
+        try:
+            return replace(self._solve(now, level, float(height)), load=load)
+        except SolverError:
+            if cuts == 0:
+                raise
+            before = now.load, Fraction(float(now.carried.sum()))
+            middle = (before[0] + load) / 2, (before[1] + height) / 2
+            return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
+
+    def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
+        trial = _Trial.of(self, now, level)
+        size = float(np.abs(level.indentations).max())
+        eta, x = trial.even(total)
+        iterate = trial.at(eta, x, total)
+        for _ in range(ITERATIONS):
+            if iterate.residual <= ACCURATE * size:
+                break
+            change, shift = iterate.newton(self.A)
+            part = 1.0
+            for _ in range(HALVINGS):
+                following = trial.at(iterate.eta + part * change, iterate.x + part * shift, total)
+                if following.residual < iterate.residual:
+                    break
+                part /= 2
+            else:
+                break
+            iterate = following
+        if iterate.residual > 1e3 * ACCURATE * size:
+            found = f"a residual of {iterate.residual / size:.1e} of the indentation"
+            raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
+        moved = now.positions + iterate.eta
+        rise = now.rise + iterate.x
+        work = now.work + 0.5 * (float(now.carried.sum()) + total) * iterate.x
+        return Bundle(now.load, level, iterate.curves, iterate.carried, moved, rise, work)
+
+    def stored(self, state: Bundle) -> float:
+        """The elastic energy over c_t f^2: own deflections along the curves, and the coupling."""
+        own = 0.0
+        for curve, k in zip(state.curves, self.coefficients, strict=True):
+            carried = 0.0
+            levels = np.array([float(level) for level in curve.levels])
+            loads = hertz.load(levels, k)
+            for j, slope in enumerate(map(float, curve.slopes)):
+                run, rise = levels[j + 1] - levels[j], loads[j + 1] - loads[j]
+                own += slope * (carried - slope * loads[j]) * run
+                own += 0.4 * slope**2 * (loads[j + 1] * levels[j + 1] - loads[j] * levels[j])
+                carried += slope * rise
+        return own + 0.5 * float(state.carried @ self.A @ state.carried)
+
+
+class Followed(NamedTuple):
+    """What general steps find at m points, of which nothing is proved.
+
+    losses : (m,) since the beginning, nan where steps do not settle them;  status : (m, N)
+    fronts : (m, N) indentations down to which each asperity slipped last, or its own
+    """
+
+    states: States
+    losses: Array
+    status: NDArray[np.str_]
+    fronts: Array
+
+
+def followed(
+    levels: FrictionLevels,
+    start: MemoryCurve,
+    points: Sequence[tuple[Fraction, Fraction]],
+    steps: int | None = None,
+    stepper: type[Stepper] | None = None,
+) -> Followed:
+    """The general step along a path, so many times per segment.
+
+    The error of n steps is about e / n^2, so of losses by n and 2n steps (4 W_2n - W_n) / 3 is
+    given, and how it changes from one doubling to the next estimates its error.
+
+    steps : default twice as many until every loss changes by less than SETTLED of itself, and
+        displacements by less than SETTLED_MOTION of the largest
+    """
+    by = (stepper or Stepper)(levels)
+
+    def found(count: int) -> Followed:
+        return _found(levels, by, by.along(start, points, count))
+
+    if steps is not None:
+        return found(steps)
+    count, before, best = 2 * FEWEST, found(FEWEST), np.full(len(points), np.inf)
+    while True:
+        here = found(count)
+        last, best = best, (4.0 * here.losses - before.losses) / 3.0
+        settled = np.abs(best - last) <= SETTLED * (best + NEGLIGIBLE * best.max(initial=0.0))
+        moved = here.states.displacements - before.states.displacements
+        near = np.abs(moved).max() <= SETTLED_MOTION * np.abs(here.states.displacements).max()
+        if (settled.all() and near) or count >= MOST:
+            known = np.maximum.accumulate(np.maximum(best, 0.0))
+            return here._replace(losses=frozen(np.where(settled, known, np.nan)))
+        count, before = 2 * count, here
+
+
+def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) -> Followed:
+    unit = (float(levels.coefficient.value), float((levels.coefficient * levels.ratio).value))
+    f, travel = unit
+    positions = travel * np.array([each.positions for each in bundles])
+    own = travel * np.array([each.deflections for each in bundles])
+    forces = f * np.array([each.carried for each in bundles])
+    spent = np.array([each.work - stepper.stored(each) for each in bundles])
+    displacements = travel * np.array([each.rise for each in bundles])
+    parts = (displacements, forces, positions, positions - own)
+    unknown = (np.full(part.shape, np.inf) for part in parts)
+    fields = (frozen(each) for pair in zip(parts, unknown, strict=True) for each in pair)
+    return Followed(
+        states=States(*fields),
+        losses=frozen(f * travel * spent),
+        status=frozen(np.array([worded(levels, levels.at(each.load)) for each in bundles])),
+        fronts=np.array([[_front(curve) for curve in each.curves] for each in bundles]),
+    )
+
+
+def _front(curve: MemoryCurve) -> float:
+    return float(curve.load if curve.front is None else curve.front)
+
+
+class _Iterate(NamedTuple):
+    eta: Array
+    x: float
+    curves: tuple[MemoryCurve, ...]
+    carried: Array
+    slopes: Array  # dT_i / deta_i
+    defect: Array  # of the n equations
+    excess: float  # of the total
+
+    @property
+    def residual(self) -> float:
+        """The largest defect, the excess as a displacement among them."""
+        stiffness = float(self.slopes.sum())
+        missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
+        return max(float(np.abs(self.defect).max()), missing if self.excess else 0.0)
+
+    def newton(self, A: Array) -> tuple[Array, float]:
+        """The step of eta and x."""
+        n = len(self.eta)
+        matrix = np.empty((n + 1, n + 1))
+        matrix[:n, :n] = A * self.slopes
+        matrix[np.diag_indices(n)] += 1.0
+        matrix[:n, n] = -1.0
+        matrix[n, :n] = self.slopes
+        matrix[n, n] = 0.0
+        try:
+            step = np.linalg.solve(matrix, -np.append(self.defect, self.excess))
+        except np.linalg.LinAlgError as error:
+            raise SolverError("everything slides", solver="general step") from error
+        return step[:n], float(step[n])
+
+
+class _Trial(NamedTuple):
+    """A step under way: from a state to a level of the normal load."""
+
+    stepper: Stepper
+    now: Bundle
+    level: Snapshot
+    deflections: Array  # (n,) before
+    parts: Array  # (n,) of the step during which each touches
+
+    @classmethod
+    def of(cls, stepper: Stepper, now: Bundle, level: Snapshot) -> _Trial:
+        own = np.maximum(level.indentations, 0.0)
+        gaps = np.maximum(-now.level.indentations, 0.0)
+        parts = np.divide(own, own + gaps, out=np.zeros_like(own), where=own > 0)
+        return cls(stepper, now, level, now.deflections, parts)
+
+    def even(self, total: float) -> tuple[Array, float]:
+        """A start at which nothing slides: each asperity carries the same part of friction."""
+        own = np.maximum(self.level.indentations, 0.0)
+        wanted = total / self.level.load * own - self.deflections
+        eta = np.divide(wanted, self.parts, out=np.zeros_like(own), where=self.parts > 0)
+        return eta, float(eta @ self.level.loads / self.level.load)
+
+    def at(self, eta: Array, x: float, total: float) -> _Iterate:
+        curves, carried, slopes = [], np.zeros(len(eta)), np.zeros(len(eta))
+        targets = self.deflections + eta * self.parts
+        for i, (old, k) in enumerate(zip(self.now.curves, self.stepper.coefficients, strict=True)):
+            own = max(float(self.level.indentations[i]), 0.0)
+            curve, _ = old.go(own, min(max(targets[i], -own), own))
+            curves.append(curve)
+            if own == 0.0:
+                continue
+            levels = np.array([float(level) for level in curve.levels])
+            loads = hertz.load(levels, k)
+            carried[i] = np.diff(loads) @ np.array([float(slope) for slope in curve.slopes])
+            if abs(targets[i]) < own:
+                slopes[i] = self.parts[i] * _slope(old, curve, k)
+        defect = eta + self.stepper.A @ (carried - self.now.carried) - x
+        return _Iterate(
+            eta, x, tuple(curves), carried, slopes, defect, float(carried.sum()) - total
+        )
+
+
+def _slope(old: MemoryCurve, curve: MemoryCurve, k: float) -> float:
+    """dT_i over the deflection: of the chord of what is appended, or at the front."""
+    high = float(curve.load)
+    if curve.front is None and curve.load > old.load:
+        low = float(old.load)
+        return float((hertz.load(high, k) - hertz.load(low, k)) / (high - low))
+    front = high if curve.front is None else float(curve.front)
+    return float(1.5 * np.sqrt(front / k**3))

@@ -1,0 +1,221 @@
+"""The normal solutions of a contact at rational total loads, and what friction needs of its scene.
+
+Forces are counted in f times the unit of loads, displacements in c_t f times the unit of lengths,
+c_t = (2 - nu) / (2 (1 - nu)). A total load is named by a rational number [force]: where the load
+is prescribed it is that load. Where the approach is prescribed the load P follows, and is known to
+thirty digits only: the name of P is its float64 number, and L stands for P less the difference of
+the names. A load of 0 is 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, among_zeros, frozen
+from convexrough.contact import Contact, levels_of
+from convexrough.friction.order import MOST, Order, order_between
+from convexrough.influence.coupling import Coupling
+from convexrough.normal.level import Level
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair
+from convexrough.roundoff import ROUNDOFF, SAFETY
+
+#: Roundoffs of f P that a shear force may be off f P, and still be it: gross sliding.
+AT_THE_END = 16
+
+
+Made = TypeVar("Made")
+
+
+class FrictionLevels:
+    """The levels of a contact, named by rational loads [force]; `contact.keep(FrictionLevels)`.
+
+    scene : with friction;  load : P;  candidates : (n,) of N asperities of the scene
+    """
+
+    def __init__(self, contact: Contact) -> None:
+        self._levels = contact.keep(levels_of)
+        self._named: dict[Fraction, Level] = {}
+        self._kept: dict[Any, Any] = {}
+        self.scene = contact.scene
+        self.by_load = contact.prescribed_load is not None
+        self.candidates = self._levels.problem.candidates
+        self.units = self._levels.problem.units
+        found = float(self.top.load.value) * self.units.force
+        prescribed = contact.prescribed_load
+        self.load = Fraction(found if prescribed is None else prescribed)
+        material = self.scene.material
+        self.coefficient = Ball.exact(checks.friction(self.scene.friction))
+        nu = Ball.exact(material.poisson_ratio)
+        self.ratio = (2.0 - nu) / ((1.0 - nu) * 2.0)  # c_t
+
+    @cached_property
+    def force_unit(self) -> Ball:
+        """What levels' loads are shear forces in [force]."""
+        return self.coefficient * self.units.force
+
+    @cached_property
+    def travel_unit(self) -> Ball:
+        """What levels' lengths are tangential displacements in [length]."""
+        return self.coefficient * self.ratio * self.units.length
+
+    @cached_property
+    def loss_unit(self) -> Ball:
+        """c_t f^2, in the scene's units [force length]."""
+        return self.force_unit * self.travel_unit
+
+    @property
+    def top(self) -> Level:
+        """The level of P."""
+        return self._levels.top
+
+    @property
+    def proved(self) -> bool:
+        """The normal solution at P is proved."""
+        return self.top.solution is not None
+
+    @property
+    def top_error(self) -> Array:
+        """(N,) bounds on the errors of the loads at P, in own units."""
+        return self.to_scene(np.asarray(self.top.loads.error))
+
+    @property
+    def presses(self) -> int:
+        """How many normal problems were solved, with that of P."""
+        return 1 + self._levels.presses
+
+    @property
+    def known(self) -> list[Fraction]:
+        """The loads of all levels so far."""
+        return [*self._named, self.load]
+
+    def at(self, load: Fraction) -> Level:
+        """The level of a load from 0 to P."""
+        if load == self.load:
+            return self.top
+        if load not in self._named:
+            self._named[load] = self._levels.at(self._ball(load))
+        return self._named[load]
+
+    def displaced(self, displacement: float) -> Fraction:
+        """The load of the level whose approach is D0(P) - X / (c_t f), X >= 0 [length]."""
+        lowered = Ball.exact(displacement) / self.travel_unit
+        left = self.top.approach - lowered - self.at(Fraction(0)).approach
+        if not left.value > AT_THE_END * ROUNDOFF * lowered.value:
+            return Fraction(0)
+        if displacement == 0.0:
+            return self.load
+        level = self._levels.at_approach(self.top.approach - lowered)
+        drop = (self.top.load - level.load).mid
+        load = self.load - (Fraction(float(drop.high)) + Fraction(float(drop.low))) * Fraction(
+            self.units.force
+        )
+        self._named[load] = level
+        return load
+
+    @cached_property
+    def farthest(self) -> float:
+        """[length] X in gross sliding."""
+        far = (self.top.approach - self.at(Fraction(0)).approach) * self.travel_unit
+        return float(far.value)
+
+    def order(self, loads: Iterable[Fraction], most: int = MOST) -> Order:
+        """Whether no indentation falls with the load, from the least of these loads to P."""
+        asked = frozenset({*loads, self.load})
+        return self.keep((order_between, asked, most), lambda: order_between(self.at, asked, most))
+
+    def keep(self, name: Any, make: Callable[[], Made]) -> Made:
+        """make(), once for each name."""
+        if name not in self._kept:
+            self._kept[name] = make()
+        made: Made = self._kept[name]
+        return made
+
+    def snapshot(self, load: Fraction) -> Snapshot:
+        """A level in the scene's units, for all its asperities."""
+        level = self.at(load)
+        return Snapshot(
+            load=float(load),
+            loads=self.to_scene(level.loads.value * self.units.force),
+            indentations=self.indentations(level).value * self.units.length,
+            touching=self.to_scene(level.touching),
+            open=~self.to_scene(~level.open),
+        )
+
+    def loads(self, level: Level) -> Ball:
+        """(N,) P_i in own units."""
+        high, low, radius = (self.to_scene(part) for part in _parts(level.loads))
+        return Ball(Pair(high, low), radius)
+
+    def indentations(self, level: Level) -> Ball:
+        """(N,) n_i in own units; of asperities that cannot touch to some sixteen digits."""
+        known, others = level.indentation, self._others
+        if len(others) == 0:
+            return known
+        high, low, radius = (self.to_scene(part) for part in _parts(known))
+        approach = float(level.approach.value)
+        high[others] = approach + self.scene.offsets[others] / self.units.length
+        radius[others] = self.scene.offset_errors[others] / self.units.length
+        radius[others] += 4 * ROUNDOFF * (np.abs(high[others]) + abs(approach))
+        radius[others] += float(level.approach.error)
+        if level.trial is not None:
+            loads = level.trial.loads.high
+            felt = self._beyond.apply(loads)
+            high[others] -= felt
+            radius[others] += self._beyond.rounding(loads).of(felt) + 4 * ROUNDOFF * felt
+            radius[others] += level.solution.moves(self._beyond) if level.solution else np.inf
+        return Ball(Pair(high, low), radius * (1 + SAFETY))
+
+    @cached_property
+    def _others(self) -> Indices:
+        """Asperities of the scene that cannot touch at loads up to P."""
+        left = np.ones(len(self.scene), dtype=bool)
+        left[self.candidates] = False
+        return np.flatnonzero(left)
+
+    @cached_property
+    def _beyond(self) -> Coupling:
+        points = self.scene.contact_points[self._others]
+        return self._levels.problem.influence.onto(points)
+
+    def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
+        """(..., N) values of the candidates, among zeros for all others of the scene."""
+        return among_zeros(values, self.candidates, len(self.scene), axis=-1)
+
+    def _ball(self, load: Fraction) -> Ball:
+        unit = Fraction(self.units.force)
+        if load == 0:
+            return Ball.exact(0.0)
+        if self.by_load:
+            return Ball.exact(load / unit)
+        return self.top.load - Ball.exact((self.load - load) / unit)
+
+
+class Snapshot(NamedTuple):
+    """A normal solution in the scene's units. Arrays are (N,).
+
+    load, loads : [force];  indentations : [length] minus the gap where open
+    touching, open : proved
+    """
+
+    load: float
+    loads: Array
+    indentations: Array
+    touching: NDArray[np.bool_]
+    open: NDArray[np.bool_]
+
+
+def rounded(ball: Ball) -> tuple[Array, Array]:
+    """The float64 numbers nearest to a ball, and bounds on their errors."""
+    return frozen(np.array(ball.value)), frozen(np.array(ball.error))
+
+
+def _parts(ball: Ball) -> tuple[Array, Array, Array]:
+    return np.asarray(ball.mid.high), np.asarray(ball.mid.low), ball.radius

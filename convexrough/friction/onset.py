@@ -1,0 +1,157 @@
+"""The load at which an asperity first touches, and the shear force at which it starts to slide.
+
+On first loading asperity i slides once the level P - Q / f is below its onset, the root of its
+indentation n_i(L). It is found by Newton's method, with dn_i/dL = S - (A q)_i, and enclosed by two
+proofs: that it is open just below, and that it touches just above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.contact import Contact
+from convexrough.errors import InputError
+from convexrough.friction.levels import FrictionLevels
+
+#: Of more loaded asperities than this, coupled by an operator, the onset of some only is found.
+MOST_ONSETS = 256
+
+#: Distances from the root, relative to it, at which proofs are tried, the closest first.
+TRIED = tuple(10.0**-k for k in range(13, 3, -1))
+
+#: Levels known already are taken up to this one of those distances.
+ENOUGH = 2
+
+#: Newton steps at most, and the change of L, in parts of P, that ends them.
+STEPS, SETTLED = 60, 2.0**-54
+
+
+class Onset(NamedTuple):
+    """A load [force], proved to be between two others where order holds."""
+
+    load: Fraction
+    lower: Fraction  # the asperity is proved open there
+    upper: Fraction  # and to touch there
+
+
+def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
+    """(n,) [force] the shear force at which each asperity starts to slide on first loading.
+
+    The same as the amplitude (maximum - minimum) / 2 of a steady cycle below which its sliding has
+    shaken down to partial slip. nan where the asperity carries no load.
+
+    which : indices of the asperities to look at, in this order; default all. Each takes some normal
+        solutions, so of many loaded asperities some must be named.
+
+    >>> onsets = cr.onset_of_sliding(contact, which=[0, 36])
+    >>> print((onsets / contact.load).round(3))
+    [0.5   0.176]
+    """
+    checks.instance("contact", contact, Contact)
+    f = Fraction(checks.friction(contact.scene.friction))
+    asked = indices("which", which, len(contact.scene))
+    onsets = np.full(len(asked), np.nan)
+    loaded = np.flatnonzero(contact.loads[asked])
+    if len(loaded) == 0:
+        return frozen(onsets)
+    levels = contact.keep(FrictionLevels)
+    if not levels.top.problem.influence.at_hand and len(loaded) > MOST_ONSETS:
+        raise InputError(
+            "which",
+            found=f"{len(loaded):,} loaded asperities",
+            expected=f"at most {MOST_ONSETS} of them, each of which takes some normal solutions",
+        )
+    found = enclosed(levels, asked[loaded].tolist())
+    onsets[loaded] = [float(f * (levels.load - found[i].load)) for i in asked[loaded].tolist()]
+    return frozen(onsets)
+
+
+def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
+    """The onsets of asperities that touch at P; a side without a proof is 0 or P."""
+    depths = levels.top.indentation.value[np.searchsorted(levels.candidates, which)]
+    return {which[k]: _enclosed(levels, which[k]) for k in np.argsort(depths).tolist()}
+
+
+def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
+    """By the levels on the way to the root, and where these are far from it by levels close by."""
+    place = int(np.searchsorted(levels.candidates, asperity))
+    found = _root(levels, place)
+    around = [Fraction(part) * (found or levels.load) for part in TRIED]
+    near = [s for s in levels.known if around[0] <= abs(s - found) <= around[ENOUGH]]
+    below = [*(s for s in near if s < found), *(found - part for part in around)]
+    above = [*(s for s in near if s > found), *(found + part for part in around)]
+    lower = next((s for s in below if s > 0 and levels.at(s).open[place]), Fraction(0))
+    sure = (s for s in above if s < levels.load and levels.at(s).touching[place])
+    return Onset(found, lower, next(sure, levels.load))
+
+
+def _root(levels: FrictionLevels, place: int) -> Fraction:
+    """The load at which n_i is 0, of a candidate; 0 of the highest."""
+
+    def depth(load: Fraction) -> float:
+        return float(levels.at(load).indentation.value[place])
+
+    if depth(Fraction(0)) >= 0.0:  # one of those that are as high as the highest
+        return Fraction(0)
+    known = [load for load in levels.known if depth(load) > 0]
+    low, high = max((s for s in levels.known if depth(s) <= 0), default=Fraction(0)), min(known)
+    here = min((low, high), key=lambda s: abs(depth(s))) if low else high
+    for _ in range(STEPS):
+        value = depth(here)
+        if value > 0:
+            high = min(high, here)
+        else:
+            low = max(low, here)
+        step = Fraction(value / _rate(levels, here, place))
+        following = here - step
+        if abs(step) <= Fraction(SETTLED) * levels.load or value == 0:
+            return min(max(following, low), high)
+        if not low < following < high:
+            following = (low + high) / 2
+        here = _short(following)
+    return here
+
+
+def _rate(levels: FrictionLevels, load: Fraction, place: int) -> float:
+    """dn_i/dL, per unit of force."""
+    level = levels.at(load)
+    return float(level.rates[place]) / levels.units.force
+
+
+def _short(load: Fraction) -> Fraction:
+    """As a sum of two float64 numbers: a rational number of few digits."""
+    high = Fraction(float(load))
+    return high + Fraction(float(load - high))
+
+
+def last_to_touch(levels: FrictionLevels) -> tuple[int, Onset]:
+    """The asperity with the highest onset of those that touch at P."""
+    touching: Indices = np.flatnonzero(levels.top.loads.value > 0)
+    depths = levels.top.indentation.value[touching]
+    last = int(touching[np.argmin(depths)])
+    while True:
+        found = _enclosed(levels, int(levels.candidates[last]))
+        there = levels.at(found.load).indentation
+        farthest = int(touching[np.argmin(there.value[touching])])
+        if farthest == last or there.value[farthest] >= -there.radius[farthest]:
+            return int(levels.candidates[last]), found
+        last = farthest
+
+
+def indices(what: str, which: ArrayLike | None, n: int) -> Indices:
+    """Indices of asperities of a scene of n, checked; default all."""
+    if which is None:
+        return np.arange(n)
+    asked = np.atleast_1d(np.asarray(which))
+    whole = asked.ndim == 1 and (np.issubdtype(asked.dtype, np.integer) or asked.size == 0)
+    if not whole or (asked < 0).any() or (asked >= n).any():
+        expected = f"whole numbers from 0 to {n - 1}: indices of asperities of the scene"
+        raise InputError(what, found=repr(which)[:60], expected=expected)
+    return asked.astype(np.intp)

@@ -1,0 +1,148 @@
+"""What a cycle costs where normal load and shear swing out of step: loss against phase and size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, frozen
+from convexrough.drawn import Drawn
+from convexrough.errors import InputError
+from convexrough.friction.cycle import Cycle, steady
+from convexrough.friction.order import Order
+from convexrough.friction.shapes import elliptic_path
+from convexrough.influence import Kind
+from convexrough.progress import Announce
+from convexrough.record import Along, Table
+from convexrough.scene.asperities import Asperities
+from convexrough.scene.scene import Scene
+from convexrough.sphere.smooth import smooth_reference
+
+#: The orders of the cycles, the least sure first.
+UNSURE_FIRST: tuple[Order, ...] = ("fails", "proved for one step", "proved")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PhaseLosses(Table, Drawn):
+    """Losses of ellipses  P = load + factor load_amplitude cos t,  Q alike with sin(t + phase).
+
+    A row for each ellipse, c of them: all phases of the first factor, then of the next.
+
+    phases, factors : (c,) [rad] and of both amplitudes
+    losses  : (c,) per later cycle, both bodies [force length], on chords; loss_errors are proved
+    smooth  : (c,) the same of the smooth sphere; nan where the base has no smooth reference
+    levels  : (c,) [force] L*, below which nothing slips again
+    sliding : (c,) how many asperities slide in every cycle, or lose contact in it
+    order   : the least sure of those of all cycles
+
+    >>> losses = cr.phase_losses(
+    ...     scene, load=contact.load, load_amplitude=0.3 * contact.load,
+    ...     force_amplitude=0.14 * contact.load, phases=[0.0, np.pi / 2], chords=8
+    ... )
+    >>> losses.losses.shape, losses.sliding.tolist()
+    ((2,), [12, 6])
+    """
+
+    _along: ClassVar[Along] = {
+        ("ellipse",): (
+            *("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding"),
+        ),
+    }
+
+    scene: Scene
+    load: float
+    load_amplitude: float
+    force: float
+    force_amplitude: float
+    phases: Array
+    factors: Array
+    losses: Array
+    loss_errors: Array
+    smooth: Array
+    levels: Array
+    sliding: NDArray[np.int64]
+    order: Order
+
+
+def phase_losses(
+    scene: Scene,
+    *,
+    load: float,
+    load_amplitude: float,
+    force: float = 0.0,
+    force_amplitude: float,
+    phases: ArrayLike,
+    factors: ArrayLike = (1.0,),
+    chords: int = 24,
+    influence: Kind | None = None,
+    announce: Announce | None = None,
+) -> PhaseLosses:
+    """The loss of an elliptic path at several phases and sizes; `elliptic_path` has the letters.
+
+    chords : of each ellipse; the loss is off by about chords^-2
+    influence, announce : as in `load_path`
+
+    Raises what `elliptic_path` and `steady` raise.
+
+    >>> P = contact.load
+    >>> swing = dict(load=P, load_amplitude=0.2 * P, force_amplitude=0.05 * P)
+    >>> losses = cr.phase_losses(scene, **swing, phases=[0.0, np.pi / 2], chords=8)
+    >>> bool(losses.losses[1] < 1e-9 * losses.losses[0])  # in step, and no steeper than friction
+    True
+    """
+    f = checks.friction(scene.friction)
+    turns, sizes = checks.array("phases", phases), checks.array("factors", factors)
+    for what, values in (("phases", turns), ("factors", sizes)):
+        if len(values) == 0:
+            raise InputError(what, found="none", expected="at least one")
+    alone = _smooth_alone(scene, load)
+
+    def settled(on: Scene, size: float, phase: float) -> Cycle:
+        loads, forces = elliptic_path(
+            load=load,
+            load_amplitude=size * load_amplitude,
+            force=force,
+            force_amplitude=size * force_amplitude,
+            phase=phase,
+            friction=f,
+            chords=chords,
+        )
+        kind = influence if on is scene else None
+        return steady(on, loads=loads, forces=forces, influence=kind)
+
+    rough, smooth = list[Cycle](), list[float]()
+    pairs = list(product(sizes.tolist(), turns.tolist()))
+    for k, (size, phase) in enumerate(pairs):
+        if announce is not None:
+            announce(f"ellipse {k + 1} of {len(pairs)}")
+        rough.append(settled(scene, size, phase))
+        smooth.append(settled(alone, size, phase).loss if alone else np.nan)
+    sliding = [np.isin(each.status, ("sliding", "intermittent")).sum() for each in rough]
+    return PhaseLosses(
+        scene=scene,
+        load=float(load),
+        load_amplitude=float(load_amplitude),
+        force=float(force),
+        force_amplitude=float(force_amplitude),
+        phases=frozen(np.array([phase for _, phase in pairs])),
+        factors=frozen(np.array([size for size, _ in pairs])),
+        losses=frozen(np.array([each.loss for each in rough])),
+        loss_errors=frozen(np.array([each.loss_error for each in rough])),
+        smooth=frozen(np.array(smooth)),
+        levels=frozen(np.array([each.level for each in rough])),
+        sliding=frozen(np.array(sliding, dtype=np.int64)),
+        order=min((each.order for each in rough), key=UNSURE_FIRST.index, default="proved"),
+    )
+
+
+def _smooth_alone(scene: Scene, load: float) -> Scene | None:
+    """The smooth base on a plane, as one asperity of the same relative radius; None without one."""
+    if (reference := smooth_reference(scene, load)) is None:
+        return None
+    twice = 2.0 * reference.radius
+    return Scene(twice, Asperities([[0.0, 0.0]], twice), scene.material, scene.friction)

@@ -1,0 +1,379 @@
+"""`shear`: the friction state of a pressed contact under a first shear force or displacement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, frozen
+from convexrough.contact import Contact
+from convexrough.drawn import Drawn
+from convexrough.errors import InputError
+from convexrough.friction.curve import MemoryCurve
+from convexrough.friction.general_step import Followed, followed
+from convexrough.friction.levels import AT_THE_END, FrictionLevels, rounded
+from convexrough.friction.order import Order
+from convexrough.friction.state import states_of, stick_radii, words
+from convexrough.normal.boxes import Scope
+from convexrough.progress import Announce
+from convexrough.record import Along, Table
+from convexrough.roundoff import ROUNDOFF, SAFETY
+
+if TYPE_CHECKING:
+    from convexrough.gradients.change import Direction, ShearChange
+    from convexrough.gradients.gradient import Gradient, Holding
+
+#: A force that is short of f P by less than this part of it implies that an asperity slides.
+NEAR_SLIDING = 1e-2
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShearCertificate(Table):
+    """What is proved of a friction state. Arrays are (n,), in the scene's order.
+
+    scope  : that of the contact it starts from, or "none" where nothing is proved
+    order  : "proved": no indentation falls between the levels of the state, so that words and
+        bounds hold for the state of every history of loading; "proved for one step": they hold for
+        the solution of the program with one step; "fails": nothing is proved
+    status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
+        "open" (proved to carry no load) or "undecided"
+    force_errors : [force];  slip_errors, stick_radius_errors : [length] bounds on the distance to
+        the solution
+    force_error, displacement_error : [force], [length] likewise of Q and X; 0 of the prescribed one
+
+    >>> judged = cr.shear(contact, force=0.25 * contact.load).certificate
+    >>> judged.scope, judged.holds, (judged.status == "sliding").sum().item()
+    ('global', True, 6)
+    """
+
+    _shown = ("holds",)
+    _along: ClassVar[Along] = {
+        ("asperity",): ("status", "force_errors", "slip_errors", "stick_radius_errors")
+    }
+
+    scope: Scope
+    order: Order
+    status: NDArray[np.str_]
+    force_errors: Array
+    slip_errors: Array
+    stick_radius_errors: Array
+    force_error: float
+    displacement_error: float
+
+    @property
+    def holds(self) -> bool:
+        """Every asperity is proved to slide, to stick in part, or to be open."""
+        return self.scope != "none" and not bool((self.status == "undecided").any())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShearState(Table, Drawn):
+    """A friction state. Arrays are (n,), in the order of the scene's asperities.
+
+    force         : Q [force];  displacement : X of the deep points, both bodies [length]
+    forces        : Q_i [force], sum Q
+    displacements : X_i + slip_i [length]: own deflection and slip, without the others' influence
+    slips         : [length] gross slip, 0 where not sliding
+    stick_radii   : c_i [length], 0 where sliding: the contact radii at the load P - Q / f
+
+    >>> state = cr.shear(contact, displacement=9.88e-6)
+    >>> print(f"{state.force / contact.load:.3f}", (state.status == "sliding").sum())
+    0.250 6
+    """
+
+    _shown = ("status",)
+    _along: ClassVar[Along] = {
+        ("asperity",): ("status", "forces", "displacements", "slips", "stick_radii")
+    }
+
+    contact: Contact
+    force: float
+    displacement: float
+    forces: Array
+    displacements: Array
+    slips: Array
+    stick_radii: Array
+    certificate: ShearCertificate
+
+    @property
+    def status(self) -> NDArray[np.str_]:
+        """(n,) "sliding", "partial", "open" or "undecided"; each of the first three is proved."""
+        return self.certificate.status
+
+    @property
+    def order(self) -> Order:
+        """What words and bounds rest on: that of the certificate."""
+        return self.certificate.order
+
+    def gradient(
+        self,
+        *,
+        displacement: float | None = None,
+        forces: ArrayLike | None = None,
+        slips: ArrayLike | None = None,
+        holding: Holding | None = None,
+    ) -> Gradient:
+        """Derivatives of a weighted sum of results with respect to the scene.
+
+        displacement : weight on X;  forces, slips : (n,) weights on those of the asperities
+        holding : as in `Contact.gradient`; the shear force is held, also where a
+            displacement was prescribed: `Gradient` says how to hold that
+
+        Raises InputError in gross sliding where several asperities slide last, or the approach is
+        held: there is no derivative.
+
+        >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
+        >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")
+        9.88e-06 124.6
+        """
+        from convexrough.gradients.states import state_gradient  # a floor above: when asked
+
+        return state_gradient(
+            self,
+            displacement=displacement,
+            forces=forces,
+            slips=slips,
+            holding=holding,
+        )
+
+    def change(self, direction: Direction) -> ShearChange:
+        """How forces, slips and the displacement change, to first order, when the scene does.
+
+        direction : of what, by how much
+
+        Raises InputError in gross sliding.
+        """
+        from convexrough.gradients.change import shear_change  # a floor above: when asked
+
+        return shear_change(self, direction)
+
+
+def shear(
+    contact: Contact,
+    *,
+    force: float | None = None,
+    displacement: float | None = None,
+    announce: Announce | None = None,
+) -> ShearState:
+    """Shear a pressed contact, first loading, at constant normal load.
+
+    force [force] Q or displacement [length] X of the deep points : exactly one. A force within 16
+        roundoffs of f P is read as f P: gross sliding
+    announce : told in a line how far long work has come
+
+    Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding) or X its
+    displacement there, and SolverError where a normal problem is not solved.
+
+    >>> state = cr.shear(contact, force=0.25 * contact.load)
+    >>> print((state.status == "sliding").sum(), f"{state.displacement:.3g}")
+    6 9.88e-06
+    """
+    checks.instance("contact", contact, Contact)
+    friction = checks.friction(contact.scene.friction)
+    checks.exactly_one("force", force, "displacement", displacement)
+    if displacement is not None:
+        displacement = checks.finite("displacement", displacement)
+    else:
+        force = one_force("force", force, friction * contact.load)
+    if contact.load == 0.0:
+        return _nothing_loaded(contact, displacement or 0.0)
+    levels = contact.keep(FrictionLevels)
+    if announce is not None:
+        announce("pressing at the load P - Q / f")
+    if force is not None:
+        height = height_of(levels, force)
+    else:
+        height = levels.load - level_at("displacement", levels, abs(displacement or 0.0))
+        height = height if (displacement or 0.0) >= 0 else -height
+    curve = MemoryCurve.pressed(levels.load).go(levels.load, height)[0]
+    order = levels.order({levels.load - abs(height)})
+    if order == "fails" and levels.proved and height:
+        if displacement is not None:
+            height = _by_steps(levels, displacement)
+        found = followed(levels, MemoryCurve.pressed(levels.load), [(levels.load, height)])
+        return _stepped(contact, levels, found, height, force)
+    return _state(contact, levels, curve, order, force, displacement)
+
+
+def one_force(what: str, value: ArrayLike | None, limit: float) -> float:
+    """A shear force that friction can bear."""
+    given = checks.bearable(what, np.asarray(value), limit)
+    if given.ndim:
+        raise InputError(what, found=f"shape {given.shape}", expected="one number")
+    return float(given)
+
+
+def height_of(levels: FrictionLevels, force: float) -> Fraction:
+    """T = Q / f at the load P; P itself where it is that to rounding: gross sliding."""
+    return limited(levels.load, Fraction(force) / Fraction(checks.friction(levels.scene.friction)))
+
+
+def limited(load: Fraction, height: Fraction) -> Fraction:
+    """T, or P or -P where it is that to rounding."""
+    if abs(load - abs(height)) > AT_THE_END * Fraction(ROUNDOFF) * load:
+        return height
+    return load if height > 0 else -load
+
+
+def level_at(what: str, levels: FrictionLevels, displacement: float) -> Fraction:
+    """The load of the level that gives the deep points a displacement X >= 0 on first loading."""
+    farthest = levels.farthest
+    if not displacement <= farthest * (1 + 1e-14):
+        raise InputError(
+            what,
+            found=f"{displacement:.17g}: gross sliding",
+            expected=f"at most X = {farthest:.17g}, where the last asperity slides",
+        )
+    return levels.displaced(displacement)
+
+
+def _state(
+    contact: Contact,
+    levels: FrictionLevels,
+    curve: MemoryCurve,
+    order: Order,
+    force: float | None,
+    displacement: float | None,
+) -> ShearState:
+    found = states_of(levels, [curve])
+    if order == "fails":
+        found = found.unproved()
+    level = levels.at(levels.load - abs(curve.height))
+    radii, radius_errors = stick_radii(levels, level)
+    loaded = contact.loads > 0
+    unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
+    most = np.abs(found.drifts[0]) + found.drift_errors[0]  # where it may or may not touch
+    slip_errors = np.where(loaded, found.drift_errors[0], 0.0) + np.where(unsure, most, 0.0)
+    moved, error = float(found.displacements[0]), float(found.displacement_errors[0])
+    doubt = 0.0
+    if displacement is not None:
+        total, off = rounded((levels.top.load - level.load) * levels.force_unit)
+        force, doubt = float(np.copysign(total, displacement)), float(off)
+        moved, error = displacement, 0.0 if order != "fails" else np.inf
+    assert force is not None
+    if order == "fails":
+        doubt, radius_errors = np.inf if displacement is not None else 0.0, radii + np.inf
+    status = words(levels, curve, order)
+    certificate = ShearCertificate(
+        scope=contact.certificate.scope if levels.proved and order != "fails" else "none",
+        order=order,
+        status=frozen(np.where(status == "stuck", "partial", status)),
+        force_errors=found.force_errors[0],
+        slip_errors=frozen(slip_errors),
+        stick_radius_errors=frozen(radius_errors),
+        force_error=doubt,
+        displacement_error=error,
+    )
+    return ShearState(
+        contact=contact,
+        force=force,
+        displacement=moved,
+        forces=found.forces[0],
+        displacements=frozen(np.where(loaded, found.asperity_displacements[0], 0.0)),
+        slips=frozen(np.where(loaded, found.drifts[0], 0.0)),
+        stick_radii=radii,
+        certificate=certificate,
+    )
+
+
+def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
+    """T at which general steps give X."""
+    from scipy.optimize import brentq  # 0.1 s to import: only when asked
+
+    start = MemoryCurve.pressed(levels.load)
+
+    def beyond(part: float) -> float:
+        height = Fraction(part) * levels.load
+        moved = followed(levels, start, [(levels.load, height)]).states.displacements[0]
+        return float(moved - displacement)
+
+    root = brentq(beyond, -1.0, 1.0, xtol=1e-12)
+    return Fraction(root) * levels.load
+
+
+def _stepped(
+    contact: Contact,
+    levels: FrictionLevels,
+    found: Followed,
+    height: Fraction,
+    force: float | None,
+) -> ShearState:
+    """What general steps find where order fails; nothing is proved of it."""
+    states, loaded = found.states, contact.loads > 0
+    unknown = frozen(np.full(len(loaded), np.inf))
+    relative = contact.scene.relative_radii
+    certificate = ShearCertificate(
+        scope="none",
+        order="fails",
+        status=found.status[0],
+        force_errors=unknown,
+        slip_errors=unknown,
+        stick_radius_errors=unknown,
+        force_error=np.inf if force is None else 0.0,
+        displacement_error=np.inf,
+    )
+    if force is None:
+        force = float(height) * checks.friction(contact.scene.friction)
+    return ShearState(
+        contact=contact,
+        force=force,
+        displacement=float(states.displacements[0]),
+        forces=states.forces[0],
+        displacements=frozen(np.where(loaded, states.asperity_displacements[0], 0.0)),
+        slips=frozen(np.where(loaded, states.drifts[0], 0.0)),
+        stick_radii=frozen(np.where(loaded, np.sqrt(relative * found.fronts[0]), 0.0)),
+        certificate=certificate,
+    )
+
+
+def _nothing_loaded(contact: Contact, displacement: float) -> ShearState:
+    if displacement:
+        raise InputError("displacement", found=displacement, expected="0, as nothing is loaded")
+    zero = frozen(np.zeros(len(contact.scene)))
+    normal = contact.certificate
+    certificate = ShearCertificate(
+        normal.scope, "proved", normal.status, zero, zero, zero, 0.0, 0.0
+    )
+    return ShearState(contact, 0.0, 0.0, zero, zero, zero, zero, certificate)
+
+
+def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> ShearCertificate:
+    """Judge shear forces of first loading that came from anywhere.
+
+    forces : (n,) [force] along the shear force, in the order of the scene's asperities
+    force  : [force] the shear force Q that they carry
+
+    Forces are held against the solution: `force_errors` are bounds on their distance to it. A word
+    is that of the solution where the force is near enough to imply it: nearer to f P, or to what
+    the solution leaves of it, than a hundredth of f P, or than all that is left. All else in the
+    certificate is of the solution.
+
+    Raises InputError if the scene has no friction, |Q| exceeds f P, or forces are not numbers.
+
+    >>> force = 0.25 * contact.load
+    >>> state = cr.shear(contact, force=force)
+    >>> cr.certify_shear(contact, state.forces, force=force).holds
+    True
+    """
+    given = checks.array("forces", forces, length=len(contact.scene))
+    return against(shear(contact, force=checks.finite("force", force)), given)
+
+
+def against(state: ShearState, given: Array) -> ShearCertificate:
+    """The certificate of forces near a state."""
+    contact = state.contact
+    apart = np.abs(given - state.forces)
+    errors = (apart + state.certificate.force_errors) * (1 + SAFETY)
+    limits = checks.friction(contact.scene.friction) * contact.loads
+    left = np.where(state.status == "sliding", NEAR_SLIDING * limits, limits - np.abs(state.forces))
+    implied = (errors < left) | (state.status == "open")
+    return replace(
+        state.certificate,
+        status=frozen(np.where(implied, state.status, "undecided")),
+        force_errors=frozen(errors),
+    )

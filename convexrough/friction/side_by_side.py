@@ -1,0 +1,168 @@
+"""A load path found in three ways: do they agree, and what does it cost?
+
+The memory curve is plane geometry. The general step knows no order and solves equations by Newton's
+method; the conic step minimises the same energy as a cone program. Both take one step for each
+segment, which is exact where indentations are ordered: docs/theory/without-order.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough.arrays import Array
+from convexrough.contact import Contact
+from convexrough.drawn import Drawn
+from convexrough.errors import SolverError
+from convexrough.frames import Variables
+from convexrough.friction.conic_step import ConicStepper
+from convexrough.friction.order import Order
+from convexrough.friction.path import LoadPath, walk
+from convexrough.influence import Kind
+from convexrough.progress import Announce
+from convexrough.record import LINE, Record, Table
+from convexrough.scene.scene import Scene
+
+Way = Literal["general step", "memory curve", "conic step"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PathEntry(Record):
+    """What one way made of a path of m points.
+
+    outcome : "answered"; "refused": the scene is not one for this way; or "failed"
+    message : why, where it did not answer; else ""
+    path    : its answer; None without one
+    force_disagreement : of all Q_i with the first that answered, over f times the largest P_i
+    displacement_disagreement : of X, over the largest |X|
+    seconds : [s] with the normal solutions
+
+    >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
+    >>> found.entries[0].way, found.entries[0].outcome
+    ('general step', 'answered')
+    """
+
+    way: Way
+    outcome: Literal["answered", "refused", "failed"]
+    message: str = ""
+    path: LoadPath | None = None
+    force_disagreement: float = np.nan
+    displacement_disagreement: float = np.nan
+    seconds: float = np.nan
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PathComparison(Table, Drawn):
+    """All entries, the general step first.
+
+    order : of the indentations at the levels used, on which the memory curve rests
+
+    >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
+    >>> max(each.displacement_disagreement for each in found.entries) < 1e-4
+    True
+    """
+
+    scene: Scene
+    loads: Array
+    forces: Array
+    order: Order
+    entries: tuple[PathEntry, ...]
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "order", self.order
+        for each in self.entries:
+            apart = f"Q_i {each.force_disagreement:.1e}, X {each.displacement_disagreement:.1e} off"
+            answered = f"{apart}; {each.seconds:.2g} s"
+            found = answered if each.outcome == "answered" else f"{each.outcome}: {each.message}"
+            yield each.way, found[:LINE]
+
+    def _variables(self) -> Variables:
+        """A row for each entry."""
+        names = (
+            *("way", "outcome", "message", "seconds"),
+            *("force_disagreement", "displacement_disagreement"),
+        )
+        arrays: Variables = {
+            name: (("entry",), np.array([getattr(each, name) for each in self.entries]))
+            for name in names
+        }
+        nothing = np.full((len(self.loads), len(self.scene)), np.nan)
+        paths = [each.path for each in self.entries]
+        displacements = [nothing[:, 0] if it is None else it.displacements for it in paths]
+        forces = [nothing if it is None else it.asperity_forces for it in paths]
+        arrays["displacements"] = ("entry", "point"), np.array(displacements)
+        arrays["asperity_forces"] = ("entry", "point", "asperity"), np.array(forces)
+        return arrays
+
+
+def compare_paths(
+    scene: Scene,
+    *,
+    loads: ArrayLike,
+    forces: ArrayLike,
+    start: Contact | None = None,
+    influence: Kind | None = None,
+    announce: Announce | None = None,
+) -> PathComparison:
+    """Follow a path by the general step, the memory curve and the conic step.
+
+    loads, forces, start, influence : as in `load_path`
+    announce : told the name of each way before it starts
+
+    Raises InputError as `load_path`, and SolverError where none of them answers.
+
+    >>> P = contact.load
+    >>> found = cr.compare_paths(scene, loads=[P, P / 2], forces=[0.3 * P, 0.0])
+    >>> [each.way for each in found.entries if each.force_disagreement < 1e-4]
+    ['general step', 'memory curve', 'conic step']
+    """
+    given = (scene, loads, forces, start, influence)
+    entries = list[PathEntry]()
+
+    def enter(way: Way, found: Callable[[], LoadPath]) -> None:
+        if announce is not None:
+            announce(way)
+        answered = [each.path for each in entries if each.path is not None]
+        entries.append(_entry(way, found, answered[0] if answered else None))
+
+    enter("general step", lambda: walk(*given, steps=1))
+    enter("memory curve", lambda: walk(*given))
+    enter("conic step", lambda: walk(*given, steps=1, stepper=ConicStepper))
+    path = next((each.path for each in entries if each.path is not None), None)
+    if path is None:
+        raise SolverError(entries[0].message, solver="compare_paths", advice="use load_path")
+    return PathComparison(scene, path.loads, path.forces, path.order, tuple(entries))
+
+
+def _entry(way: Way, found: Callable[[], LoadPath], reference: LoadPath | None) -> PathEntry:
+    refused = PathEntry("memory curve", "refused", "an indentation falls as the load rises")
+    if way == refused.way and reference is not None and reference.order == "fails":
+        return refused
+    began = perf_counter()
+    try:
+        path = found()
+    except SolverError as error:
+        return PathEntry(way, "failed", str(error))
+    seconds = perf_counter() - began
+    if way == refused.way and path.order == "fails":
+        return refused
+    if reference is None:
+        reference = path
+    apart = path.asperity_forces - reference.asperity_forces
+    largest = (path.scene.friction or 1.0) * float(path.asperity_loads.max()) or 1.0
+    farthest = float(np.abs(reference.displacements).max()) or 1.0
+    return PathEntry(
+        way=way,
+        outcome="answered",
+        path=path,
+        force_disagreement=float(np.abs(apart).max()) / largest,
+        displacement_disagreement=float(
+            np.abs(path.displacements - reference.displacements).max() / farthest
+        ),
+        seconds=seconds,
+    )

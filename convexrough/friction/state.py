@@ -1,0 +1,148 @@
+"""Friction states: sums of normal solutions, by the bends of the memory curve.
+
+With bends c_k of the curve at the levels s_k (`MemoryCurve.bends`),
+
+    Q_i = f sum c_k P_i(s_k),   X = c_t f sum c_k D0(s_k),   own + drift = c_t f sum c_k n_i(s_k),
+
+n_i the indentation, or minus the gap (docs/theory/states.md). First loading to Q at the load P has
+two bends: Q_i = f (P_i(P) - P_i(L)), X = c_t f (D0(P) - D0(L)), slip_i = c_t f g_i(L), L = P - Q/f.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.friction.curve import MemoryCurve
+from convexrough.friction.levels import FrictionLevels, rounded
+from convexrough.friction.order import Order
+from convexrough.normal.level import Level
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair
+
+
+class States(NamedTuple):
+    """m states of N asperities in the scene's units, and proved bounds on their errors.
+
+    displacements (m,), forces (m, N) : X and Q_i;  drifts (m, N) : of each asperity against its
+    partner;  asperity_displacements (m, N) : own deflection and drift
+    """
+
+    displacements: Array
+    displacement_errors: Array
+    forces: Array
+    force_errors: Array
+    asperity_displacements: Array
+    asperity_displacement_errors: Array
+    drifts: Array
+    drift_errors: Array
+
+    def unproved(self) -> States:
+        """The same, with nothing known of the errors."""
+        names = [name for name in self._fields if name.endswith("errors")]
+        return self._replace(
+            **{name: frozen(np.full(getattr(self, name).shape, np.inf)) for name in names}
+        )
+
+
+def used_by(curves: Sequence[MemoryCurve]) -> set[Fraction]:
+    """The loads of the levels that states and their words need."""
+    bent = {load for curve in curves for load, bend in curve.bends if bend}
+    return bent | {curve.front for curve in curves if curve.front is not None}
+
+
+class Sums(NamedTuple):
+    """Sums over levels, each times its bends, of m curves: some of `places` for each of them.
+
+    used : (k,) loads of the levels;  places : (m, j) which of them;  weights : (m, j) bends
+    """
+
+    used: list[Fraction]
+    places: Indices
+    weights: Ball
+
+    @classmethod
+    def of(cls, curves: Sequence[MemoryCurve]) -> Sums:
+        """Those that states of these curves are made of."""
+        bends = [[(load, bend) for load, bend in curve.bends if bend] for curve in curves]
+        used = sorted({load for each in bends for load, _ in each} or {curves[0].load})
+        place = {load: k for k, load in enumerate(used)}
+        most = max((len(each) for each in bends), default=0)
+        places = np.zeros((len(bends), most), dtype=np.intp)
+        high, low = np.zeros(places.shape), np.zeros(places.shape)
+        for row, each in enumerate(bends):
+            for column, (load, bend) in enumerate(each):
+                places[row, column] = place[load]
+                high[row, column], low[row, column] = Pair.nearest(bend)
+        return cls(used, places, Ball.around(Pair(high, low), 2.0**-98 * np.abs(high)))
+
+    def total(self, values: Ball) -> Ball:
+        """(m, ...) from (k, ...)."""
+        wide = (slice(None),) + (None,) * (len(values.shape) - 1)
+        total = Ball.exact(np.zeros((len(self.places), *values.shape[1:])))
+        for j in range(self.places.shape[1]):
+            total = total + self.weights[:, j][wide] * values[self.places[:, j]]
+        return total
+
+
+def displacements_of(levels: FrictionLevels, curves: Sequence[MemoryCurve]) -> Ball:
+    """(m,) X of these curves [length]."""
+    sums = Sums.of(curves)
+    approaches = Ball.stacked([levels.at(load).approach for load in sums.used])
+    return sums.total(approaches) * levels.travel_unit
+
+
+def states_of(
+    levels: FrictionLevels, curves: Sequence[MemoryCurve], which: Indices | None = None
+) -> States:
+    """The states of these curves; of some asperities alone, in this order, or of all."""
+    sums, some = Sums.of(curves), slice(None) if which is None else which
+    solved = [levels.at(load) for load in sums.used]
+    loads = Ball.stacked([levels.loads(level)[some] for level in solved])
+    moved = Ball.stacked([levels.indentations(level)[some] for level in solved])
+    travel = levels.travel_unit
+    fields = (
+        displacements_of(levels, curves),
+        sums.total(loads) * levels.force_unit,
+        sums.total(moved) * travel,
+        -sums.total((-moved).positive_part()) * travel,
+    )
+    return States(*(part for ball in fields for part in rounded(ball)))
+
+
+def words(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:
+    """(N,) "open", "sliding", "partial", "stuck" or "undecided", from the proofs at P and at L."""
+    here = levels.at(curve.load)
+    if order == "fails":
+        return worded(levels, here)
+    if curve.front is None:
+        return worded(levels, here, stuck=here.touching)
+    front = levels.at(curve.front)
+    sliding = here.touching & front.open
+    return worded(levels, here, partial=here.touching & front.touching, sliding=sliding)
+
+
+def worded(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
+    """(N,) "open" where open here, and each word where that is proved; else "undecided"."""
+    found = np.full(len(levels.scene), "open", dtype="<U12")
+    some = np.full(len(levels.candidates), "undecided", dtype="<U12")
+    some[here.open] = "open"
+    for word, which in proved.items():
+        some[which] = word
+    found[levels.candidates] = some
+    return frozen(found)
+
+
+def stick_radii(levels: FrictionLevels, level: Level) -> tuple[Array, Array]:
+    """(N,) contact radii at a level, 3 P^(1/3) / (4 k E*) [length], and bounds on their errors."""
+    modulus = Ball.exact(levels.scene.material.contact_modulus)
+    root = 2.0 ** round(np.log2(levels.units.force) / 3)  # the force unit is a power of eight
+    radii = level.loads.cbrt() / level.problem.exact.coefficients / modulus
+    radii = radii * (0.75 * root * levels.units.local)
+    values, errors = (levels.to_scene(np.array(part)) for part in (radii.value, radii.error))
+    return frozen(values), frozen(errors)

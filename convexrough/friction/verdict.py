@@ -1,0 +1,106 @@
+"""`verify` for shear forces: what somebody claims of sliding, held against what is proved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.contact import Contact
+from convexrough.friction.shear import ShearCertificate, ShearState, against, shear
+from convexrough.normal.claims import Claim
+from convexrough.record import Record
+
+#: A shear force is claimed to slide if it falls short of f P by no more than this part of it.
+CLAIMS_SLIDING = 1e-4
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShearVerdict(Claim, Record):
+    """What is proved of shear forces of first loading. Arrays are those of the scene's asperities.
+
+    contact : pressed;  forces : (n,) [force] as given
+    total_prescribed : [force] the shear force Q that they carry
+    claimed : (n,) who is claimed to slide
+    within  : forces must be proved this near, in parts of the largest; None: near enough for every
+        word to follow from the forces alone
+    certificate : of the forces as given
+    solution : the friction state, with its own certificate
+    """
+
+    contact: Contact
+    forces: Array
+    total_prescribed: float | None
+    claimed: NDArray[np.bool_]
+    within: float | None
+    certificate: ShearCertificate
+    solution: ShearState
+
+    @property
+    def values(self) -> Array:
+        """(n,) [force] the shear forces."""
+        return self.forces
+
+    @cached_property
+    def wrongly_sliding(self) -> Indices:
+        """(m,) claimed to slide, and proved to stick in part or to be open."""
+        return frozen(np.flatnonzero(self.claimed & np.isin(self.status, ("partial", "open"))))
+
+    @cached_property
+    def wrongly_sticking(self) -> Indices:
+        """(m,) not claimed to slide, and proved to."""
+        return frozen(np.flatnonzero(~self.claimed & (self.status == "sliding")))
+
+    @property
+    def wrong(self) -> dict[str, Indices]:
+        """The claims of sliding and sticking where they are wrong."""
+        return {
+            "claimed to slide, proved not to": self.wrongly_sliding,
+            "claimed to stick, proved to slide": self.wrongly_sticking,
+        }
+
+    @property
+    def errors_alone(self) -> Array:
+        """(n,) [force] the certificate's."""
+        return self.certificate.force_errors
+
+    def nearby(self) -> tuple[Array, Array]:
+        """The solution's forces and bounds."""
+        return self.solution.forces, self.solution.certificate.force_errors
+
+
+def verify_shear(
+    contact: Contact,
+    forces: ArrayLike,
+    *,
+    force: float,
+    within: float | None = None,
+    sliding: ArrayLike | None = None,
+) -> ShearVerdict:
+    """Hold shear forces of first loading that came from anywhere against the friction law.
+
+    forces  : (n,) [force] along the shear force, in the order of the scene's asperities
+    force   : [force] the shear force Q that they carry
+    within  : forces must be proved this near, in parts of the largest force
+    sliding : (n,) who is claimed to slide; default: those whose force is f P, or short of it by no
+        more than 1e-4 of that
+
+    Raises InputError as `certify_shear`.
+    """
+    within = None if within is None else checks.positive("within", within)
+    given = checks.array("forces", forces, length=len(contact.scene))
+    state = shear(contact, force=checks.finite("force", force))
+    if sliding is None:
+        sliding = claims_sliding(contact, given)
+    claimed = frozen(np.array(np.broadcast_to(sliding, given.shape), dtype=bool))
+    return ShearVerdict(contact, given, float(force), claimed, within, against(state, given), state)
+
+
+def claims_sliding(contact: Contact, forces: Array) -> NDArray[np.bool_]:
+    """(n,) whose force is f P, or short of it by no more than 1e-4 of that."""
+    limits = checks.friction(contact.scene.friction) * contact.loads
+    return np.asarray((limits > 0) & (np.abs(forces) >= (1.0 - CLAIMS_SLIDING) * limits))

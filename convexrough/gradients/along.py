@@ -1,0 +1,217 @@
+"""Gradients along load paths: sums of V and D0 at the levels that the memory curve names.
+
+Levels and weights are rational functions of the loads P_k and of T_k = Q_k / f, and other ones on
+each side of a tie: where an inner loop just closes, or a front just meets the bend of a layer. So
+a derivative by a force or load is taken from the path itself with that number moved by 2^-6000 of
+the largest load, up and down, in exact arithmetic: nothing that float64 numbers can make is as
+small, so every tie is broken as an infinitely small change would. To first order in the shift,
+
+    V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l),
+
+l the level of the path itself that L belongs to (docs/theory/gradients.md, "Along a path").
+"""
+
+from __future__ import annotations
+
+from bisect import bisect, insort
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.errors import InputError
+from convexrough.friction.curve import MemoryCurve, Piece
+from convexrough.friction.levels import FrictionLevels
+from convexrough.gradients.pulled import ZERO, Moves, Part
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair
+
+#: A shift of loads and forces, over the largest load; levels nearer than the second are one.
+SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
+
+#: Weights on V, D0 and S at a level.
+Weights: TypeAlias = tuple[Fraction, ...]
+NOTHING: Weights = (Fraction(0),) * 3
+
+#: A change of P and of T at all points.
+Direction: TypeAlias = tuple[Sequence[Fraction], Sequence[Fraction]]
+
+#: A derivative that there is none of, or that is infinite.
+NONE = Ball(Pair.exact(np.nan), np.asarray(np.inf))
+
+
+class Sums(NamedTuple):
+    """Losses over c_t f^2, and displacements over c_t f, as weights on V and D0 by levels."""
+
+    losses: dict[Fraction, Weights]
+    displacements: dict[Fraction, Weights]
+
+    def lose(self, piece: Piece, share: Fraction) -> None:
+        """What a piece costs, (1 - c th) I, times a share.
+
+        I = (P0 - L0) D0(L0) - (P1 - L1) D0(L1) + (2 - b) (V(L0) - V(L1)) - (L0 - L1) M, with
+        b = (P0 - P1) / (L0 - L1) and M the mean of D0 from P1 to P0.
+        """
+        share *= 1 - piece.sign * piece.slope
+        high, low, before, after = piece[2:]
+        run, fall = high - low, before - after
+        add = self._adder(self.losses, share)
+        add(high, 2 - fall / run, before - high)
+        add(low, fall / run - 2, low - after)
+        if fall == 0:
+            add(before, Fraction(0), -run)
+        else:
+            add(before, -run / fall, Fraction(0))
+            add(after, run / fall, Fraction(0))
+
+    def move(self, curve: MemoryCurve, share: Fraction) -> None:
+        """The displacement of a state, times a share."""
+        add = self._adder(self.displacements, share)
+        for level, bend in curve.bends:
+            add(level, Fraction(0), bend)
+
+    @staticmethod
+    def _adder(
+        found: dict[Fraction, Weights], share: Fraction
+    ) -> Callable[[Fraction, Fraction, Fraction], None]:
+        def add(level: Fraction, energy: Fraction, approach: Fraction) -> None:
+            V, D, S = found.get(level, NOTHING)
+            found[level] = (V + share * energy, D + share * approach, S)
+
+        return add
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A path through numbered points, and what is asked of it.
+
+    start : load [force] at which the path begins, without shear
+    steps : of each straight segment the point that it goes to, the weight on its loss, and that
+        on the displacement at its end
+    """
+
+    start: Fraction
+    steps: Sequence[tuple[int, Fraction, Fraction]]
+
+    def sums(self, loads: Sequence[Fraction], heights: Sequence[Fraction]) -> Sums:
+        """At these P and T."""
+        curve, found = MemoryCurve.pressed(self.start), Sums({}, {})
+        for point, lost, moved in self.steps:
+            curve, pieces = curve.go(loads[point], heights[point])
+            if lost:
+                for piece in pieces:
+                    found.lose(piece, lost)
+            if moved:
+                found.move(curve, moved)
+        return found
+
+
+@dataclass(frozen=True)
+class Along:
+    """A walk through the levels of a contact, at P and T."""
+
+    known: FrictionLevels
+    walk: Walk
+    loads: Sequence[Fraction]
+    heights: Sequence[Fraction]
+
+    @cached_property
+    def sums(self) -> Sums:
+        return self.walk.sums(self.loads, self.heights)
+
+    def parts(self, moves: Moves) -> tuple[list[Part], Ball, Ball]:
+        """What each level adds; the losses; the displacements.
+
+        moves : of every level, at fixed T
+        """
+        spent, far, weights = ZERO, ZERO, dict[Fraction, tuple[Ball, Ball]]()
+        lost, force = self.known.loss_unit, self.known.units.force
+        for level, (V, D, _) in self.sums.losses.items():
+            each = lost * Ball.exact(V), lost / force * Ball.exact(D)
+            weights[level] = each
+            spent = spent + Part(self.known.at(level), *each).value
+        for level, (_, D, _) in self.sums.displacements.items():
+            energy, before = weights.get(level, (ZERO, ZERO))
+            rise = self.known.travel_unit * Ball.exact(D)
+            weights[level] = energy, before + rise
+            far = far + rise * self.known.at(level).approach
+        parts = [Part(self.known.at(level), *each, moves=moves) for level, each in weights.items()]
+        return parts, spent, far
+
+    def _one_side(
+        self, loads: Sequence[Fraction], heights: Sequence[Fraction], sign: int, times: Ball
+    ) -> Ball:
+        unit, force = max(self.loads), self.known.units.force
+        longest = max(map(abs, (*loads, *heights)))
+        by = sign * SHIFT * unit / longest if longest else SHIFT
+        try:
+            moved = self.walk.sums(
+                [load + by * each for load, each in zip(self.loads, loads, strict=True)],
+                [height + by * each for height, each in zip(self.heights, heights, strict=True)],
+            )
+        except InputError:  # beyond gross sliding, or less than no load
+            return NONE
+        total = ZERO
+        for base, there, factor in (
+            (self.sums.losses, moved.losses, self.known.loss_unit),
+            (self.sums.displacements, moved.displacements, self.known.travel_unit * force),
+        ):
+            for level, (V, D, S) in _slopes(base, there, unit, by).items():
+                if level == 0 and S:
+                    return NONE
+                here = self.known.at(level)
+                each = Ball.exact(V) * here.energy + Ball.exact(D) / force * here.approach
+                if S:
+                    each = each + Ball.exact(S) / (force * force) * here.tangent.approach
+                total = total + factor * each
+        return total * times
+
+    def slopes(self, directions: Sequence[Direction], factor: Ball) -> tuple[Ball, Array]:
+        """(m,) derivatives along directions of P and T, and (m, 2) from below and from above.
+
+        Each times a factor. Sides that their bounds do not tell apart are one number, within the
+        bounds of both; where they differ, or one does not exist, there is none: nan.
+        """
+        sides = [[self._one_side(*each, sign, factor) for sign in (-1, 1)] for each in directions]
+        found = [_one(below, above) for below, above in sides]
+        return Ball.stacked(found), np.array([[float(s.value) for s in both] for both in sides])
+
+
+def _one(below: Ball, above: Ball) -> Ball:
+    apart = below - above
+    if np.isnan(below.value + above.value) or apart.positive or apart.negative:
+        return NONE
+    return Ball.around((below + above).mid, apart.size) * 0.5 if apart.size else below
+
+
+def _slopes(
+    base: dict[Fraction, Weights], moved: dict[Fraction, Weights], unit: Fraction, by: Fraction
+) -> dict[Fraction, Weights]:
+    """(moved - base) / by, as weights on V, D0 and S at levels of the path itself.
+
+    unit : the largest load, by which weights on D0 and S are measured
+    """
+    places, found = sorted(base), dict[Fraction, Weights]()
+    for sign, weights in ((-1, base), (1, moved)):
+        for level, (V, D, _) in weights.items():
+            near = bisect(places, level)
+            around = [*places[max(near - 1, 0) : near + 1], level]
+            at = next(each for each in around if abs(each - level) <= NEAR * unit)
+            if at is level:  # where the path itself has none
+                insort(places, at)
+            off = level - at
+            before = found.get(at, NOTHING)
+            more = (V, D + V * off, D * off + V * off * off / 2)
+            found[at] = tuple(b + sign * m for b, m in zip(before, more, strict=True))
+    slopes = {level: tuple(w / by for w in weights) for level, weights in found.items()}
+    sizes = [abs(w) / unit**k for weights in slopes.values() for k, w in enumerate(weights)]
+    least = NEAR * max(sizes, default=Fraction(0))
+    kept = {
+        level: tuple(w if abs(w) > least * unit**k else Fraction(0) for k, w in enumerate(weights))
+        for level, weights in slopes.items()
+    }
+    return {level: weights for level, weights in kept.items() if any(weights)}

@@ -1,0 +1,151 @@
+"""Derivatives of a number at one load level, and of sums over levels, as balls in own units.
+
+A level is the normal solution at a total load L (`normal.level`): loads P, approach D0,
+indentations n (minus the gap where open), and the energy V. With C = k P^(2/3), q = dP/dL and
+S = dD0/dL,
+
+    dV  = -P'dd + (3/5) (P C)'d log k + P'dA P / 2 + D0 dL,
+    dD0 = -q'dd + (q C)'d log k + q'dA P + S dL.
+
+Weights w on loads and v on indentations take one linear solve with that right side:
+lambda / c + A lambda = w - A v + mu, sum lambda = 0 gives
+
+    w'dP + v'dn = (lambda + v)'dd - (lambda C)'d log k - (lambda + v)'dA P
+                  + (sum v) dD0 + (w - A v)'q dL.
+
+Derived in docs/theory/gradients.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from convexrough.errors import InputError
+from convexrough.normal.level import Level
+from convexrough.numbers.balls import Ball, where
+
+ZERO = Ball.exact(0.0)
+
+#: Derivatives of a level's total load (own units) by parameters of the result, by their names.
+Moves: TypeAlias = Mapping[str, Ball]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a number takes from one level: weights, in its own units over the level's.
+
+    level    : where
+    energy, approach : () weights on V and on D0;  loads, indentations : (n,) on P and n
+    moves    : how the level's total load follows the parameters of the result
+    """
+
+    level: Level
+    energy: Ball = ZERO
+    approach: Ball = ZERO
+    loads: Ball | None = None
+    indentations: Ball | None = None
+    moves: Moves = field(default_factory=dict)
+
+    @property
+    def value(self) -> Ball:
+        """What it adds to the number."""
+        level = self.level
+        total = self.energy * level.energy + self.approach * level.approach
+        if self.loads is not None:
+            total = total + self.loads.dot(level.loads)
+        if self.indentations is not None:
+            total = total + self.indentations.dot(level.indentation)
+        return total
+
+    @property
+    def length(self) -> Ball:
+        """That of the value which is in proportion to lengths: it does not scale with forces."""
+        far = self.approach * self.level.approach
+        if self.indentations is not None:
+            far = far + self.indentations.dot(self.level.indentation)
+        return far
+
+
+class Pulled(NamedTuple):
+    """offsets'dd + local'd log k + left'dA P + load dL, of one part. Arrays are (n,).
+
+    loads, felt : P and A P;  total : L
+    steep       : weight on D0 at no load, where it changes infinitely fast with L
+    """
+
+    offsets: Ball
+    local: Ball
+    left: Ball
+    load: Ball
+    loads: Ball
+    felt: Ball
+    total: Ball
+    steep: Ball = ZERO
+
+    @classmethod
+    def of(cls, part: Part) -> Pulled:
+        """All derivatives that one level has a part in."""
+        level, v, w = part.level, part.indentations, part.loads
+        rise = part.approach if v is None else part.approach + v.sum()
+        P, zero = level.loads, Ball.exact(np.zeros(len(level.problem)))
+        felt = level.approach + level.problem.exact.offsets - level.indentation
+        own = part.energy * P
+        by_load = part.energy * level.approach
+        if level.trial is None:
+            moved, jump = _first_touch(level, rise, w)
+            lifted = moved if v is None else moved + v
+            return cls(lifted, zero, zero, by_load + jump, zero, zero, level.load, rise)
+        moved = zero  # lambda - rise q
+        if w is not None or v is not None:
+            right = zero if w is None else w
+            if v is not None:
+                right = right - product(level, v)
+            moved = level.response(right, ZERO).loads
+            by_load = by_load + right.dot(level.tangent.loads)
+        if rise.size > 0.0:
+            moved = moved - rise * level.tangent.loads
+            by_load = by_load + rise * level.tangent.approach
+        lifted = moved if v is None else moved + v
+        local = (own * 3.0 / 5.0 - moved) * level.indentation.positive_part()
+        return cls(lifted - own, local, own * 0.5 - lifted, by_load, P, felt, level.load)
+
+    def times(self, factor: Ball) -> Pulled:
+        """Of the number times another."""
+        return self._replace(
+            offsets=factor * self.offsets,
+            local=factor * self.local,
+            left=factor * self.left,
+            load=factor * self.load,
+            steep=factor * self.steep,
+        )
+
+
+def _first_touch(level: Level, rise: Ball, w: Ball | None) -> tuple[Ball, Ball]:
+    """At no load D0 = -d of the highest asperity, which is the first to carry any."""
+    offsets = level.problem.exact.offsets
+    first = offsets.upper >= offsets.lower.max()
+    if np.count_nonzero(first) > 1:
+        expected = "a force below f P: there several asperities slide last, together, and which "
+        expected += "of them does depends on the direction of a change"
+        raise InputError("force", found="gross sliding", expected=expected)
+    zero = Ball.exact(np.zeros(len(offsets)))
+    moved = where(first, zero - rise, zero)
+    return moved, ZERO if w is None else w[int(np.argmax(first))]
+
+
+def product(level: Level, weights: Ball) -> Ball:
+    """A times balls: of their midpoints, and at most the largest entry times their radii."""
+    problem = level.problem
+    felt = problem.product(weights.mid)
+    if weights.radius.any():
+        felt = Ball.around(felt.mid, felt.radius + weights.radius.sum() * problem.largest_entry)
+    return felt
+
+
+def value_of(parts: Iterable[Part]) -> Ball:
+    """The number that these parts add up to."""
+    return sum((part.value for part in parts), start=ZERO)

@@ -1,0 +1,217 @@
+"""From derivatives in own units to those by what a scene is made of, as balls.
+
+With dJ = alpha'dd + kappa'd log k + sum over parts of left'dA P, d = z - (x^2 bx + y^2 by) / 2
+with curvatures b = 1/R along each axis, or 1/(R + rho) in the geometry "closest", whose contact
+points are c = r / (1 + rho/R); k^3 = (9/16) (1/R + 1/rho) / E*^2, 1/R the mean of both axes, and
+A_ij = 1 / (pi E* |c_i - c_j|)
+(docs/theory/gradients.md, "To the scene").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from convexrough.arrays import Array, Indices
+from convexrough.gradients.pulled import ZERO, Pulled
+from convexrough.normal.problem import NormalProblem
+from convexrough.numbers.balls import Ball, where
+from convexrough.numbers.pairs import Pair
+from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.scene.base import along, named
+from convexrough.scene.scene import Scene
+
+#: Up to so many asperities that carry load, sums over pairs are made pair by pair on balls.
+PAIRWISE = 1000
+
+#: Pairs on balls that are worked on together.
+BLOCK = 2**16
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The numbers of a problem's candidates in the scene's units, as balls.
+
+    points : (n, 2) r, of the summits;  contact_points : (n, 2) c
+    tips   : (n,) rho;  curvature : (2,) 1/R along x and y;  bend : (n, 2) b
+    share  : (n, 2) c over r;  relative : (n,) 1 / (1/R + 1/rho)
+    """
+
+    problem: NormalProblem
+    points: Ball
+    tips: Ball
+    curvature: Ball
+
+    @classmethod
+    def of(cls, problem: NormalProblem) -> Geometry:
+        scene, which = problem.scene, problem.candidates
+        asperities = scene.asperities
+        return cls(
+            problem,
+            Ball.exact(asperities.positions[which]),
+            Ball.exact(asperities.tip_radii[which]),
+            curvatures(scene),
+        )
+
+    @property
+    def closest(self) -> bool:
+        return self.problem.scene.geometry == "closest"
+
+    @cached_property
+    def share(self) -> Ball:
+        if not self.closest:
+            return 1.0 + 0.0 * self.points
+        return 1.0 / (1.0 + self.tips[:, None] * self.curvature)
+
+    @cached_property
+    def bend(self) -> Ball:
+        return self.share * self.curvature
+
+    @cached_property
+    def contact_points(self) -> Ball:
+        return self.points * self.share if self.closest else self.points
+
+    @cached_property
+    def relative(self) -> Ball:
+        return 1.0 / (self.curvature.sum() * 0.5 + 1.0 / self.tips)
+
+    def slopes(self, loads: Ball, which: Indices) -> Ball:
+        """(m, 2) [1 / length] -scale sum_j (c_i - c_j) P_j / r_ij^3 among some, loads (m,) P.
+
+        Of many asperities in float64: a stored matrix' sums of m terms are off by some m roundoffs
+        of the sum of magnitudes, and what transforms lose is not known.
+        """
+        if len(which) <= PAIRWISE:
+            return self._pair_by_pair(loads, which)
+        influence = self.problem.influence.among(which)
+        found = influence.slopes(loads.value)
+        if influence.name != "dense":
+            return Ball.around(found, np.inf)
+        off = (len(which) + 16) * ROUNDOFF + 4.0 * influence.entry_error
+        size = influence.falloff(np.abs(loads.value) * off + loads.error, 2) * influence.scale
+        return Ball.around(found, (size * (1 + SAFETY))[:, None])
+
+    def _pair_by_pair(self, loads: Ball, which: Indices) -> Ball:
+        points, scale = self.contact_points[which], self.problem.exact.scale
+        n, found = len(which), []
+        rows = max(1, BLOCK // max(1, n))
+        for start in range(0, n, rows):
+            some = np.arange(start, min(start + rows, n))
+            itself = (np.arange(len(some)), some)
+            x, y = (points[some, k][:, None] - points[None, :, k] for k in (0, 1))
+            squares = x * x + y * y
+            apart = np.ones(squares.shape, dtype=bool)
+            apart[itself] = False
+            squares = where(apart, squares, 1.0 + 0.0 * squares)
+            weights = where(apart, loads[None, :] / (squares * squares.sqrt()), 0.0 * squares)
+            found += [Ball.stacked([(x * weights).sum(), (y * weights).sum()])]
+        parts = ((f.mid.high, f.mid.low, f.radius) for f in found)
+        high, low, radius = (np.concatenate(each, axis=1).T for each in zip(*parts, strict=True))
+        return -scale * Ball(Pair(high, low), radius)
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Of one number by a scene, as balls in the scene's units, over the candidates of a problem.
+
+    offsets : (n,) by d [1 / length];  local : (n,) by log k;  pulled : what changes by A
+    """
+
+    geometry: Geometry
+    offsets: Ball
+    local: Ball
+    pulled: tuple[Pulled, ...]
+
+    @classmethod
+    def of(cls, problem: NormalProblem, pulled: Sequence[Pulled]) -> Derivatives:
+        zero = Ball.exact(np.zeros(len(problem)))
+        offsets = sum((each.offsets for each in pulled), start=zero) / problem.units.length
+        local = sum((each.local for each in pulled), start=zero)
+        return cls(Geometry.of(problem), offsets, local, tuple(pulled))
+
+    @cached_property
+    def turning(self) -> Ball:
+        """(n, 2) by the contact points c, through the coupling: G."""
+        geometry, n = self.geometry, len(self.offsets)
+        carrying = np.zeros(n, dtype=bool)
+        for each in self.pulled:
+            carrying |= (each.left.size > 0) | (each.loads.size > 0)
+        which = np.flatnonzero(carrying)
+        total = Ball.exact(np.zeros((len(which), 2)))
+        for each in self.pulled:
+            left, loads = each.left[which], each.loads[which]
+            if left.size.any():
+                total = total + left[:, None] * geometry.slopes(loads, which)
+                total = total + loads[:, None] * geometry.slopes(left, which)
+        return spread(total, which, n)
+
+    @cached_property
+    def coupled(self) -> Ball:
+        """sum of left'A P."""
+        return sum((each.left.dot(each.felt) for each in self.pulled), start=ZERO)
+
+    @cached_property
+    def positions(self) -> Ball:
+        """(n, 2)"""
+        geometry = self.geometry
+        sinking = self.offsets[:, None] * geometry.bend * geometry.points
+        return self.turning * geometry.share - sinking
+
+    @cached_property
+    def straightened(self) -> Ball:
+        """(n, 2) by minus the curvatures b of the drops."""
+        points = self.geometry.points
+        return self.offsets[:, None] * points * points * 0.5
+
+    @cached_property
+    def outwards(self) -> Ball:
+        """(n, 2) G r share^2, by minus rho/R of the contact points."""
+        geometry = self.geometry
+        return self.turning * geometry.points * geometry.share * geometry.share
+
+    @property
+    def tip_radii(self) -> Ball:
+        geometry = self.geometry
+        bent = -self.local * geometry.relative / (3.0 * geometry.tips * geometry.tips)
+        if geometry.closest:
+            bends = self.straightened * geometry.bend * geometry.bend
+            bent = bent + (bends - self.outwards * geometry.curvature).sum()
+        return bent
+
+    @property
+    def sphere_radius(self) -> Ball | None:
+        """None of other bases than a sphere."""
+        geometry, scene = self.geometry, self.geometry.problem.scene
+        if named(scene.sphere_radius) != "a sphere":
+            return None
+        squared = geometry.curvature[0] * geometry.curvature[0]
+        bends = self.straightened * geometry.share * geometry.share
+        if geometry.closest:
+            bends = bends + self.outwards * geometry.tips[:, None]
+        return (bends.sum() - self.local * geometry.relative / 3.0).sum() * squared
+
+    @property
+    def contact_modulus(self) -> Ball:
+        modulus = self.geometry.problem.scene.material.contact_modulus
+        return (self.local.sum() * -2.0 / 3.0 - self.coupled) / modulus
+
+
+def curvatures(scene: Scene) -> Ball:
+    """(2,) [1 / length] of the base along x and y, 0 where it is straight."""
+    radii = np.array(along(scene.sphere_radius))
+    bent = np.isfinite(radii)
+    return where(bent, 1.0 / Ball.exact(np.where(bent, radii, 1.0)), Ball.exact(np.zeros(2)))
+
+
+def spread(values: Ball, places: Indices, n: int) -> Ball:
+    """Balls at their places of n along the first axis, among zeros."""
+
+    def full(part: Array) -> Array:
+        found = np.zeros((n, *part.shape[1:]))
+        found[places] = part
+        return found
+
+    return Ball(Pair(full(values.mid.high), full(values.mid.low)), full(values.radius))

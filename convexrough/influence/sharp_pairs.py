@@ -1,0 +1,175 @@
+"""Near pairs to more digits: docs/theory/sharp-mesh.md, "Near pairs"."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from convexrough import threads
+from convexrough.arrays import Array
+from convexrough.influence.pair_sums import Product, within
+from convexrough.influence.sliced_matrix import squared_distances
+from convexrough.influence.softened import Softened, exact_series
+from convexrough.numbers.pairs import CHUNK, Pair, rounded, two_sum
+from convexrough.roundoff import ROUNDOFF
+
+#: Bits after the point of the integers that L is computed with within the reach.
+FIXED = 160
+
+#: Nodes of the table of L, at least, and terms of Taylor's series about each.
+NODES, TERMS = 1024, 8
+
+
+def soft_terms(kernel: Softened, step: Fraction, nodes: int, count: int) -> list[Any]:
+    """Taylor's series of reach L in (r / reach)^2 at r^2 = 0, step, 2 step, ...: its first terms.
+
+    As whole numbers of 2^-FIXED.
+    """
+    one, apart = 1 << FIXED, step / Fraction(kernel.reach) ** 2
+    t = one - np.arange(nodes, dtype=object) * one * apart.numerator // apart.denominator
+    found = [0 * t for _ in range(count)]
+    for term in reversed(exact_series(kernel.order, 1)):
+        for k in range(count - 1, 0, -1):
+            found[k] = (found[k] * t >> FIXED) - found[k - 1]
+        found[0] = (found[0] * t >> FIXED) + int(term * one)
+    return found
+
+
+def soft_values(values: Any, scale: Fraction) -> Pair:
+    """Of whole numbers of 2^-FIXED, times a number."""
+    unit = scale / (1 << FIXED)
+    return Pair(*np.array([Pair.nearest(value * unit) for value in values]).T)
+
+
+@dataclass(frozen=True, eq=False)
+class SoftTable:
+    """L of squared distances from 0 to the reach: Taylor's series from the nearest node.
+
+    step  : [length^2] of nodes, a power of two;  values : (m,) at these
+    terms : (TERMS - 1, m) the others of the series in r^2 / step, in float64
+    error : bound on that of each L
+    """
+
+    step: float
+    values: Pair
+    terms: Array
+    error: float
+
+    @classmethod
+    def of(cls, kernel: Softened) -> SoftTable:
+        step = 2.0 ** math.floor(math.log2(kernel.reach**2 / NODES))
+        nodes = math.ceil(kernel.reach**2 / step) + 1
+        values, *others = soft_terms(kernel, Fraction(step), nodes, TERMS)
+        scales = (step / kernel.reach**2) ** np.arange(1, TERMS)[:, None] / kernel.reach
+        slopes = np.array(others).astype(np.float64) * 2.0**-FIXED * scales
+        # At r = 0 all are largest. Rounding, and what the series leaves out.
+        ends = [
+            abs(float(term[0])) for term in soft_terms(kernel, Fraction(1), 1, kernel.order + 1)
+        ]
+        away = step / (2.0 * kernel.reach**2)
+        sizes = [end * 2.0**-FIXED * away**k / kernel.reach for k, end in enumerate(ends)]
+        error = 16.0 * ROUNDOFF * sum(sizes[1:]) + 1.01 * sum(sizes[TERMS:])
+        return cls(step, soft_values(values, 1 / Fraction(kernel.reach)), slopes, error)
+
+    def at(self, squares: Pair) -> Pair:
+        """L; the low parts are up to a hundredth of it."""
+        node = np.rint(squares.high / self.step).astype(np.intp)
+        away = ((squares.high - node * self.step) + squares.low) / self.step
+        rise = self.terms[-1][node]
+        for terms in self.terms[-2::-1]:
+            rise *= away
+            rise += terms[node]
+        return Pair(self.values.high[node], self.values.low[node] + rise * away)
+
+
+@dataclass(frozen=True, eq=False)
+class SharpPairs:
+    """S, its entries cut in two: first parts are multiples of a unit, so that their sums are exact.
+
+    first, second : (n, n) sparse, pairs i < j
+    unit, loads   : powers of two: of the first parts, and of loads of 1 at most
+    sums          : (n,) of S;  centre : L(0);  error : bound on that of an entry beside 1 / r
+    """
+
+    product: Product
+    first: Any
+    second: Any
+    unit: float
+    loads: float
+    sums: Array
+    centre: Pair
+    error: float
+
+    @classmethod
+    def of(cls, product: Product) -> SharpPairs:
+        from scipy.sparse import csr_array
+
+        upper, order, kernel = product.near.upper, product.order, product.splitting.kernel
+        ones, terms = np.ones(len(order.points)), max(product.near.terms, 1)
+        sums = _sizes(product, ones)
+        # What a sum has in the middle, and 16 times that, is to be exact.
+        bits = (49 - terms.bit_length()) // 2
+        unit = 2.0 ** (math.floor(math.log2(float(np.median(sums)) / terms)) - bits)
+        table = SoftTable.of(kernel)
+        points = Pair.exact(order.points)
+        if order.tails is not None:
+            points = Pair(order.points, order.tails)
+        first, second = np.empty_like(upper.data), np.empty_like(upper.data)
+
+        def cut(rows: slice) -> None:
+            starts = upper.indptr[rows.start : rows.stop + 1]
+            some = slice(int(starts[0]), int(starts[-1]))
+            here = np.repeat(np.arange(rows.start, rows.stop), np.diff(starts))
+            squares = squared_distances(points.at(here), points.at(upper.indices[some]))
+            inverse, soft = squares.inverse_root(), table.at(squares)
+            high, low = two_sum(inverse.high, -soft.high)
+            low += inverse.low - soft.low
+            first[some] = rounded(high + low, np.asarray(unit))
+            second[some] = (high - first[some]) + low
+
+        rows = max(1, CHUNK * len(ones) // max(len(first), 1))
+        parts = threads.chunks(len(ones), rows)
+        threads.each(cut, parts, threads.worthwhile(len(first)))
+        low, high = (
+            csr_array((part, upper.indices, upper.indptr), shape=upper.shape)
+            for part in (second, first)
+        )
+        centre = Pair(*(part[0] for part in table.values))
+        error = table.error + 4.0 * ROUNDOFF * unit
+        return cls(product, high, low, unit, 2.0**-bits, sums, centre, error)
+
+    def __call__(self, ordered: Pair) -> tuple[Pair, Array]:
+        """(n,) sums for loads of 1 at most, and bounds on their errors."""
+        product, kernel = self.product, self.product.splitting.kernel
+        first = rounded(np.asarray(ordered.high), np.asarray(self.loads))
+        second = np.asarray((ordered.high - first) + ordered.low)
+        exact, left = _applied(self.first, np.stack((first, second), axis=1)).T
+        left = left + _applied(self.second, first + second)
+        own = ordered * Pair(-self.centre.high, -self.centre.low)
+        sizes = np.abs(ordered.high)
+        every = _sizes(product, sizes)
+        terms = product.near.terms
+        rest = self.loads * self.sums + self.unit * terms
+        inexact = np.where(every + rest < 2.0**52 * self.unit * self.loads, 0.0, every + rest)
+        around = within(product.order.points, sizes, product.splitting.cut)
+        errors = (terms + 4) * ROUNDOFF * (rest + inexact) + self.error * around
+        errors += 2.0**-88 * (every + kernel.centre * around)
+        return Pair(*two_sum(exact, left)) + own, 1.01 * errors
+
+
+def _applied(upper: Any, loads: Array) -> Array:
+    result: Array = upper @ loads
+    result += upper.T @ loads
+    return result
+
+
+def _sizes(product: Product, strengths: Array) -> Array:
+    """(n,) bounds on the sums of |S| over near pairs: between two points that are one it is -L."""
+    near, kernel = product.near, product.splitting.kernel
+    ordered = near.apply(strengths) + kernel.centre * strengths
+    around = within(product.order.points, strengths, product.splitting.cut)
+    return np.asarray(1.01 * (ordered + 2.0 * kernel.centre * around))

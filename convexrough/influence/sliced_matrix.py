@@ -1,0 +1,224 @@
+"""Sums of P_j / r_ij by a matrix, to some 27 digits, through BLAS.
+
+Entries and loads are cut into slices. First slices are multiples of one unit for each row and block
+of columns, and have so few bits that their products add up without rounding, in any order: all sums
+are below 2^53 units. So it is with products of first and second slices. What is left is some 2^-48
+of the whole, and ordinary sums of it lose 2^-101.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from convexrough import threads
+from convexrough.arrays import Array, Indices
+from convexrough.numbers.balls import TINY, UP, Ball
+from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, rounded, two_square, two_sum
+from convexrough.roundoff import ROUNDOFF
+
+#: Columns that share a unit, and bits of the first and second slice of an entry.
+BLOCK, FIRST, SECOND = 128, 24, 23
+
+#: More bits of a first slice of loads are of no use.
+MOST_BITS = 30
+
+#: Rows of a matrix that is kept: its slices take 0.4 GB.
+KEPT = 4096
+
+#: A matrix of so many rows, or of twice what is wanted, is made wholly: more may be wanted of it.
+SMALL = 128
+
+#: Entries looked at together where a matrix is made: what a cache holds.
+PIECE = 2**15
+
+#: Where the points span 1: nothing is known of a larger 1 / r, as squares may underflow.
+LARGEST = 2.0**300
+
+
+@dataclass(frozen=True, eq=False)
+class SlicedMatrix:
+    """Rows of 1 / r_ij as first + second + rest; 0 where two points are one.
+
+    blocks : of columns, and the bits that a first and a second slice of their loads may have
+    losses : (3 blocks, m) what a product loses by the largest load, what two slices leave of it,
+        and what one slice leaves of it, in each block
+    """
+
+    slices: tuple[Array, Array, Array]
+    blocks: list[tuple[slice, int]]
+    losses: Array
+
+    @classmethod
+    def of(cls, points: Pair, rows: slice, point_error: float = 0.0) -> SlicedMatrix:
+        """For points (n, 2) that span about 1, each off by a distance `point_error` at most."""
+        here, n = points.at(rows), len(points.high)
+        m, starts = len(here.high), range(0, n, BLOCK)
+        slices = (np.empty((m, n)), np.empty((m, n)), np.empty((m, n)))
+        largest, sizes = np.empty((len(starts), m)), np.empty((3, len(starts), m))
+
+        def cut(some: slice) -> None:
+            inverse = inverse_distances(here.at(some), points)
+            for block, start in enumerate(starts):
+                columns = np.s_[:, start : start + BLOCK]
+                high, low = inverse.at(columns)
+                most = largest[block, some] = high.max(axis=1)
+                unit = _unit(most)[:, None]
+                first = rounded(high, unit)
+                rest = high - first
+                second = rounded(rest, unit * 2.0**-SECOND)
+                rest = (rest - second) + low
+                for k, each in enumerate((first, second, rest)):
+                    slices[k][some][columns] = each
+                    sizes[k, block, some] = np.abs(each).sum(axis=1)
+
+        threads.each(cut, threads.chunks(m, max(1, PIECE // n)), threads.worthwhile(m * n))
+        sizes *= UP
+        most = (np.maximum(sizes[0], sizes[1] * 2.0**SECOND) / _unit(largest)).max(axis=1)
+        bits = np.minimum(53 - np.frexp(most)[1], MOST_BITS).tolist()
+        nearest = largest.max(axis=0)
+        moved = 2.0 * point_error * nearest * UP
+        with np.errstate(divide="ignore"):
+            moved = np.where((moved < 1) & (nearest < LARGEST), moved / (1.0 - moved), np.inf)
+        few = 4 * len(bits) + 12  # operations that are not sums of a block
+        ordinary = (min(BLOCK, n) + few) * ROUNDOFF * sizes
+        whole = ((few * ROUNDOFF) ** 2 + PAIR_ROUNDOFF + moved) * sizes.sum(axis=0)
+        losses = np.stack((ordinary[2] + whole, ordinary[0], ordinary[1]), axis=1)
+        blocks = [(slice(s, s + BLOCK), b) for s, b in zip(starts, bits, strict=True)]
+        return cls(slices, blocks, losses.reshape(-1, m) * UP)
+
+    def among(self, which: Indices) -> SlicedMatrix:
+        """For some of the points, in this order: shorter sums lose no more."""
+        first, second, rest = (part.take(which, 0).take(which, 1) for part in self.slices)
+        stops = np.searchsorted(which, [columns.stop for columns, _ in self.blocks]).tolist()
+        columns = (slice(*edges) for edges in pairwise([0, *stops]))
+        blocks = [(some, bits) for some, (_, bits) in zip(columns, self.blocks, strict=True)]
+        return SlicedMatrix((first, second, rest), blocks, self.losses.take(which, 1))
+
+    def __matmul__(self, loads: Pair) -> tuple[Array, Array, Array]:
+        """The products with loads (..., n) of 1 at most, (..., m): high and low, and the error."""
+        sums, rests, left_over = [], [], []
+        for columns, bits in self.blocks:
+            a, b, c = (part[:, columns].T for part in self.slices)
+            x, tail = loads.at(np.s_[..., columns])
+            most = _most(x)
+            unit = np.ldexp(2.0**-bits, np.frexp(most)[1])
+            first = rounded(x, unit)
+            left = x - first
+            second = rounded(left, unit * 2.0 ** -(bits + 1))
+            rest = (left - second) + tail
+            left = left + tail
+            sums += [first @ a, second @ a, first @ b]
+            rests.append(left @ b + rest @ a + x @ c)
+            left_over += [most, _most(rest) + TINY, _most(left) + TINY]
+        high, low = sums[0], sum(rests)
+        for exact in sums[1:]:
+            high, error = two_sum(high, exact)
+            low = low + error
+        return (*two_sum(high, low), np.concatenate(left_over, axis=-1) @ self.losses + TINY)
+
+
+class MatrixSums:
+    """sum_j P_j / r_ij among points (n, 2), each coordinate off by `point_error` at most.
+
+    Slices of up to `KEPT` rows are kept; of more they are made anew each time, in parts.
+    """
+
+    def __init__(self, points: Pair, point_error: float = 0.0) -> None:
+        self.points, self.point_error = points, point_error
+        self.whole: MatrixSums | None = None
+        self.which: Indices | None = None
+
+    def among(self, which: Indices) -> MatrixSums:
+        """Among some of the points."""
+        part = MatrixSums(self.points.at(which), self.point_error)
+        if len(which) and (which[1:] > which[:-1]).all():
+            part.whole, part.which = self, which
+        return part
+
+    def __call__(self, loads: Pair) -> Ball:
+        """(..., n) for loads (..., n)."""
+        if loads.high.size == 0:
+            return Ball.exact(loads)
+        with np.errstate(all="ignore"):
+            unit = np.frexp(_most(loads.high))[1]
+            loads = Pair(*(np.ldexp(part, -unit) for part in loads))
+            found = [matrix @ loads for matrix in self._matrices()]
+            parts = (
+                found[0]
+                if len(found) == 1
+                else (np.concatenate(x, -1) for x in zip(*found, strict=True))
+            )
+            high, low, radius = (np.ldexp(part, unit - self._scale) for part in parts)
+            return Ball.around(Pair(high, low), radius * UP + TINY)
+
+    def _matrices(self) -> Iterable[SlicedMatrix]:
+        n = len(self.points.high)
+        if n <= KEPT:
+            return (self._kept,)
+        rows = threads.chunks(n, KEPT**2 // n)
+        return (SlicedMatrix.of(*self._scaled(some)) for some in rows)
+
+    @cached_property
+    def _kept(self) -> SlicedMatrix:
+        if self._of_whole:
+            assert self.whole is not None
+            assert self.which is not None
+            return self.whole._kept.among(self.which)
+        return SlicedMatrix.of(*self._scaled(slice(0, None)))
+
+    @cached_property
+    def _of_whole(self) -> bool:
+        """Whether to take it out of a larger matrix: of one that is there, or small."""
+        if self.whole is None or (n := len(self.whole.points.high)) > KEPT:
+            return False
+        return "_kept" in vars(self.whole) or n <= max(SMALL, 2 * len(self.points.high))
+
+    @cached_property
+    def _scale(self) -> int:
+        """The power of two that the points span."""
+        if self._of_whole:
+            assert self.whole is not None
+            return self.whole._scale
+        return math.frexp(np.ptp(self.points.high, axis=0).max())[1]
+
+    def _scaled(self, rows: slice) -> tuple[Pair, slice, float]:
+        points = Pair(*(np.ldexp(part, -self._scale) for part in self.points))
+        return points, rows, math.sqrt(2.0) * math.ldexp(self.point_error, -self._scale) * UP
+
+
+def _unit(largest: Array) -> Array:
+    """Of a first slice of entries up to this."""
+    return np.asarray(np.ldexp(2.0**-FIRST, np.frexp(largest)[1]))
+
+
+def _most(values: Array) -> Array:
+    """(..., 1) the largest size along the last axis."""
+    return np.asarray(np.abs(values).max(axis=-1, initial=0.0, keepdims=True))
+
+
+def inverse_distances(points: Pair, others: Pair) -> Pair:
+    """(m, n) 1 / r_ij to 2^-98 of themselves; 0 where two points are one."""
+    return squared_distances(points.at(np.s_[:, None]), others).inverse_root()
+
+
+def squared_distances(points: Pair, others: Pair) -> Pair:
+    """r^2 of points along the last axis."""
+    x, y = (_square(points.at(np.s_[..., k]), others.at(np.s_[..., k])) for k in (0, 1))
+    square, rest = two_sum(x.high, y.high)
+    return Pair(square, rest + (x.low + y.low))
+
+
+def _square(here: Pair, there: Pair) -> Pair:
+    """Squared differences of one coordinate; float64 numbers leave fewer terms."""
+    if here.low.any() or there.low.any():
+        apart = here - there
+    else:
+        apart = Pair(*two_sum(here.high, -there.high))
+    high, rest = two_square(apart.high)
+    return Pair(high, rest + (apart.high + apart.high) * apart.low)

@@ -1,0 +1,91 @@
+"""How a shear force is shared where every asperity sticks, and how far that is proved.
+
+Shares Y solve  (H + C) Y = the same displacement everywhere,  sum Y = 1,  with H = diag(1/(2 E* a))
+of the true loads. What is proved of computed shares is the theorem of `convex.theorem`:
+docs/theory/shakedown.md, "Elastic shares". Y is (n,), or (n, 2, 2) with the full kernel.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from convexrough import checks
+from convexrough.arrays import Array
+from convexrough.contact import Contact
+from convexrough.convex.theorem import distance
+from convexrough.numbers.balls import Ball
+from convexrough.roundoff import SAFETY
+from convexrough.vector_shear.loaded import Loaded
+from convexrough.vector_shear.problem import VectorProblem
+
+
+class Shares(NamedTuple):
+    """Shares of the n loaded asperities, own units; errors are infinite where nothing is proved.
+
+    values : (n,) or (n, 2, 2);  errors : (n,) or (n, 2), under a force along x and along y
+    loads, load_errors : (n,)
+    """
+
+    values: Array
+    errors: Array
+    loads: Array
+    load_errors: Array
+
+
+def scalar_shares(contact: Contact) -> Shares:
+    """With the scalar kernel: how a normal solution changes with its load."""
+    known = Loaded.of(contact)
+    if known.scope == "none":
+        return _unproved(known.elastic, known)
+    place = np.searchsorted(known.levels.candidates, known.touching)
+    shares = known.tangent.loads[place]
+    return Shares(shares.value, shares.error, known.loads, known.errors)
+
+
+def vector_shares(contact: Contact) -> Shares:
+    """With the full tangential kernel."""
+    problem = VectorProblem.of(contact)
+    n, h = len(problem), problem.stiffness
+    checks.fits_in_memory("loaded asperities", n, 3 * 4 * 8, power=2)
+    stiffness = problem.kernel + np.diag(np.repeat(h, 2))
+    together = np.tile(np.eye(2), (n, 1))
+    moved = np.linalg.solve(stiffness, together)
+    y = moved @ np.linalg.inv(together.T @ moved)  # (2n, 2)
+    known = problem.scalar
+    if known.scope == "none":
+        return _unproved(y.reshape(n, 2, 2), known)
+
+    shares = y.reshape(n, 2, 2)
+    if problem.margin == 0.0 or known.stray > 0 or not known.sure.all():
+        return _unproved(shares, known)
+    errors = np.stack([_errors(problem, shares[..., k], np.eye(2)[k]) for k in (0, 1)], axis=1)
+    return Shares(shares, errors, known.loads, known.errors)
+
+
+def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
+    """(n,) bounds on shares (n, 2), from how far (H + C) Y is from the same at every asperity.
+
+    What they miss of the total is put on the first one.
+    """
+    known = problem.scalar
+    exact = Ball.exact(np.ascontiguousarray(shares.T))
+    stiffness = 1.0 / (known.held / known.ceiling_balls * 1.5)
+    moved = exact * stiffness + problem.couple(shares).T
+    off = np.hypot(*(moved - moved.value.mean(axis=1)[:, None]).size)
+    off += problem.product_error * (known.influence.matrix @ np.hypot(*shares.T))
+    missing = float(np.hypot(*(exact.sum() - total).size)) * (1 + SAFETY)
+    off += missing * problem.reach[0]
+    off[0] += missing * stiffness.upper[0]
+    within = distance(off * (1 + SAFETY), 1.0 / known.softness, problem.margin)
+    errors: Array = within * np.sqrt(known.softness) * (1 + SAFETY)
+    errors[0] += missing
+    return errors
+
+
+def _unproved(values: Array, problem: Loaded) -> Shares:
+    """Shares of loads of which nothing is known."""
+    nowhere = np.full(len(values), np.inf)
+    errors = nowhere if values.ndim == 1 else np.full(values[:, 0].shape, np.inf)
+    return Shares(values, errors, problem.loads, nowhere)

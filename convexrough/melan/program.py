@@ -1,0 +1,173 @@
+"""Melan's theorem at constant normal load, for asperities that stick until they slide.
+
+With elastic shares q_i(v) of the vertices v of a path, in units of f, and t0 its mean,
+
+    maximise lambda  with  |r_i + lambda q_i(v)| <= P_i  for all i and v,  sum r_i = t0,
+
+and for slips s_iv with sum_v s_iv = x the same for all i, any such lambda is at most
+
+    [sum P_i |s_iv| - x . t0] / sum s_iv . q_i(v).
+
+Both are evaluated here for what a solver found, so it need not be trusted, and with what shares and
+loads can be off by: docs/theory/shakedown.md, "Melan's program".
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from convexrough import checks
+from convexrough.arrays import Array
+from convexrough.contact import Contact
+from convexrough.errors import SolverError
+from convexrough.melan.elastic_shares import Shares, vector_shares
+from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.solvers.programs import ConeProgram, run_clarabel
+from convexrough.vector_shear.loaded import Loaded
+
+#: What the solver is asked for, and how far its state is moved towards one that is surely safe.
+TOLERANCE, MARGIN = 1e-10, 1e-9
+
+#: Slips are multiples of the largest over this: sums of such numbers are exact.
+STEPS = 2.0**30
+
+
+class Melan(NamedTuple):
+    """Bounds on lambda, the state at rest [force over f] and the slips of each vertex.
+
+    lower, upper : proved; 0 and infinite where the shares or the loads are not
+    factor       : what the state admits, were shares and loads as computed
+    """
+
+    factor: float
+    lower: float
+    upper: float
+    gross: float
+    rest: Array  # (n, 2)
+    slips: Array  # (m, n, 2)
+
+
+def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
+    """The program with the full tangential kernel; mean (2,) and vertices (m, 2) are Q / f."""
+    problem = Loaded.of(contact)
+    unit, touching, n = problem.units.force, problem.touching, len(problem.loads)
+    shares, m = vector_shares(contact), len(vertices)
+    checks.fits_in_memory("cones", m * n, 4000.0)
+    elastic = np.einsum("ijk,vk->vij", shares.values, vertices / unit)  # (m, n, 2)
+    errors = np.einsum("ik,vk->vi", shares.errors, np.abs(vertices) / unit)
+    steady = shares.values @ (mean / unit)
+    raw = run_clarabel(_program(shares.loads, steady, elastic), "shakedown", TOLERANCE)
+    rest = _inwards(shares.loads, steady + raw.x[1:].reshape(n, 2), mean / unit)
+    cones = raw.multipliers[2:].reshape(m, n, 3)
+    slips = _closed(-cones[..., 1:] / shares.loads[:, None])
+    everyone = np.zeros((m, len(contact.scene), 2))
+    everyone[:, touching] = slips
+    state = np.zeros((len(contact.scene), 2))
+    state[touching] = (rest - steady) * unit
+    return Melan(
+        factor=_largest(rest, elastic, shares.loads)[1],
+        lower=_lower(shares, rest, mean / unit, elastic, errors),
+        upper=_upper(shares, slips, mean / unit, elastic, errors),
+        gross=_largest(mean[None], vertices[:, None], np.array([contact.load]))[1],
+        rest=state,
+        slips=everyone,
+    )
+
+
+def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
+    """Unknowns lambda and rho = r - steady; cones scaled by P_i."""
+    from scipy.sparse import csc_matrix, hstack, identity, kron, vstack
+
+    m, n, _ = elastic.shape
+    inverse = np.diag(1.0 / limits)
+    into = csc_matrix(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    scaled = np.zeros((m, n, 3))
+    scaled[..., 1:] = -elastic / limits[:, None]
+    rests = kron(csc_matrix(np.ones((m, 1))), kron(csc_matrix(-inverse), into))
+    balance = kron(csc_matrix(np.ones((1, n))), identity(2))
+    equal = hstack([csc_matrix((2, 1)), balance])
+    within = hstack([csc_matrix(scaled.reshape(-1, 1)), rests])
+    constant = np.zeros((m, n, 3))
+    constant[..., 0] = 1.0
+    constant[..., 1:] = steady / limits[:, None]
+    unknowns = 1 + 2 * n
+    linear = np.zeros(unknowns)
+    linear[0] = -1.0
+    return ConeProgram(
+        quadratic=csc_matrix((unknowns, unknowns)),
+        linear=linear,
+        constraints=csc_matrix(vstack([equal, within])),
+        constant=np.append(np.zeros(2), constant.reshape(-1)),
+        equalities=2,
+    )
+
+
+def _inwards(limits: Array, state: Array, mean: Array) -> Array:
+    """(n, 2) a state at rest that adds up, and is moved a little towards one within friction."""
+    parts = limits[:, None] / limits.sum()
+    state = state + parts * (mean - state.sum(axis=0))
+    return np.asarray(state + MARGIN * (parts * mean - state))
+
+
+def _lower(shares: Shares, rest: Array, mean: Array, elastic: Array, errors: Array) -> float:
+    """The largest lambda that the state is sure to admit.
+
+    What it misses of the total is counted at every asperity, as no matter who is given it.
+    """
+    missing = float(np.hypot(*(rest.sum(axis=0) - mean)))
+    missing += 4 * len(rest) * ROUNDOFF * float(np.abs(rest).sum())
+    limits = (shares.loads - shares.load_errors - missing) * (1 - SAFETY)
+    if not np.isfinite(errors).all() or (limits <= 0).any():
+        return 0.0
+    least, most = _largest(rest, elastic, limits)
+    if not least <= 0.0 <= most:
+        return 0.0
+    limits = limits - most * errors  # more than any smaller lambda needs
+    if (limits <= 0).any():
+        return 0.0
+    least, most = _largest(rest, elastic, limits)
+    return most * (1 - SAFETY) if least <= 0.0 <= most else 0.0
+
+
+def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
+    """The least and largest lambda with |fixed + lambda scaled| <= limit everywhere.
+
+    fixed : (n, 2);  scaled : (m, n, 2);  limits : (n,)
+    """
+    a = (scaled**2).sum(axis=-1)
+    b = (fixed * scaled).sum(axis=-1)
+    c = np.broadcast_to((fixed**2).sum(axis=-1) - limits**2, a.shape)
+    moving = a > 0
+    root = np.sqrt(np.maximum(b**2 - a * c, 0.0)[moving])
+    if (b**2 < a * c)[moving].any() or (c[~moving] > 0).any():
+        return np.inf, 0.0
+    a, b = a[moving], b[moving]
+    return float(((-b - root) / a).max()), float(((-b + root) / a).min())
+
+
+def _closed(slips: Array) -> Array:
+    """(m, n, 2) slips that add up to the same everywhere, exactly: they are whole numbers."""
+    largest = float(np.abs(slips).max())
+    if not largest > 0:
+        raise SolverError("the program was answered without a mechanism", solver="shakedown")
+    slips = np.round(slips * (STEPS / largest))
+    net = slips.sum(axis=0)
+    together = np.round(net.mean(axis=0))
+    most = np.hypot(slips[..., 0], slips[..., 1]).argmax(axis=0)
+    slips[most, np.arange(slips.shape[1])] += together - net
+    return np.asarray(slips)
+
+
+def _upper(shares: Shares, slips: Array, mean: Array, elastic: Array, errors: Array) -> float:
+    """What slips that close prove; infinite where they do no work."""
+    sizes = np.hypot(slips[..., 0], slips[..., 1])
+    done = slips * elastic
+    doubt = float((sizes * errors).sum()) + 4 * done.size * ROUNDOFF * float(np.abs(done).sum())
+    work = float(done.sum()) - doubt
+    together = slips.sum(axis=0)[0]
+    given = together * mean
+    cost = float((sizes * (shares.loads + shares.load_errors)).sum()) * (1 + SAFETY)
+    cost += -float(given.sum()) + 4 * ROUNDOFF * float(np.abs(given).sum())
+    return cost / work * (1 + SAFETY) if work > 0 else np.inf

@@ -1,0 +1,293 @@
+"""`shakedown`: how far a load path may be scaled until asperities slide in every cycle.
+
+The path is (P0, Q0) + factor (p, q). With T = Q / f, r+ and r- the largest -(p + t) and -(p - t) of
+its points, the permanently stuck level is  L* = P0 - factor (r+ + r-) / 2,  and asperity i slides
+for ever once L* falls below its onset sigma_i: docs/theory/shakedown.md, "The exact limit".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.arrays import Array, frozen
+from convexrough.contact import Contact, press
+from convexrough.drawn import Drawn
+from convexrough.errors import InputError
+from convexrough.frames import Variables
+from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.onset import MOST_ONSETS, enclosed, last_to_touch
+from convexrough.friction.order import Order
+from convexrough.influence import Kind
+from convexrough.melan import program
+from convexrough.melan.elastic_shares import scalar_shares
+from convexrough.progress import Announce
+from convexrough.record import Along, Table
+from convexrough.roundoff import SAFETY
+from convexrough.scene.scene import Scene
+from convexrough.vector_shear.loaded import Loaded
+
+Theory = Literal["exact", "elastic", "vector"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Shakedown(Table, Drawn):
+    """The factor up to which sliding shakes down, from below by a state and above by slips.
+
+    kind    : "exact": partial slip, any path; sliding of whole asperities ceases. "elastic" and
+        "vector": Melan's theorem for asperities that stick until they slide, at constant load
+    factor  : least of `factors`, or of the program;  lower, upper : proved bounds on it; 0 and
+        infinite where the loads are not proved, or the order that "exact" rests on
+    factors : (n,) of each asperity that touches at the mean load, nan of others and where not
+        looked for; one number for all by "vector"
+    gross   : the factor at which all of them slide at once, beyond which there is no such path
+    witness : (n,) or (n, 2) [force] shear at rest that keeps all within friction up to `lower`,
+        with what the path adds elastically
+    mechanism : (n,) slips just beyond, the largest 1; (m, n, 2) of each vertex by "vector"
+    order   : of indentations, which "exact" rests on; None of the others
+    load, force : P0 and Q0 [force], Q0 (2,) by "vector"
+    load_amplitudes, force_amplitudes : (m,) p and q [force], q (m, 2) by "vector"
+
+    >>> Q = 0.1 * contact.load
+    >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
+    >>> limit.lower <= limit.factor <= limit.upper
+    True
+    """
+
+    _along: ClassVar[Along] = {
+        ("asperity",): ("factors", "witness", "mechanism"),
+        ("vertex",): ("load_amplitudes", "force_amplitudes"),
+    }
+
+    scene: Scene
+    kind: Theory
+    factor: float
+    lower: float
+    upper: float
+    factors: Array
+    gross: float
+    witness: Array
+    mechanism: Array
+    load: float
+    force: float | Array
+    load_amplitudes: Array
+    force_amplitudes: Array
+    order: Order | None = None
+
+    @property
+    def gap(self) -> float:
+        """(upper - lower) / factor."""
+        return (self.upper - self.lower) / self.factor if np.isfinite(self.factor) else 0.0
+
+    @property
+    def proved(self) -> bool:
+        """The bounds enclose the factor."""
+        return self.lower > 0 and bool(self.upper < np.inf or self.factor == np.inf)
+
+    def _variables(self) -> Variables:
+        """Vectors by "vector", whose mechanism has slips for each vertex."""
+        found = super()._variables()
+        if self.kind == "vector":
+            for name, along in (
+                ("witness", ("asperity", "direction")),
+                ("mechanism", ("vertex", "asperity", "direction")),
+                ("force_amplitudes", ("vertex", "direction")),
+            ):
+                found[name] = along, found[name][1]
+        return found
+
+
+def shakedown(
+    scene: Scene,
+    *,
+    loads: float,
+    forces: ArrayLike = 0.0,
+    load_amplitudes: ArrayLike = 0.0,
+    force_amplitudes: ArrayLike,
+    kind: Theory = "exact",
+    influence: Kind | None = None,
+    announce: Announce | None = None,
+) -> Shakedown:
+    """The largest factor of a closed path around (loads, forces) that shakes down.
+
+    loads, forces : P0 and Q0 [force]; Q0 is (2,) for "vector"
+    load_amplitudes, force_amplitudes : (m,) p and q of the points of the path [force], a number
+        for all; q is (m, 2) for "vector". Only "exact" allows p that is not 0
+    influence, announce : as in `load_path`
+
+    Raises InputError for bad values, |Q0| >= f P0, or a path on which nothing moves.
+
+    The rings of the paper's example: sliding ceases up to 0.3517 of f P.
+
+    >>> Q = 0.05 * contact.load
+    >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
+    >>> f"{limit.factor / 10:.4f}"
+    '0.3517'
+    """
+    f = checks.friction(scene.friction)
+    P0 = checks.positive("loads", loads)
+    if kind not in ("exact", "elastic", "vector"):
+        raise InputError("kind", found=repr(kind), expected='"exact", "elastic" or "vector"')
+    if kind == "vector":
+        Q0, q = _vectors("forces", forces, 1)[0], _vectors("force_amplitudes", force_amplitudes, 2)
+    else:
+        Q0 = checks.finite("forces", cast("float", forces))
+        q = checks.array("force_amplitudes", np.atleast_1d(np.asarray(force_amplitudes)))
+    p = _alike("load_amplitudes", load_amplitudes, len(q))
+    t0, t = Q0 / f, q / f
+    if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
+        raise InputError("forces", found=forces, expected=f"less than f P = {f * P0:g} in size")
+    if len(q) == 0 or not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
+        expected = "a path that moves: at least two points, such as [Q, -Q]"
+        given = "one point" if len(q) else "none"
+        raise InputError("force_amplitudes", found=given, expected=expected)
+    if kind == "exact":
+        contact = press(scene, load=P0, influence=influence, announce=announce)
+        found = _exact(contact, float(t0), p, t)
+    elif np.any(p):
+        expected = 'none: only "exact" holds where the normal load varies'
+        raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)
+    else:
+        contact = press(scene, load=P0, influence=influence)
+        found = _elastic(contact, float(t0), t) if kind == "elastic" else _vector(contact, t0, t)
+    return Shakedown(
+        scene=scene,
+        kind=kind,
+        load=P0,
+        force=frozen(f * t0) if kind == "vector" else float(f * t0),
+        load_amplitudes=frozen(p),
+        force_amplitudes=frozen(q),
+        **found._asdict(),
+    )
+
+
+class _Found(NamedTuple):
+    """As in `Shakedown`."""
+
+    factor: float
+    lower: float
+    upper: float
+    factors: Array
+    gross: float
+    witness: Array
+    mechanism: Array
+    order: Order | None = None
+
+
+def _exact(contact: Contact, t0: float, p: Array, t: Array) -> _Found:
+    levels, scene = contact.keep(FrictionLevels), contact.scene
+    f, P0 = checks.friction(scene.friction), float(levels.load)
+    plus, minus = float((-(p + t)).max()), float((-(p - t)).max())
+    fall = (plus + minus) / 2  # of L*, per factor
+    gross = min((P0 + c * t0) / r if r > 0 else np.inf for c, r in ((1, plus), (-1, minus)))
+    touching = np.flatnonzero(contact.loads)
+    last, worst = last_to_touch(levels)
+    found = {last: worst}
+    if len(touching) <= MOST_ONSETS:
+        found |= enclosed(levels, touching.tolist())
+    factors = np.full(len(scene), np.nan)
+    for asperity, onset in found.items():
+        factors[asperity] = float(levels.load - onset.load) / fall if fall > 0 else np.inf
+    sure, beyond = levels.snapshot(worst.upper), levels.snapshot(worst.lower)
+    order = levels.order({worst.lower, worst.upper})
+    proved = order == "proved" and bool(sure.touching[touching].all())
+    lower, upper = (
+        float(levels.load - s) / fall if fall > 0 else np.inf for s in (worst.upper, worst.lower)
+    )
+    height = t0 - lower * (plus - minus) / 2 if fall > 0 else t0
+    gaps = np.maximum(-beyond.indentations, 0.0) * (contact.loads > 0)
+    return _Found(
+        factor=float(factors[last]),
+        lower=lower * (1 - SAFETY) if proved else 0.0,
+        upper=upper * (1 + SAFETY) if proved else np.inf,
+        factors=frozen(factors),
+        gross=gross,
+        witness=frozen(f * height / (sure.load or 1.0) * sure.loads),
+        mechanism=frozen(gaps / (gaps.max() or 1.0)),
+        order=order,
+    )
+
+
+def _elastic(contact: Contact, t0: float, t: Array) -> _Found:
+    """The scalar program in closed form: alternating slip of one asperity, or gross sliding."""
+    f = checks.friction(contact.scene.friction)
+    problem, shares = Loaded.of(contact), scalar_shares(contact)
+    high, low = float(t.max()), float(t.min())
+    q, P, doubt, off = shares.values, shares.loads, shares.load_errors, shares.errors
+
+    def limits(loads: Array, sizes: Array) -> Array:
+        """Of each asperity: it slides to and fro where the range of its share is 2 P_i."""
+        reach = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
+        return np.divide(2.0 * loads, reach, out=np.full_like(loads, np.inf), where=reach > 0)
+
+    each = limits(P, np.abs(q))
+    sliding = min(
+        (contact.load - t0) / high if high > 0 else np.inf,
+        (contact.load + t0) / -low if low < 0 else np.inf,
+    )
+    factor = min(float(each.min()), sliding)
+    lower = min(float(limits(np.maximum(P - doubt, 0.0), np.abs(q) + off).min()), sliding)
+    upper = min(float(limits(P + doubt, np.abs(q) - off).min()), sliding)
+    # A share that might be negative would be loaded while the others are unloaded.
+    proved = bool((q >= off).all())
+    critical = np.arange(len(P)) == int(np.argmin(each)) if factor < sliding else np.ones(len(P))
+    # At rest each asperity has room from -P_i - factor q_i low to P_i - factor q_i high.
+    travelled = np.outer(factor * q / problem.units.force, (low, high))
+    room_low, room_high = -P - travelled.min(axis=1), P - travelled.max(axis=1)
+    width = room_high - room_low
+    part = (t0 / problem.units.force - room_low.sum()) / (width.sum() or 1.0)
+    factors = np.full(len(contact.scene), np.nan)
+    factors[problem.touching] = each
+    return _Found(
+        factor=factor,
+        lower=lower * (1 - SAFETY) if proved else 0.0,
+        upper=upper * (1 + SAFETY) if proved else np.inf,
+        factors=frozen(factors),
+        gross=sliding,
+        witness=frozen(problem.to_scene(f * problem.units.force * (room_low + part * width))),
+        mechanism=frozen(problem.to_scene(np.asarray(critical, dtype=np.float64))),
+    )
+
+
+def _vector(contact: Contact, t0: Array, t: Array) -> _Found:
+    f = checks.friction(contact.scene.friction)
+    found = program.solve(contact, t0, t)
+    slips = np.hypot(*np.moveaxis(found.slips, -1, 0)).max()
+    return _Found(
+        factor=found.factor,
+        lower=found.lower,
+        upper=found.upper,
+        factors=frozen(np.where(contact.loads > 0, found.factor, np.nan)),
+        gross=found.gross,
+        witness=frozen(f * found.rest),
+        mechanism=frozen(found.slips / slips),
+    )
+
+
+def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
+    """(m, 2) of forces in the plane; one of them, or a number along x, if one is expected."""
+    try:
+        given = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(what, found=repr(values)[:60], expected="numbers") from error
+    if given.ndim == 0 and dimensions == 1:
+        given = np.array([float(given), 0.0])
+    if given.ndim != dimensions or given.shape[-1] != 2 or not np.isfinite(given).all():
+        shape = "two finite numbers" if dimensions == 1 else "finite numbers of shape (m, 2)"
+        raise InputError(what, found=f"shape {given.shape}", expected=shape)
+    return np.atleast_2d(given)
+
+
+def _alike(what: str, values: ArrayLike, count: int) -> Array:
+    """(count,) of amplitudes; a number stands for as many of it."""
+    given = checks.array(what, np.atleast_1d(np.asarray(values)))
+    if np.ndim(values) == 0:
+        return frozen(np.full(count, float(given[0])))
+    if len(given) != count:
+        expected = f"{count}, as many as of force_amplitudes"
+        raise InputError(what, found=f"{len(given)} values", expected=expected)
+    return given

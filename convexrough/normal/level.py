@@ -1,0 +1,322 @@
+"""Normal solutions of a scene at total loads L: all that friction and gradients are made of.
+
+At a total load L the scene has one solution in the box where it was proved: loads P_i(L), approach
+D0(L), indentations n_i(L) (minus the gap where open), and the energy
+
+    V(L) = min over sum P = L of  sum (3/5) k P^(5/3) + P'AP/2 - d'P,    so that V' = D0.
+
+Its tangent q = dP/dL, S = dD0/dL solves  q / c + A q = S,  sum q = 1  over the touching asperities,
+with c = dP/dn = (3/2) P^(1/3) / k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array
+from convexrough.convex.newton_step import correct
+from convexrough.convex.theorem import distance
+from convexrough.errors import ProofError, SolverError
+from convexrough.normal.problem import NormalProblem
+from convexrough.normal.proved import Obstacle, Proved, proved
+from convexrough.normal.refine import CORRECTIONS, REDUCTION, Trial, refined_loads
+from convexrough.numbers.balls import Ball, where
+from convexrough.numbers.pairs import Pair
+from convexrough.roundoff import SAFETY
+
+#: A residual that refinement cannot bring below this part of its first size is no rounding.
+SOLVED = 1e-6
+
+#: Loads of the candidates (own units) at a total load, from any solver.
+Press = Callable[[NormalProblem], Array]
+
+
+class Response(NamedTuple):
+    """Loads that springs and half-space carry, as balls in own units: `Level.response`.
+
+    loads : (n,) x, 0 where open;  approach : beta
+    """
+
+    loads: Ball
+    approach: Ball
+
+
+class Springs(NamedTuple):
+    """The contacts of a level as linear springs: what `Level.response` solves with.
+
+    touching  : (n,) whose springs are known;  doubtful : those that may or may not touch
+    slopes    : (n,) c = dP/dn, 0 where not touching;  stiffness : 1/c, likewise
+    bound     : (n,) h, at most 1/c of any that may touch; infinite where open
+    margin    : mu of the theorem, with H = diag(h); 0 where nothing is proved
+    """
+
+    touching: NDArray[np.bool_]
+    doubtful: NDArray[np.bool_]
+    slopes: Array
+    stiffness: Ball
+    bound: Array
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """The normal solution at one total load, as balls over the candidates, in own units.
+
+    load     : () L;  approach : () D0(L)
+    loads    : (n,) P_i(L);  indentation : (n,) n_i(L), minus the gap where open
+    touching, open : (n,) proved
+    """
+
+    problem: NormalProblem
+    load: Ball
+    approach: Ball
+    loads: Ball
+    indentation: Ball
+    touching: NDArray[np.bool_]
+    open: NDArray[np.bool_]
+    solution: Proved | None = None
+    trial: Trial | None = None
+
+    @classmethod
+    def of(cls, found: Proved, load: Ball) -> Level:
+        """A proved solution whose total load is known."""
+        return cls(
+            found.problem,
+            load,
+            found.approach,
+            found.loads,
+            found.indentation,
+            found.touching,
+            found.open,
+            found,
+            found.trial,
+        )
+
+    @classmethod
+    def unproved(cls, problem: NormalProblem, state: Trial, load: Ball) -> Level:
+        """Trial loads of which nothing is proved: every radius is infinite."""
+        unknown = Ball.around(state.loads, np.inf)
+        none = np.zeros(len(problem), dtype=bool)
+        approach = Ball.around(state.approach.mid, np.inf if problem.load else 0.0)
+        indentation = Ball.around(state.indentation.mid, np.inf)
+        return cls(problem, load, approach, unknown, indentation, none, none, None, state)
+
+    @classmethod
+    def unloaded(cls, problem: NormalProblem) -> Level:
+        """The level L = 0, where the highest asperity just touches."""
+        offsets = problem.exact.offsets
+        ends = np.array([offsets.lower.max(), offsets.upper.max()])
+        highest = offsets[int(np.argmax(offsets.value))]
+        ties = np.flatnonzero(offsets.upper >= ends[0])
+        if len(ties) > 1:
+            highest = Ball.around(highest.mid, highest.radius + (ends[1] - ends[0]))
+        below = offsets - highest
+        n = len(problem)
+        touching = np.zeros(n, dtype=bool)
+        zero = Ball.exact(np.zeros(n))
+        return cls(problem, Ball.exact(0.0), -highest, zero, below, touching, below.negative)
+
+    @cached_property
+    def energy(self) -> Ball:
+        """V(L)."""
+        state, offsets = self.trial, self.problem.exact.offsets
+        if state is None:
+            return Ball.exact(0.0)
+        local = state.gap + state.indentation
+        per_load = local * Fraction(3, 5) + state.product * 0.5 - offsets
+        found = Ball.exact(state.loads).dot(per_load)
+        # The trial loads cost at most e'|P - P*| more than the least, at their own total.
+        above = float(state.excess @ (self.loads.error + np.abs(state.loads.low))) * (1 + SAFETY)
+        load = float(state.missing.size + self.load.radius) * float(self.approach.size)
+        return Ball.around(found.mid, found.radius + above + load * (1 + SAFETY))
+
+    @cached_property
+    def tangent(self) -> Response:
+        """q = dP/dL and S = dD0/dL."""
+        return self.response(Ball.exact(np.zeros(len(self.problem))), Ball.exact(1.0))
+
+    @cached_property
+    def springs(self) -> Springs:
+        """What `response` solves with; raises ProofError at no load, where nothing is elastic."""
+        found, state = self.solution, self.trial
+        if state is None:
+            raise ProofError("at no load the approach has no derivative")
+        zero = Ball.exact(np.zeros(len(self.problem)))
+        if found is None:
+            inside = np.asarray(state.inside)
+            own = state.gap + state.indentation  # k P^(2/3)
+            ratio = where(inside, own / where(inside, Ball.exact(state.loads), 1 + zero), zero)
+            stiffness = ratio / 1.5
+            nowhere = np.full(len(self.problem), np.inf)
+            slopes = np.where(inside, 1.0 / np.where(inside, stiffness.value, 1.0), 0.0)
+            return Springs(inside, ~inside & False, slopes, stiffness, nowhere, 0.0)
+        softness = 1.5 / self.problem.exact.coefficients * self.loads.cbrt()
+        touching = self.touching
+        with np.errstate(divide="ignore"):
+            known = np.maximum(found.stiffness, (1.0 - SAFETY) / softness.upper)
+        bound = np.where(self.open, np.inf, known)
+        return Springs(
+            touching,
+            ~touching & ~self.open,
+            np.where(touching, softness.value, 0.0),
+            where(touching, 1.0 / where(touching, softness, 1 + zero), zero),
+            bound,
+            1.0 - min(found.box.convexity_number, found.box.problem.convexity_at(bound)),
+        )
+
+    def response(self, right: Ball, total: Ball) -> Response:
+        """x and beta:  x / c + A x = right + beta  where touching, x = 0 elsewhere, sum x = total.
+
+        Of an asperity that may or may not touch, all that it could contribute. Refined in pairs
+        until the residual no longer halves; then proved by the theorem of `convex.theorem`, first
+        with the doubtful ones at x = 0, which bounds what they carry, then without them.
+
+        right : (n,);  total : ()
+
+        Raises SolverError where the system is singular, or nearly: there is no derivative.
+        """
+        problem, springs = self.problem, self.springs
+        touching, c, stiffness = springs.touching, springs.slopes, springs.stiffness
+        weights, largest = c / c.sum(), int(np.argmax(c))
+
+        def completed(x: Pair) -> Pair:
+            at = x.at(largest) + (total.mid - x.total())
+            high, low = x.high.copy(), x.low.copy()
+            high[largest], low[largest] = at
+            return Pair(high, low)
+
+        def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
+            """x / c + A x - right - beta, and beta as it fits best."""
+            above = stiffness * x + product - right
+            mean = float(weights @ above.value)
+            beta = Ball.exact(mean) + float(weights @ (above - mean).value)
+            return above - beta, beta
+
+        def size_of(left: Ball) -> float:
+            return float(np.sqrt(c @ left.value**2))
+
+        x = completed(Pair.exact(float(total.value) * weights))
+        left, beta = residual(x, problem.product(x))
+        size = size_of(left)
+        first = max(size, size_of(right))
+        for _ in range(CORRECTIONS):
+            rounding = float(np.sqrt(c @ left.radius**2))
+            if size == 0.0 or size <= rounding < np.inf:
+                break
+            defect = np.where(touching, left.value, 0.0)
+            unit = float(np.abs(defect).max())
+            step = correct(
+                problem.influence,
+                problem.shells,
+                np.sqrt(c),
+                defect / unit,
+                balanced=True,
+                tolerance=REDUCTION,
+            )
+            following = completed(x + Pair.exact(c * step * unit))
+            better, risen = residual(following, problem.product(following))
+            before, now = size, size_of(better)
+            if now < size:
+                x, left, beta, size = following, better, risen, now
+            if not now < 0.5 * before:
+                break
+        if size > SOLVED * first:
+            raise SolverError(
+                "the state has no derivative: its linear system is singular, or nearly",
+                solver="response",
+                advice="the energy need not be convex there: press less hard",
+            )
+        return self._proved_response(x, left, beta, total)
+
+    def _proved_response(self, x: Pair, left: Ball, beta: Ball, total: Ball) -> Response:
+        problem, springs = self.problem, self.springs
+        touching, doubtful, h = springs.touching, springs.doubtful, springs.bound
+        if not springs.margin > 0.0:
+            return Response(Ball.around(x, np.inf), Ball.around(beta.mid, np.inf))
+        j = int(np.argmax(springs.slopes))
+        short = float((total - Ball.exact(x).sum()).size)
+
+        def excess(others: float) -> tuple[Array, float, float]:
+            """e, where j carries what is missing of the total, and others carry at most so much."""
+            missing = short + others
+            felt = (missing + others) * problem.largest_entry
+            e = left.size + felt
+            e[j] += missing * float(springs.stiffness.upper[j])
+            return e, missing, felt
+
+        carried = np.zeros(len(h))
+        if doubtful.any():
+            e, _, _ = excess(0.0)
+            within = distance(np.where(np.isinf(h), 0.0, e), h, springs.margin)
+            carried[doubtful] = (within / np.sqrt(h[doubtful])) * (1 + SAFETY)
+        e, missing, felt = excess(float(carried.sum()) * (1 + SAFETY))
+        known = np.where(touching, h, np.inf)
+        within = distance(np.where(touching, e, 0.0), known, springs.margin)
+        errors = np.where(touching, within / np.sqrt(known) * (1 + SAFETY), carried)
+        errors[j] += missing
+        moved = within / np.sqrt(float(known.min())) * problem.row_norm + felt
+        each = (left.size + springs.stiffness.upper * errors)[touching]
+        off = (float(each.min()) + moved) * (1 + SAFETY)
+        return Response(Ball.around(x, errors), Ball.around(beta.mid, beta.radius + off))
+
+    @cached_property
+    def rates(self) -> Array:
+        """(n,) dn/dL = S - A q, in float64."""
+        q, rise = self.tangent
+        rates: Array = float(rise.value) - self.problem.influence.apply(q.value)
+        return rates
+
+
+class Levels:
+    """The normal solutions of one scene at total loads up to that of the first, each found once.
+
+    top : the level with the highest load: of a pressed contact
+    """
+
+    def __init__(self, top: Level, press: Press) -> None:
+        self.top, self.problem, self._press = top, top.problem, press
+        self._known: dict[tuple[float, float, float], Level] = {}
+
+    @property
+    def presses(self) -> int:
+        """How many normal problems were solved beside the first."""
+        return len(self._known)
+
+    def below(self, drop: Ball) -> Level:
+        """The level at the top's load less some of it, in own units."""
+        return self.at(self.top.load - drop)
+
+    def at(self, load: Ball) -> Level:
+        """The level at a total load in own units; raises ProofError where nothing is proved."""
+        high, low = float(load.mid.high), float(load.mid.low)
+        key = (high, low, float(load.radius))
+        if key not in self._known:
+            self._known[key] = self._level(load)
+        return self._known[key]
+
+    def _level(self, load: Ball) -> Level:
+        if not load.positive:
+            if load.size == 0.0:
+                return Level.unloaded(self.problem)
+            raise ProofError(f"the load of a level may be 0 or less: {float(load.value):.3g}")
+        return self._solved(self.problem.at_load(load), load)
+
+    def at_approach(self, approach: Ball) -> Level:
+        """The level at a prescribed approach in own units, above that of the first touch."""
+        return self._solved(self.problem.at_approach(approach), None)
+
+    def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
+        state = refined_loads(problem, self._press(problem))
+        boxes = None if self.top.solution is None else iter((self.top.solution.box.closed,))
+        found = proved(problem, state, boxes)
+        if isinstance(found, Obstacle):
+            total = Ball.exact(state.loads).sum() if load is None else load
+            return Level.unproved(problem, state, total)
+        return Level.of(found, found.total if load is None else load)

@@ -1,0 +1,196 @@
+"""The solution near trial loads, proved by the theorem of `convex.theorem` on a box.
+
+The way from a residual to a bound on each load, in order: a box on which the energy is convex
+(`boxes`), the theorem on it, the theorem again on the small box that then holds the solution, and
+from there the approach, the indentations and, through these, the loads once more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices
+from convexrough.convex.theorem import distance
+from convexrough.influence.coupling import Coupling, error_reach
+from convexrough.normal.boxes import Box, box_of_touching, crowded, tried
+from convexrough.normal.problem import NormalProblem
+from convexrough.normal.refine import Trial
+from convexrough.numbers.balls import Ball
+from convexrough.numbers.pairs import Pair
+from convexrough.roundoff import SAFETY
+
+#: Boxes of touching asperities that are tried: larger ones where the solution may lie outside, and
+#: with asperities added that are not proved open. Heuristics, as is the room that a box leaves.
+ATTEMPTS, ROOM = 6, 2.0
+
+#: Loads known to fewer digits than this are also bounded through their indentations.
+POOR = 2.0**-60
+
+NONE = np.zeros(0, dtype=np.intp)
+
+CROWDED = "their discs overlap so far that the energy is not known to be convex"
+POORLY_KNOWN = "their loads are not known well enough to stay in a box where the energy is convex"
+NOT_OPEN = "they are held open, but their gaps are not proved"
+
+
+class Obstacle(NamedTuple):
+    """Why nothing is proved, and of which candidates."""
+
+    reason: str
+    which: Indices
+
+
+class Proved(NamedTuple):
+    """The solution, as balls over the candidates, in own units.
+
+    trial    : the loads that it was proved from
+    box      : where it is the only one
+    distance : || P - P* ||_H of the trial loads;  stiffness : (n,) H
+    loads, indentation : (n,) P and D0 + d - A P, an indentation, or minus a gap
+    approach : D0
+    """
+
+    problem: NormalProblem
+    trial: Trial
+    box: Box
+    distance: float
+    stiffness: Array
+    loads: Ball
+    indentation: Ball
+    approach: Ball
+
+    @property
+    def touching(self) -> NDArray[np.bool_]:
+        """(n,) proved to carry a load."""
+        return self.indentation.positive | self.loads.positive
+
+    @property
+    def open(self) -> NDArray[np.bool_]:
+        """(n,) proved to have a gap."""
+        return self.indentation.negative
+
+    @property
+    def total(self) -> Ball:
+        """The sum of the loads: by Cauchy's inequality known better than by its terms."""
+        trial = Ball.exact(self.trial.loads).sum()
+        spread = self.distance * math.sqrt(float((1.0 / self.stiffness).sum())) * (1 + SAFETY)
+        return Ball.around(trial.mid, trial.radius + spread + float(self.trial.missing.size))
+
+    def moves(self, coupling: Coupling) -> Array:
+        """(m,) bounds on how far A (P - P*) is from 0 at other points."""
+        missing = self.trial.missing.size * self.problem.largest_entry
+        reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.stiffness)
+        return np.asarray((self.distance * reach + missing) * (1 + SAFETY))
+
+
+def proved(
+    problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None
+) -> Proved | Obstacle:
+    """The solution in the first box that is proved to hold it.
+
+    boxes : to try first, of all candidates; default `boxes.tried`. Where none holds the solution,
+        those of the touching candidates alone are tried, all others being open.
+    """
+    loads = state.loads.high
+    for box in boxes or tried(problem, loads, state.product.value):
+        found = _in_box(problem, box, state)
+        if isinstance(found, Proved) and not (box.held & ~found.open).any():
+            return found
+    touching, room, obstacle = state.inside, np.zeros(len(loads)), Obstacle("", NONE)
+    for _ in range(ATTEMPTS):
+        held = box_of_touching(problem, loads, touching, room)
+        if held is None:
+            break
+        found = _in_box(problem, held, state)
+        if not isinstance(found, Proved):
+            obstacle = Obstacle(POORLY_KNOWN, np.flatnonzero(loads + found >= held.faces))
+            room = np.maximum(room, ROOM * found)
+            continue
+        doubtful = held.held & ~found.open
+        if not doubtful.any():
+            return found
+        obstacle = Obstacle(NOT_OPEN, np.flatnonzero(doubtful))
+        touching, room = touching | doubtful, np.maximum(room, ROOM * found.loads.radius)
+    return obstacle if obstacle.reason else Obstacle(CROWDED, crowded(problem, loads))
+
+
+def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
+    """The solution, or how far the loads may be off where that is not proved to stay in the box."""
+    loads = state.loads.high
+    missing = float(state.missing.size)
+    felt, own = _of_missing(problem, state, missing)
+    residual = np.where(box.held, 0.0, state.excess + felt)
+    if missing:
+        residual[own[0]] += own[1]
+
+    def errors_on(stiffness: Array, margin: float) -> tuple[float, Array]:
+        within = distance(residual, stiffness, margin)
+        errors = within / np.sqrt(stiffness) * (1 + SAFETY)
+        if missing:
+            errors[own[0]] += missing
+        return within, errors
+
+    _, errors = errors_on(box.stiffness, 1.0 - box.convexity_number)
+    if (loads + errors >= box.faces).any() or not np.isfinite(errors).all():
+        return errors
+    near = np.minimum(box.loads, (loads + errors) * (1 + SAFETY))
+    h = problem.stiffness(near)
+    margin = 1.0 - min(box.convexity_number, box.problem.convexity_at(h))
+    within, errors = errors_on(h, margin)
+    # A (P - P*) by Cauchy's inequality
+    softest = float(h.min(initial=np.inf))
+    moved = (within / np.sqrt(softest) * problem.row_norm + felt) * (1 + SAFETY)
+    shift = _approach_error(problem, state, errors, moved)
+    approach = Ball.around(state.approach.mid, shift)
+    known = state.indentation
+    indentation = Ball.around(known.mid, known.radius + (moved + shift))
+    found = Ball.around(state.loads, np.where(indentation.negative, 0.0, errors))
+    found = _sharpened(problem, found, indentation)
+    return Proved(problem, state, box, within, h, found, indentation, approach)
+
+
+def _sharpened(problem: NormalProblem, loads: Ball, indentation: Ball) -> Ball:
+    """Loads that are poorly known also as (n / k)^(3/2) of their indentations n."""
+    which = np.flatnonzero(loads.radius > POOR * loads.mid.high)
+    if len(which) == 0:
+        return loads
+    k = problem.exact.coefficients
+    ratio = indentation[which] / (k if len(k) == 1 else k[which])
+    by_law = ratio.positive_part() * ratio.sqrt()
+    better = by_law.radius < loads.radius[which]
+    parts = np.array((*loads.mid, loads.radius))
+    parts[:, which[better]] = np.array((*by_law.mid, by_law.radius))[:, better]
+    return Ball(Pair(parts[0], parts[1]), parts[2])
+
+
+def _of_missing(
+    problem: NormalProblem, state: Trial, missing: float
+) -> tuple[float, tuple[int, float]]:
+    """What a missing part of the total, on the largest load, adds to each gap and to its own."""
+    if missing == 0.0 or len(state.loads.high) == 0:
+        return 0.0, (0, 0.0)
+    j = int(np.argmax(state.loads.high))
+    largest = float(state.loads.high[j])
+    if not missing < largest / 2.0:
+        return np.inf, (j, np.inf)
+    steepest = 4.0 / 3.0 * float(state.local[j]) / largest * (1 + SAFETY)
+    return missing * problem.largest_entry, (j, missing * steepest)
+
+
+def _approach_error(problem: NormalProblem, state: Trial, errors: Array, moved: float) -> float:
+    """|D0 - D0*|, as D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch."""
+    if problem.load is None:
+        return float(state.approach.radius)
+    least = state.loads.high - errors
+    sure = least > 0
+    if not sure.any():
+        return np.inf
+    # k P^(2/3) is concave: from least to P it rises by at most its slope at the former
+    slope = problem.stiffness(least[sure], np.flatnonzero(sure))
+    each = state.gap.size[sure] + slope * errors[sure] * (1 + SAFETY)
+    return float(each.min() + moved) * (1 + SAFETY) + float(state.approach.radius)

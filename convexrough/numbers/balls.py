@@ -1,0 +1,308 @@
+"""Balls: numbers known to within a radius. A formula evaluated on balls proves its own error.
+
+The midpoint of a ball is a pair of float64 numbers, its radius a float64 number. Every operation
+returns a ball that holds all results of its operands' numbers, with its own rounding counted.
+Where nothing is known (an overflow, a divisor that may be 0) the radius is infinite.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import threads
+from convexrough.arrays import Array
+from convexrough.numbers.pairs import CHUNK, PAIR_ROUNDOFF, Pair
+
+#: A factor above the rounding of a short chain of float64 operations on radii.
+UP = 1.0 + 2.0**-40
+
+#: Above what any one operation on pairs can lose by underflow.
+TINY = 2.0**-1000
+
+#: Numbers that stand for themselves: they become balls of radius 0.
+Exact: TypeAlias = "float | int | Fraction | Array | Pair"
+
+#: Of each number on its own, from midpoints and radii to a midpoint and a radius.
+Elementwise: TypeAlias = "Callable[..., tuple[Pair, Array]]"
+
+quietly = np.errstate(all="ignore")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Ball:
+    """All numbers within a radius of a midpoint. Arrays of any one shape.
+
+    >>> third = Ball.exact(1.0) / 3.0
+    >>> float(third.mid.high), bool(third.radius < 1e-28)
+    (0.3333333333333333, True)
+    """
+
+    mid: Pair
+    radius: Array
+
+    # numpy's operators leave `array * ball` to the ball.
+    __array_ufunc__ = None
+
+    @classmethod
+    def exact(cls, value: Exact) -> Ball:
+        """Numbers that are known exactly; a Fraction to the rounding of the nearest pair."""
+        if isinstance(value, Fraction):
+            pair = Pair.nearest(value)
+            return cls.around(pair, PAIR_ROUNDOFF * abs(pair.high) + TINY)
+        pair = value if isinstance(value, Pair) else Pair.exact(value)
+        high = np.asarray(pair.high, dtype=np.float64)
+        return cls(Pair(high, np.asarray(pair.low)), np.zeros_like(high))
+
+    @classmethod
+    @quietly
+    def around(cls, value: Exact, radius: Any) -> Ball:
+        """Numbers known to within a radius."""
+        ball = cls.exact(value)
+        return cls(*_finished(ball.mid, (ball.radius + radius) * UP + 0.0 * ball.mid.high))
+
+    @classmethod
+    @quietly
+    def between(cls, low: Array, high: Array) -> Ball:
+        """All numbers from `low` to `high`."""
+        middle = low / 2.0 + high / 2.0
+        return cls.around(middle, np.maximum(high - middle, middle - low) * UP + TINY)
+
+    @classmethod
+    def stacked(cls, balls: list[Ball]) -> Ball:
+        """Balls of one shape, along a new first axis."""
+        return cls(
+            Pair(np.stack([b.mid.high for b in balls]), np.stack([b.mid.low for b in balls])),
+            np.stack([b.radius for b in balls]),
+        )
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the arrays."""
+        return self.radius.shape
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    def __getitem__(self, index: Any) -> Ball:
+        return Ball(
+            Pair(np.asarray(self.mid.high[index]), np.asarray(self.mid.low[index])),
+            np.asarray(self.radius[index]),
+        )
+
+    @property
+    def value(self) -> Array:
+        """The midpoints, rounded to float64."""
+        high: Array = self.mid.high
+        return high
+
+    @property
+    def error(self) -> Array:
+        """Bounds on the distance of every number of the ball to `value`."""
+        error: Array = (self.radius + np.abs(self.mid.low)) * UP
+        return error
+
+    @property
+    @quietly
+    def lower(self) -> Array:
+        """Lower bounds on all numbers of the ball."""
+        low: Array = self.mid.high - (self.radius - self.mid.low)
+        return np.asarray(low - self._margin)
+
+    @property
+    @quietly
+    def upper(self) -> Array:
+        """Upper bounds on all numbers of the ball."""
+        high: Array = self.mid.high + (self.radius + self.mid.low)
+        return np.asarray(high + self._margin)
+
+    @property
+    def _margin(self) -> Array:
+        """Above the rounding of an end of the ball."""
+        return np.asarray(2.0**-51 * (np.abs(self.mid.high) + self.radius) + TINY)
+
+    @property
+    def size(self) -> Array:
+        """Upper bounds on the absolute values."""
+        size: Array = np.abs(self.mid.high) * UP + self.radius
+        return np.asarray(size * UP)
+
+    @property
+    def positive(self) -> NDArray[np.bool_]:
+        """Where every number is above 0."""
+        return np.asarray(self.lower > 0)
+
+    @property
+    def negative(self) -> NDArray[np.bool_]:
+        """Where every number is below 0."""
+        return np.asarray(self.upper < 0)
+
+    def __add__(self, other: Ball | Exact) -> Ball:
+        return elementwise(_sum, self, as_ball(other))
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Ball:
+        return Ball(-self.mid, self.radius)
+
+    def __sub__(self, other: Ball | Exact) -> Ball:
+        return elementwise(_sum, self, -as_ball(other))
+
+    def __rsub__(self, other: Exact) -> Ball:
+        return as_ball(other) - self
+
+    def __mul__(self, other: Ball | Exact) -> Ball:
+        return elementwise(_product, self, as_ball(other))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Ball | Exact) -> Ball:
+        return elementwise(_quotient, self, as_ball(other))
+
+    def __rtruediv__(self, other: Exact) -> Ball:
+        return as_ball(other) / self
+
+    def scaled(self, unit: float) -> Ball:
+        """The numbers times a power of two, which is exact away from underflow and overflow."""
+        return Ball(Pair(self.mid.high * unit, self.mid.low * unit), self.radius * unit)
+
+    def positive_part(self) -> Ball:
+        """max(x, 0): |max(x, 0) - max(m, 0)| <= r."""
+        above = self.mid.high > 0
+        high, low = (np.where(above, part, 0.0) for part in self.mid)
+        return Ball(Pair(high, low), np.where(self.upper <= 0, 0.0, self.radius))
+
+    def sqrt(self) -> Ball:
+        """Square roots of the positive parts: |x^(1/2) - m^(1/2)| <= r / m^(1/2), r^(1/2)."""
+        return elementwise(_root(Pair.sqrt, np.sqrt), self)
+
+    def cbrt(self) -> Ball:
+        """Cube roots of the positive parts: |x^(1/3) - m^(1/3)| <= r / m^(2/3), r^(1/3)."""
+        return elementwise(_root(Pair.cbrt, np.cbrt), self)
+
+    def two_thirds(self) -> Ball:
+        """x^(2/3) of the positive parts: |x^(2/3) - m^(2/3)| <= r / m^(1/3), r^(2/3)."""
+        return elementwise(_root(Pair.two_thirds, lambda x: np.cbrt(x) ** 2), self)
+
+    @quietly
+    def sum(self) -> Ball:
+        """The sum along the last axis."""
+        n = self.radius.shape[-1]
+        lost = 2.0 * PAIR_ROUNDOFF * np.abs(self.mid.high).sum(axis=-1)
+        radius = (self.radius.sum(axis=-1) + lost + (n + 1) * TINY) * (UP + n * 2.0**-52)
+        return Ball(*_finished(self.mid.total(), radius))
+
+    def dot(self, other: Ball | Exact) -> Ball:
+        """The sum of products along the last axis."""
+        return (self * other).sum()
+
+
+def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
+    """Of two balls, one for each place."""
+    high, low = (np.where(condition, a, b) for a, b in zip(yes.mid, no.mid, strict=True))
+    return Ball(Pair(high, low), np.where(condition, yes.radius, no.radius))
+
+
+def as_ball(value: Ball | Exact) -> Ball:
+    """The ball itself, or numbers as balls."""
+    return value if isinstance(value, Ball) else Ball.exact(value)
+
+
+@quietly
+def elementwise(operation: Elementwise, *balls: Ball) -> Ball:
+    """operation(mid, radius, mid, radius, ...) of each number; on all cores where there are many.
+
+    All have one shape, or one number stands for all, or the result is computed at once.
+    """
+    count = max(ball.radius.size for ball in balls)
+    if count <= CHUNK or any(ball.radius.size not in (1, count) for ball in balls):
+        operands = (part for ball in balls for part in (ball.mid, ball.radius))
+        return Ball(*_finished(*operation(*operands)))
+    shape = np.broadcast_shapes(*(ball.shape for ball in balls))
+    flat = [ball if ball.radius.size == 1 else _flat(ball) for ball in balls]
+    high, low, radius = np.empty((3, count))
+
+    def compute(some: slice) -> None:
+        parts = (ball if ball.radius.size == 1 else ball[some] for ball in flat)
+        with np.errstate(all="ignore"):
+            found = _finished(*operation(*(x for ball in parts for x in (ball.mid, ball.radius))))
+        (high[some], low[some]), radius[some] = found
+
+    threads.each(compute, threads.chunks(count, CHUNK), threads.worthwhile(count))
+    return Ball(Pair(high.reshape(shape), low.reshape(shape)), radius.reshape(shape))
+
+
+def _flat(ball: Ball) -> Ball:
+    return Ball(Pair(ball.mid.high.ravel(), ball.mid.low.ravel()), ball.radius.ravel())
+
+
+def _finished(mid: Pair, radius: Array) -> tuple[Pair, Array]:
+    """With an infinite radius where a number is none; the radius counts the midpoint's rounding."""
+    high, low, radius = np.asarray(mid.high), np.asarray(mid.low), np.asarray(radius)
+    if math.isfinite(radius.sum()):
+        return Pair(high, low), radius
+    bad = ~np.isfinite(high + low)
+    high, low = np.where(bad, 0.0, high), np.where(bad, 0.0, low)
+    return Pair(high, low), np.where(bad | np.isnan(radius), np.inf, radius)
+
+
+def _sum(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
+    total = x + y
+    return total, (dx + dy + _lost(total)) * UP
+
+
+def _product(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
+    """|x y - X Y| <= (|X| + dx) dy + dx |Y|; what is exactly 0 makes 0, whatever the other is."""
+    product = x * y
+    radius = np.fmax((np.abs(x.high) + dx) * dy, 0.0) + np.fmax(dx * np.abs(y.high), 0.0)
+    return product, (radius * UP + _lost(product)) * UP
+
+
+def _quotient(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
+    """x/y - X/Y = ((x - X) - (X/Y) (y - Y)) / y."""
+    quotient = x / y
+    least = np.abs(y.high) * (2.0 - UP) - dy
+    radius = (dx + np.fmax(np.abs(quotient.high) * UP * dy, 0.0) + TINY) / least
+    return quotient, np.where(least > 0, (radius * UP + _lost(quotient)) * UP, np.inf)
+
+
+def _root(power: Callable[[Pair], Pair], plain: Callable[[Array], Array]) -> Elementwise:
+    """A concave power f of positive parts: |f(x) - f(m)| <= r f(m) / m, f(r)."""
+
+    def root(x: Pair, dx: Array) -> tuple[Pair, Array]:
+        safe, above = positive(x)
+        found = power(safe)
+        slope = found.high / safe.high
+        if safe is not x:
+            found = Pair(*(np.where(above, part, 0.0) for part in found))
+        return found, (rise(x, dx, dx * slope, plain) + TINY * slope + 2.0 * _lost(found)) * UP
+
+    return root
+
+
+def positive(x: Pair) -> tuple[Pair, NDArray[np.bool_]]:
+    """The numbers themselves, with 1 for those that are not positive; and where they are."""
+    above = x.high > 0
+    if above.all():
+        return x, above
+    return Pair(np.where(above, x.high, 1.0), np.where(above, x.low, 0.0)), above
+
+
+def rise(x: Pair, dx: Array, steep: Array, power: Callable[[Array], Array]) -> Array:
+    """Bounds on |f(x) - f(m)| of a concave power of positive parts: `steep` is dx f(m) / m."""
+    wide = dx > x.high
+    if not wide.any():
+        return steep
+    flat = power(np.where(x.high + dx * UP > 0, dx, 0.0)) * UP
+    return np.where(wide, np.where(x.high > 0, np.fmin(steep, flat), flat), steep)
+
+
+def _lost(result: Pair) -> Array:
+    """Above what one operation on pairs loses."""
+    return np.asarray(PAIR_ROUNDOFF * np.abs(result.high) + TINY)

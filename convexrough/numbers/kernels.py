@@ -1,0 +1,35 @@
+"""The formula that is evaluated most, with one running bound instead of a ball per operation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.numbers.balls import TINY, UP, Ball, elementwise, positive, rise
+from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, two_product, two_sum
+
+
+def residual(k: Ball, loads: Ball, displacement: Ball, depth: Ball) -> Ball:
+    """k P^(2/3) + v - D of each asperity; loads below 0 count as 0."""
+    return elementwise(_residual, k, loads, displacement, depth)
+
+
+def _residual(
+    k: Pair, dk: Array, P: Pair, dP: Array, v: Pair, dv: Array, D: Pair, dD: Array
+) -> tuple[Pair, Array]:
+    """The sum of low parts loses some 20 squared roundoffs of the sizes, all else fewer than 64."""
+    safe, loaded = positive(P)
+    power = safe.two_thirds()
+    slope = power.high / safe.high
+    local, rest = two_product(k.high, power.high)
+    rest = rest + (k.high * power.low + k.low * power.high)
+    if safe is not P:
+        local, rest = local * loaded, rest * loaded
+    total, first = two_sum(local, v.high)
+    total, second = two_sum(total, -D.high)
+    mid = Pair(*two_sum(total, (first + second) + ((rest + v.low) - D.low)))
+    sizes = np.abs(local) + (np.abs(v.high) + np.abs(D.high))
+    off = rise(P, dP, dP * slope, lambda x: np.cbrt(x) ** 2)
+    radius = (np.abs(k.high) + dk) * off + dk * power.high
+    lost = PAIR_ROUNDOFF * sizes + TINY * (1.0 + np.abs(k.high) * slope)
+    return mid, (radius * UP + (dv + dD) + lost) * UP

@@ -1,1 +1,0 @@
-"""Any load path, and frictional shakedown: what varies when the normal load varies too."""

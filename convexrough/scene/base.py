@@ -1,0 +1,64 @@
+"""The shape of the body that is pressed on asperities: sphere, ellipsoid, cylinder or flat.
+
+It is the paraboloid x^2 / (2 Rx) + y^2 / (2 Ry) about the axis. A sphere has one radius R, of which
+inf is a flat; an ellipsoid the pair (Rx, Ry), of which one is inf for a cylinder.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+from convexrough import checks
+from convexrough.errors import InputError
+
+#: R of a sphere, or (Rx, Ry) where they differ.
+Radius: TypeAlias = float | tuple[float, float]
+
+
+def checked(radius: Any) -> Radius:
+    """The radius of a sphere, or of a flat, inf; the pair of any other."""
+    if not isinstance(radius, (tuple, list)):
+        return _length("sphere_radius", radius)
+    if len(radius) != 2:
+        expected = "a number, or the two radii of an ellipsoid, along x and along y"
+        raise InputError("sphere_radius", found=repr(radius)[:60], expected=expected)
+    along_x, along_y = (_length(f"sphere_radius[{i}]", each) for i, each in enumerate(radius))
+    return along_x if along_x == along_y else (along_x, along_y)
+
+
+def along(radius: Radius) -> tuple[float, float]:
+    """Rx and Ry."""
+    return radius if isinstance(radius, tuple) else (radius, radius)
+
+
+def curved(radius: Radius) -> list[tuple[float, slice]]:
+    """Each finite radius, and the axes (0 is x, 1 is y) along which the base has it.
+
+    So its height is the sum of |the part of r along these axes|^2 / (2 R) over them.
+    """
+    parts = [(R, slice(i, i + 1)) for i, R in enumerate(along(radius))]
+    if not isinstance(radius, tuple):
+        parts = [(radius, slice(0, 2))]
+    return [(R, axes) for R, axes in parts if math.isfinite(R)]
+
+
+def named(radius: Radius) -> str:
+    """What it is."""
+    if not curved(radius):
+        return "a flat base"
+    if not isinstance(radius, tuple):
+        return "a sphere"
+    return "a cylinder" if math.inf in radius else "an ellipsoid"
+
+
+def sphere_radius(radius: Radius, what: str) -> float:
+    """R of a sphere, for what has a meaning on no other base."""
+    if isinstance(radius, tuple) or not curved(radius):
+        raise InputError(what, found=named(radius), expected="a scene whose base is a sphere")
+    return radius
+
+
+def _length(what: str, value: Any) -> float:
+    """A positive number, or inf."""
+    return math.inf if value == math.inf else checks.positive(what, value)

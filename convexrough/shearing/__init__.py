@@ -1,1 +1,0 @@
-"""Shear along one direction (Ciavarella and Jaeger): states, cycles, histories."""

@@ -1,0 +1,48 @@
+"""A smooth ellipsoid on a half-space: Hertz's ellipse of contact, by Carlson's integrals.
+
+The pressure p0 sqrt(1 - x^2/a^2 - y^2/b^2) moves the surface under it by p0 a b / (2 E*) times the
+integral over w > 0 of (1 - x^2/(a^2 + w) - y^2/(b^2 + w)) / sqrt((a^2 + w)(b^2 + w) w). That has to
+be delta - x^2/(2 Rx) - y^2/(2 Ry); with p0 a b = 3 P / (2 pi) it is, if
+
+    1/Rx = (P / (pi E*)) R_D(0, b^2, a^2),     1/Ry = (P / (pi E*)) R_D(0, a^2, b^2),
+    delta = (3 P / (2 pi E*)) R_F(0, a^2, b^2).
+
+Source: Johnson, Contact Mechanics (1985), 3.5 and 4.2; the integrals: DLMF 19.16.
+"""
+
+from __future__ import annotations
+
+import math
+
+
+def slenderness(ratio: float) -> float:
+    """b / a <= 1 of the ellipse whose radii are in this ratio, Rx / Ry >= 1."""
+    from scipy.optimize import brentq
+    from scipy.special import elliprd
+
+    def excess(log: float) -> float:
+        q = math.exp(2.0 * log)
+        return math.log(elliprd(0.0, 1.0, q) / elliprd(0.0, q, 1.0) / ratio)
+
+    # The ratio is 1 at b = a, and above Rx / Ry at b / a = Ry / Rx.
+    return 1.0 if ratio == 1.0 else math.exp(brentq(excess, -math.log(ratio), 0.0, xtol=1e-15))
+
+
+def semi_axes(
+    load: float, contact_modulus: float, radii: tuple[float, float]
+) -> tuple[float, float]:
+    """a along x and b along y [length]."""
+    from scipy.special import elliprd
+
+    largest = max(radii)
+    q = slenderness(largest / min(radii))
+    a = math.cbrt(load * largest / (math.pi * contact_modulus) * float(elliprd(0.0, q * q, 1.0)))
+    return (a, q * a) if radii[0] == largest else (q * a, a)
+
+
+def approach(load: float, contact_modulus: float, axes: tuple[float, float]) -> float:
+    """delta [length], of two deep points, one in each body."""
+    from scipy.special import elliprf
+
+    a, b = axes
+    return 1.5 * load / (math.pi * contact_modulus) * float(elliprf(0.0, a * a, b * b))

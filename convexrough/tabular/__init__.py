@@ -1,0 +1,1 @@
+"""Tables and names of units as people have them: text, arrays and workbooks."""

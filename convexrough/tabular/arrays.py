@@ -1,0 +1,139 @@
+"""Arrays in .npy, .npz, MATLAB's .mat and Parquet files."""
+
+from __future__ import annotations
+
+import csv
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from tokenize import TokenError
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.errors import ConvexroughError, FileError
+
+Columns = dict[str, list[Any]]
+
+#: Endings of files of arrays.
+ARRAYS = (".npy", ".npz", ".mat", ".parquet")
+
+#: What the readers of files raise besides OSError, in files that are not what they are named.
+SPOILED = (
+    *(ValueError, TypeError, EOFError, SyntaxError, KeyError, OverflowError, RuntimeError),
+    *(IndexError, AttributeError, NotImplementedError, MemoryError),
+    *(zipfile.BadZipFile, zlib.error, struct.error, csv.Error, TokenError),
+)
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Everything that keeps a file from being read, as a FileError."""
+    try:
+        yield
+    except ConvexroughError:
+        raise
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: not UTF-8 text, at byte {error.start}") from error
+    except UnicodeError as error:
+        raise FileError(f"{path}: not text: {error}") from error
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except SPOILED as error:
+        raise FileError(f"{path}: not an {path.suffix} file: {error}") from error
+
+
+@contextmanager
+def foreign() -> Iterator[None]:
+    """Whatever another package raises on a spoiled file, as a ValueError."""
+    try:
+        yield
+    except OSError:
+        raise
+    except Exception as error:
+        raise ValueError(str(error)) from error
+
+
+def needed(path: Path, package: str) -> Any:
+    """A package that reads such files. Raises FileError where it is not installed."""
+    try:
+        return import_module(package)
+    except ImportError as error:
+        name = package.partition(".")[0]
+        raise FileError(f"{path}: needs {name}: pip install {name}") from error
+
+
+def named_arrays(path: Path) -> dict[str, Any]:
+    """What a file holds by name; under "" where it has none."""
+    if path.suffix.lower() == ".mat":
+        return _matlab(path)
+    if path.suffix.lower() == ".parquet":
+        return _parquet(path)
+    with path.open("rb") as raw:
+        loaded = np.load(raw, allow_pickle=False)
+        if isinstance(loaded, np.ndarray):
+            return {"": loaded}
+        with loaded:
+            return {name: np.asarray(loaded[name]) for name in loaded.files}
+
+
+def read_arrays(path: Path, known: Sequence[str]) -> Columns:
+    """Columns by name; by number, from "1", where they have none.
+
+    known : names that may be wanted, in lower case; of others only those as long as these are kept
+
+    Raises FileError where what reads such files is not installed, OSError, and SPOILED.
+    """
+    named = named_arrays(path)
+    (first, values), *others = named.items() or [("", np.zeros(0))]
+    alone = values.ndim > 1 and min(values.shape) > 1 if isinstance(values, np.ndarray) else False
+    if not others and (alone or not first or first.startswith("arr_")):
+        columns = _table(np.asarray(values))
+    else:
+        vectors = {name: np.atleast_1d(np.squeeze(each)) for name, each in named.items()
+                   if isinstance(each, np.ndarray) and each.ndim}  # fmt: skip
+        columns = {name: each.tolist() for name, each in vectors.items() if each.ndim == 1}
+    wanted = [name for name in columns if name.lower() in known] or list(columns)
+    lengths = {len(columns[name]) for name in wanted}
+    if len(lengths) > 1:
+        raise ValueError(f"arrays of lengths {sorted(lengths)}")
+    return {name: values for name, values in columns.items() if len(values) in lengths}
+
+
+def _table(values: NDArray[Any]) -> Columns:
+    """Columns of a record array, of a matrix, or the one that a vector is."""
+    if values.dtype.names:
+        return {name: np.atleast_1d(values[name]).tolist() for name in values.dtype.names}
+    if values.ndim > 2:
+        raise ValueError(f"{values.ndim} dimensions")
+    return {str(i + 1): column.tolist() for i, column in enumerate(np.atleast_2d(values.T))}
+
+
+def _matlab(path: Path) -> dict[str, Any]:
+    """The variables of a file, or the fields of the structure that is its only one."""
+    from scipy.io import loadmat  # 0.1 s to import: only when there is such a file
+
+    with path.open("rb") as raw:
+        if b"\x89HDF" in raw.read(1024):
+            raise FileError(f"{path}: MATLAB's version 7.3, which is HDF5; save(..., '-v7')")
+    with foreign():
+        found = loadmat(str(path), appendmat=False, simplify_cells=True)
+    named = {name: each for name, each in found.items() if not name.startswith("__")}
+    if len(named) == 1 and isinstance(only := next(iter(named.values())), dict):
+        named = only
+    return named
+
+
+def _parquet(path: Path) -> dict[str, Any]:
+    needed(path, "pyarrow")
+    from pyarrow import parquet
+
+    with path.open("rb") as raw, foreign():
+        read = parquet.read_table(raw)
+        columns = {name: read.column(name).to_pylist() for name in read.column_names}
+    return {name: np.array(column, dtype=object) for name, column in columns.items()}

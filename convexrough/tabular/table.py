@@ -1,0 +1,387 @@
+"""Columns of numbers from files of every kind, in a scene's units, with every mistake's line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array
+from convexrough.errors import InputError, TableError
+from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
+from convexrough.tabular.text import bare, read_text_table, unit
+from convexrough.tabular.units import NAMELESS, Unit, UnitNames, known_unit
+
+#: What numbers of columns measure.
+KINDS = {
+    **dict.fromkeys(("x", "y", "height", "tip_radius"), "length"),
+    **dict.fromkeys(("load", "force"), "force"),
+    "pressure": "pressure",
+    "area": "area",
+}
+
+#: Columns of positive numbers.
+POSITIVE = ("tip_radius", "area")
+
+#: Names of columns that number the rows.
+INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "asperity", "")
+
+#: Mistakes of one file that are shown; the rest are counted.
+MOST_MISTAKES = 10
+
+#: Characters of a line that are shown.
+MOST_SHOWN = 60
+
+#: A column that is not read must not be named almost like one that is wanted and is missing.
+LOOKS_LIKE = 0.75
+
+#: Relative difference of two factors that are the same.
+SAME = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How columns are read.
+
+    columns : what they are called in the file;  scales : what their numbers are multiplied by
+    units   : the scene's;  convert : columns whose header names another unit, which is refused else
+    scalable : there is an option --scale, which messages may name
+    alike   : columns that measure the same have one unit, also where the scene names none
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict, hash=False)
+    scales: Mapping[str, float] = field(default_factory=dict, hash=False)
+    units: UnitNames = NAMELESS
+    convert: bool = False
+    scalable: bool = False
+    alike: bool = True
+
+
+AS_IT_IS = Reading()
+
+
+def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> dict[str, str]:
+    """What columns are called, by what they are; either may be said first."""
+    named = {}
+    for one, other in given.items():
+        name, column = (one, other) if one in known or other not in known else (other, one)
+        if name not in known or not column:
+            expected = f"NAME=COLUMN, where NAME is one of {', '.join(known)}"
+            raise InputError(what, found=f"{one}={other}", expected=expected)
+        named[name] = column
+    return named
+
+
+class Table(NamedTuple):
+    """Columns of a file by what they are read as, and how it was read.
+
+    columns : numbers, or text where it was asked for
+    rows    : what each row is called in messages;  lines : its text, "" where there is none
+    units   : of columns whose header names one;  style : how text was read, "" where it was none
+    called  : the header of each column that is read;  others : headers of those that are not
+    factors : what columns were multiplied by, where that is not 1
+    indices : columns of whole numbers with the name of an index
+    """
+
+    columns: dict[str, NDArray[Any]]
+    rows: list[str]
+    lines: list[str]
+    units: dict[str, str]
+    style: str
+    called: dict[str, str]
+    others: list[str]
+    factors: dict[str, float]
+    indices: dict[str, NDArray[np.intp]]
+
+    def mistake(self, row: int, what: str) -> str:
+        """A mistake in a row, with its line."""
+        return _shown(f"{self.rows[row]}{what}", self.lines[row])
+
+
+class _Source(NamedTuple):
+    """Cells of a file, by column; no header: named by number, from 1."""
+
+    header: list[str] | None
+    columns: list[Sequence[Any]]
+    rows: list[str]
+    lines: list[str]
+    style: str
+    number: Callable[[Any], float | None]
+    numbers: Callable[[Sequence[Any]], Array | None]
+    mistakes: list[str]
+
+
+def read_table(
+    path: Path,
+    *,
+    required: Sequence[str],
+    optional: Sequence[str] = (),
+    text: Sequence[str] = (),
+    instead: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    also: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    holes: Sequence[str] = (),
+    unnamed: Sequence[Sequence[str]] = (),
+    how: Reading = AS_IT_IS,
+) -> Table:
+    """Columns of a file with a header; others in it are not looked at.
+
+    required, optional, text : what is read, the last as text, and only where it is there
+    instead : what is read in place of a required one where the first of these is there
+    also  : other names of columns;  holes : columns in which nan and empty cells are nan
+    unnamed : what is meant where there is no header, and as many columns
+
+    Raises FileError where it cannot be read, and TableError with all that is wrong in it.
+    """
+    wanted = (*required, *optional, *text, *(each for names in instead.values() for each in names))
+    with reading(path):
+        source = _source(path, [*wanted, *INDEX[:-1], *(c.lower() for c in how.columns.values())])
+    if unnamed and source.header is None and len(source.rows) == 1 and len(source.columns) > 3:
+        source = _upright(source)
+    places, mistakes = _places(source, wanted, how.columns, unnamed)
+    for name, names in also.items():
+        known = [bare(each).lower() for each in source.header or []]
+        if name not in places and (there := [each for each in names if each in known]):
+            places[name] = known.index(there[0])
+    for name, others in instead.items():
+        if name not in places and others[0] in places:
+            required = [each for each in required if each != name]
+        else:
+            places = {each: place for each, place in places.items() if each not in others}
+    missing = [name for name in required if name not in places]
+    advice = "; --column {0}=NAME names another" if how.scalable else ""
+    mistakes += [
+        f"columns: found {_named(source)}, expected a column {each!r}{advice.format(each)}"
+        for each in missing
+        if each not in how.columns
+    ]
+    mistakes += _lookalikes(source, places, [*missing, *optional])
+    if not source.rows and not mistakes:
+        mistakes = ["rows: found none below the header, expected at least one"]
+    if missing or not source.rows:
+        raise TableError(str(path), few([*mistakes, *source.mistakes]))
+    names = source.header or [""] * len(source.columns)
+    units = {name: said for name, place in places.items() if (said := unit(names[place]))}
+    factors, wrong = _factors([name for name in places if name in KINDS], units, how)
+    mistakes += wrong
+    read: dict[str, NDArray[Any]] = {}
+    for name, place in places.items():
+        cells = source.columns[place]
+        if name in text:
+            read[name] = np.array([str(cell) for cell in cells])
+        else:
+            numbers = _numbers(name, cells, source, mistakes, name in holes)
+            read[name] = numbers * factors.get(name, 1.0)
+    if mistakes := [*mistakes, *source.mistakes]:
+        raise TableError(str(path), few(mistakes))
+    rest = [i for i in range(len(names)) if i not in places.values()]
+    return Table(
+        read,
+        source.rows,
+        source.lines,
+        units,
+        source.style,
+        {name: names[place] or str(place + 1) for name, place in places.items()},
+        [names[i] for i in rest if names[i]],
+        factors,
+        {names[i]: whole for i in rest if source.header and bare(names[i]).lower() in INDEX
+         if (whole := _whole(source, i)) is not None},
+    )  # fmt: skip
+
+
+def _factors(
+    names: Sequence[str], units: Mapping[str, str], how: Reading
+) -> tuple[dict[str, float], list[str]]:
+    """What columns are multiplied by to be in the scene's units, and what is wrong with these."""
+    factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
+    first: dict[str, tuple[str, Unit]] = {}
+    for name in names:
+        kind, said, place = KINDS[name], units.get(name, ""), f"column {name}"
+        scene = how.units.unit(kind)
+        if name in how.scales and (scene is None or not said):
+            continue
+        ways = [f"--scale {name}={{}}"] if how.scalable else []
+        try:
+            found = known_unit(place, said, kind)
+        except InputError as error:
+            if (scene is None and "a unit of" not in str(error.found)) or name in how.scales:
+                continue  # what is in brackets need not be a unit
+            taken = f", or {ways[0].format('1')} to take the numbers as they are" if ways else ""
+            mistakes.append(f"{error}{taken}")
+            continue
+        other, wanted = first.setdefault(kind, (name, found)) if found else ("", None)
+        if found is None or wanted is None:
+            continue
+        if scene is None:
+            if how.alike and found.size != wanted.size:
+                mistakes.append(f"{place}: found {said}, expected {units[other]}, as {other}")
+            continue
+        factor = found.into(scene)
+        given = how.scales.get(name)
+        if given is not None and abs(abs(given) / factor - 1) > SAME:
+            mistakes.append(f"{place}: found a factor {given:g}, expected {factor:.15g}, as {said} "
+                            f"are {factor:.15g} {scene.name}")  # fmt: skip
+        elif given is None and factor != 1 and how.convert:
+            factors[name] = factor
+        elif given is None and factor != 1:
+            ways = [each.format(f"{factor:.15g}") for each in ways]
+            advice = " or ".join([*ways, "convert = true in [units] of the scene"])
+            mistakes.append(f"{place}: found {said}, expected {scene.name}, the scene's unit; "
+                            f"1 {said} is {factor:.15g} {scene.name}: {advice}")  # fmt: skip
+    for name in names:
+        there = first.get(KINDS[name])
+        if there and there[0] in factors and name not in units and name not in how.scales:
+            mistakes.append(f"column {name}: found no unit, expected one, as {there[0]} has")
+    return factors, mistakes
+
+
+def _whole(source: _Source, place: int) -> NDArray[np.intp] | None:
+    """A column of whole numbers that are not negative, and nothing else."""
+    values = [source.number(cell) for cell in source.columns[place]]
+    if all(value is not None and value >= 0 and value == value // 1 < 2**53 for value in values):
+        return np.array(values).astype(np.intp)
+    return None
+
+
+def _source(path: Path, known: Sequence[str]) -> _Source:
+    """Everything in a file, by its kind."""
+    if path.suffix.lower() in ARRAYS:
+        arrays = read_arrays(path, known)
+        count = len(next(iter(arrays.values()), []))
+        return _Source(
+            header=None if "1" in arrays else list(arrays),
+            columns=list(arrays.values()),
+            rows=[f"entry {i}" for i in range(count)],
+            lines=[""] * count,
+            style="",
+            number=_as_number,
+            numbers=lambda cells: None,
+            mistakes=[],
+        )
+    table = read_text_table(path, known)
+    width = len(table.header) if table.header else max(len(row.cells) for row in table.rows)
+    mistakes = []
+    for row in table.rows:
+        if row.wrong or len(row.cells) != width:
+            expected = f"{width}, as in {'the header' if table.header else 'most rows'}"
+            what = row.wrong or f"found {len(row.cells)} cells, expected {expected}"
+            mistakes.append(_shown(f"row {row.number}: {what}", row.text))
+    whole = [row for row in table.rows if len(row.cells) == width]
+    return _Source(
+        header=table.header,
+        columns=[[row.cells[i] for row in whole] for i in range(width)],
+        rows=[f"row {row.number}" for row in whole],
+        lines=[row.text for row in whole],
+        style=str(table.style) if width > 1 or table.style.decimal == "," else "",
+        number=table.style.number,
+        numbers=table.style.numbers,
+        mistakes=mistakes,
+    )
+
+
+def _upright(source: _Source) -> _Source:
+    """A single line of numbers as a single column."""
+    cells = [column[0] for column in source.columns]
+    rows = [f"{source.rows[0]}, cell {i + 1}" for i in range(len(cells))]
+    return source._replace(columns=[cells], rows=rows, lines=[str(cell) for cell in cells])
+
+
+def _places(
+    source: _Source,
+    wanted: Sequence[str],
+    columns: Mapping[str, str],
+    unnamed: Sequence[Sequence[str]],
+) -> tuple[dict[str, int], list[str]]:
+    """The column of each name that is there, and what is wrong with the names."""
+    names = source.header
+    if names is None:
+        nameless = [""] * len(source.columns)
+        names = next((list(each) for each in unnamed if len(each) == len(nameless)), nameless)
+        names = nameless if columns else names
+    bared = [bare(name) for name in names]
+    places: dict[str, int] = {}
+    mistakes: list[str] = []
+    for name in wanted:
+        called = columns.get(name, name)
+        for known in (names, bared, [each.lower() for each in bared]):
+            if count := known.count(called):
+                places[name] = known.index(called)
+                if count > 1:
+                    mistakes.append(f"columns: found {called!r} twice, expected once")
+                break
+        else:
+            if name not in columns:
+                continue
+            if called.isdecimal() and 1 <= int(called[:9]) <= len(names):
+                places[name] = int(called) - 1
+            else:
+                mistakes.append(f"columns: found {_named(source)}, expected a column {called!r}")
+    return places, mistakes
+
+
+def _lookalikes(source: _Source, places: Mapping[str, int], wanted: Sequence[str]) -> Iterator[str]:
+    """Columns that are not read, and look like one that is wanted and is not there."""
+    from difflib import SequenceMatcher  # only when a column is not there
+
+    for i, name in enumerate(source.header or []):
+        for each in (each for each in wanted if each not in places and i not in places.values()):
+            if SequenceMatcher(None, bare(name).lower(), each).ratio() > LOOKS_LIKE:
+                expected = f'a known column; did you mean "{each}"?'
+                yield f"columns: found {bare(name)!r}, expected {expected}"
+
+
+def _named(source: _Source) -> str:
+    if source.header is None:
+        return f"no header and {len(source.columns)} columns"
+    return _cut(", ".join(source.header))
+
+
+def _numbers(
+    name: str, cells: Sequence[Any], source: _Source, mistakes: list[str], holes: bool
+) -> Array:
+    """The cells of a column; what is wrong with them goes to the mistakes."""
+    if (plain := source.numbers(cells)) is not None:
+        sizes = np.abs(plain)
+        fine = (sizes >= checks.SMALLEST) & (sizes <= checks.LARGEST) | (sizes == 0)
+        if (fine & (plain > 0) if name in POSITIVE else fine).all():
+            return plain
+    check = checks.positive if name in POSITIVE else checks.finite
+    numbers = np.full(len(cells), np.nan)
+    for i, cell in enumerate(cells):
+        number = source.number(cell)
+        if holes and (cell == "" or (number is not None and math.isnan(number))):
+            continue
+        place = f"{source.rows[i]}, column {name}"
+        try:
+            if number is None:
+                raise InputError(place, found=_cut(repr(cell)), expected="a finite number")
+            numbers[i] = check(place, number)
+        except InputError as error:
+            mistakes.append(_shown(str(error), source.lines[i]))
+    return numbers
+
+
+def _as_number(cell: Any) -> float | None:
+    return float(cell) if isinstance(cell, (int, float)) and not isinstance(cell, bool) else None
+
+
+def _shown(mistake: str, line: str) -> str:
+    return f"{mistake}: {_cut(line)}" if line else mistake
+
+
+def _cut(text: str) -> str:
+    text = "".join(each if each.isprintable() else " " for each in text[: MOST_SHOWN + 1])
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+
+
+def few(mistakes: list[str], most: int = MOST_MISTAKES) -> list[str]:
+    """The first mistakes, and how many there are besides."""
+    if (more := len(mistakes) - most) > 0:
+        return [*mistakes[:most], f"and {more:,} more mistakes"]
+    return mistakes

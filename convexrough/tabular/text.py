@@ -1,0 +1,306 @@
+"""Text of numbers as people have it: separators, decimal commas, comments, titles, encodings.
+
+Readers that do this exist. Those that are light (csv.Sniffer, numpy.loadtxt) know neither decimal
+commas nor D exponents; those that are not (pandas, polars) stop at the first mistake and do not
+show its line. So the standard library splits the lines, and what is here chooses how.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from gzip import GzipFile
+from io import BufferedReader, TextIOWrapper
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.errors import FileError
+from convexrough.tabular.arrays import foreign, needed
+from convexrough.tabular.units import parsed
+
+#: Characters of a line; a longer one is no table.
+LONGEST = 2**24
+
+#: Characters of a number, and of a column's name with its unit; longer ones are neither.
+LONGEST_NUMBER, LONGEST_NAME = 400, 400
+
+#: Endings of Excel's workbooks.
+WORKBOOKS = (".xlsx", ".xlsm")
+
+#: Lines from which separator and decimal mark are chosen.
+SAMPLE = 200
+
+_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
+_SURROGATE = re.compile("[\udc80-\udcff]")
+_WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])]|\s/\s*(?P<per>\S+))")
+_UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
+_BINARY = {
+    b"PK\x03\x04": "an archive or an Excel workbook; name it .xlsx",
+    b"MATLAB": "a MAT-file; name it .mat",
+    b"\x89HDF": "an HDF5 or MAT-file; save it as CSV",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook; save it as .xlsx",
+    b"\x93NUMPY": "a NumPy array; name it .npy",
+    b"PAR1": "a Parquet file; name it .parquet",
+}
+
+
+class Style(NamedTuple):
+    """How the cells of a line are told apart, and how their decimals are."""
+
+    separator: str
+    decimal: str
+
+    def __str__(self) -> str:
+        names = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
+        comma = ", decimal comma" if self.decimal == "," else ""
+        return f"separated by {names.get(self.separator, repr(self.separator))}{comma}"
+
+    def split(self, line: str) -> list[str]:
+        """The cells of a line. Raises csv.Error for quotes that do not end."""
+        if '"' not in line:  # three times as fast
+            return _split(line, self.separator)
+        if self.separator == " ":
+            line = " ".join(line.split())
+        reader = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
+        return [cell.strip() for cell in next(reader, [])]
+
+    def number(self, cell: str) -> float | None:
+        """What a cell says, with E or Fortran's D exponent; None where that is no number."""
+        if len(cell) > LONGEST_NUMBER:
+            return None
+        text = cell.replace("\N{MINUS SIGN}", "-")
+        if self.decimal == ",":
+            text = text.replace(",", ".") if "." not in text else ""
+        if found := _NUMBER.fullmatch(text):
+            mantissa, exponent, bare = found.groups()  # Fortran writes 1.0-105 for 1.0D-105
+            return float(f"{mantissa}e{exponent or bare or 0}")
+        return float(text) if text.lower().lstrip("+-") in ("nan", "inf", "infinity") else None
+
+    def numbers(self, cells: Sequence[str]) -> Array | None:
+        """What cells say where all are plain numbers, at once; else None."""
+        joined = "\n".join(cells)
+        if "_" in joined or (self.decimal == "," and "." in joined):
+            return None
+        try:
+            return np.array(joined.replace(self.decimal, ".").split("\n"), dtype=np.float64)
+        except ValueError:
+            return None
+
+
+#: In the order in which they are preferred where several would do.
+STYLES = [Style(*pair) for pair in (",.", ";.", ";,", "\t.", "\t,", " .", " ,")]
+
+
+def _split(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    return [cell.strip() for cell in line.split(separator)] if line else []
+
+
+class Row(NamedTuple):
+    """A line of a file: its number there, its text, and its cells; `wrong` if it has none."""
+
+    number: int
+    text: str
+    cells: list[str]
+    wrong: str = ""
+
+
+class TextTable(NamedTuple):
+    """The rows of a file below its header, which is None where it has none."""
+
+    header: list[str] | None
+    rows: list[Row]
+    style: Style
+
+
+def bare(name: str) -> str:
+    """The name of a column without its unit."""
+    found = _with_unit(name)
+    return found["name"] if found else name
+
+
+def unit(name: str) -> str:
+    """The unit that the name of a column has in brackets or after a slash, or ""."""
+    found = _with_unit(name)
+    return (found["unit"] or found["per"] or "").strip() if found else ""
+
+
+def _with_unit(name: str) -> re.Match[str] | None:
+    return _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
+
+
+def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
+    """The cells of a text file or workbook. Raises FileError where it is empty, or neither.
+
+    known : names of columns by which a header is known among titles, or in a comment above
+    """
+    lines: list[tuple[int, str]] = []
+    comment, separator = "", "\t" if path.suffix.lower() in WORKBOOKS else ""
+    for number, line in _workbook(path, known) if separator else lines_of(path):
+        text = line.strip("\r\n")
+        inner = text.strip()
+        if not lines and not separator and re.fullmatch(r"sep=.", inner):  # Excel
+            separator = inner[-1]
+        elif inner.startswith(("#", "%")):
+            comment = comment if lines else inner.lstrip("#%")
+        elif inner:
+            text = text if '"' in text else text.partition("#")[0]
+            lines.append((number, text if separator or "\t" in text else text.strip()))
+    if not lines:
+        raise FileError(f"{path}: empty")
+    styles = [Style(separator, mark) for mark in ".,"] if separator else STYLES
+    style = sniff([text for _, text in lines[:SAMPLE]], styles)
+    rows = [_row(number, text, style) for number, text in lines]
+    header, rows = _headed(rows, comment, style, known)
+    return TextTable(*_trimmed(header, rows, style), style)
+
+
+def _headed(
+    rows: list[Row], comment: str, style: Style, known: Sequence[str]
+) -> tuple[list[str] | None, list[Row]]:
+    """The names of columns, with the units of a line below them, and the rows below."""
+
+    def wanted(names: list[str]) -> int:
+        return sum(bare(name).lower() in known for name in names)
+
+    if _numeric(rows[0].cells, style):
+        named = _header(comment, style)
+        return (named if len(named) == len(rows[0].cells) and wanted(named) else None), rows
+    first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
+    headers = [_header(row.text, style) for row in rows[: min(first, SAMPLE)]]
+    place = max(range(len(headers)), key=lambda i: (wanted(headers[i]), -i))
+    header, rows = headers[place], rows[place + 1 :]
+    below = [cell.strip("[]() ") for cell in rows[0].cells] if rows else []
+    units = [each in ("", "-") or parsed(each) is not None for each in below]
+    if any(below) and all(units) and len(below) <= len(header):
+        header[: len(below)] = [f"{name} [{each}]" if each not in ("", "-") else name
+                                for name, each in zip(header, below, strict=False)]  # fmt: skip
+        rows = rows[1:]
+    return header, rows
+
+
+def lines_of(path: Path) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers, unpacked. Bytes that are not UTF-8 are taken for Latin-1."""
+    with path.open("rb") as packed:
+        is_packed = packed.peek(2)[:2] == b"\x1f\x8b"
+        raw: Any = BufferedReader(GzipFile(fileobj=packed)) if is_packed else packed
+        encoding = _encoding(path, raw)
+        number = 0
+        with TextIOWrapper(raw, encoding=encoding, errors="surrogateescape") as file:
+            while line := file.readline(LONGEST + 1):
+                number += 1
+                if len(line) > LONGEST:
+                    raise FileError(f"{path}: row {number}: longer than {LONGEST:,} characters")
+                if "\0" in line:
+                    raise FileError(f"{path}: row {number}: not text")
+                if _SURROGATE.search(line):
+                    line = line.encode("utf-8", "surrogateescape").decode("latin-1")
+                yield number, line
+
+
+def _workbook(path: Path, known: Sequence[str]) -> Iterator[tuple[int, str]]:
+    """Rows of the first sheet with a wanted column, or else of the first; cells between tabs."""
+    openpyxl = needed(path, "openpyxl")
+    with path.open("rb") as raw, foreign():
+        book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
+        pages = [
+            [["" if cell is None else _plain(str(cell)) for cell in row]
+             for row in page.iter_rows(values_only=True)]
+            for page in book.worksheets
+        ]  # fmt: skip
+    if not pages:
+        return
+
+    def wanted(page: list[list[str]]) -> bool:
+        return any(bare(cell).lower() in known for row in page[:SAMPLE] for cell in row)
+
+    for number, row in enumerate(next((page for page in pages if wanted(page)), pages[0]), 1):
+        yield number, "\t".join(row)
+
+
+def _plain(cell: str) -> str:
+    """On one line, without quotes."""
+    return " ".join(cell.replace('"', "").split())
+
+
+def _encoding(path: Path, raw: BufferedReader[Any]) -> str:
+    head = raw.peek(64)[:64]
+    for magic, what in _BINARY.items():
+        if head.startswith(magic):
+            raise FileError(f"{path}: not text: {what}")
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    if len(head) > 3 and not any(head[1::2]) and all(head[0::2]):
+        return "utf-16-le"
+    if len(head) > 3 and not any(head[0::2]) and all(head[1::2]):
+        return "utf-16-be"
+    return "utf-8-sig"
+
+
+def sniff(lines: Sequence[str], styles: Sequence[Style]) -> Style:
+    """The style in which most lines have equally many cells, and most of these are numbers."""
+
+    def score(style: Style) -> float:
+        rows = [_row(0, line, style) for line in lines]
+        body = rows[1:] or rows
+        width, _ = Counter(len(stripped(row.cells)) for row in body).most_common(1)[0]
+        equal = sum(len(stripped(row.cells)) == width for row in rows) / len(rows)
+        cells = [cell for row in body for cell in row.cells if cell]
+        numbers = sum(style.number(cell) is not None for cell in cells)
+        doubtful = style.decimal == "," in lines[0] and not _numeric(rows[0].cells, style)
+        return equal * numbers / max(1, len(cells)) * (0.5 if doubtful else 1.0)
+
+    return max(styles, key=score)
+
+
+def _row(number: int, text: str, style: Style) -> Row:
+    try:
+        return Row(number, text, style.split(text))
+    except csv.Error as error:
+        return Row(number, text, [], str(error))
+
+
+def _header(text: str, style: Style) -> list[str]:
+    """Names of columns; a unit after a space stays with its name."""
+    row = _row(0, _UNIT_APART.sub("", text) if style.separator == " " else text, style)
+    return row.cells or [text]
+
+
+def _numeric(cells: Sequence[str], style: Style) -> bool:
+    return all(style.number(cell) is not None for cell in cells if cell)
+
+
+def stripped(cells: list[str]) -> list[str]:
+    """Without the empty cells that separators at the end of a line make."""
+    end = len(cells)
+    while end and not cells[end - 1]:
+        end -= 1
+    return cells[:end]
+
+
+def _trimmed(
+    header: list[str] | None, rows: list[Row], style: Style
+) -> tuple[list[str] | None, list[Row]]:
+    """Without separators at the ends of lines, and with a name for the row names that R writes."""
+    if header is None:
+        width = max((len(stripped(row.cells)) for row in rows), default=0)
+    else:
+        header = stripped(header)
+        width = len(header)
+        longer = [row.cells for row in rows if len(stripped(row.cells)) == width + 1]
+        if style.separator in " \t" and longer and len(longer) == len(rows):
+            count = {style.number(cells[0]) for cells in longer}
+            if count in ({*range(len(rows))}, {*range(1, len(rows) + 1)}):
+                header, width = ["", *header], width + 1
+    return header, [
+        row
+        if len(row.cells) <= width
+        else row._replace(cells=[*row.cells[:width], *stripped(row.cells[width:])])
+        for row in rows
+    ]

@@ -1,0 +1,132 @@
+"""Names of units: what they measure, and how large they are. Exact, as fractions of SI."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from typing import NamedTuple
+
+from convexrough.checks import nearest
+from convexrough.errors import InputError
+
+
+class Unit(NamedTuple):
+    """size : in SI;  length, force : the powers of these that it has;  name : as it is shown"""
+
+    size: Fraction
+    length: int
+    force: int
+    name: str = ""
+
+    @property
+    def kind(self) -> str:
+        """What it measures, "" where no column has that."""
+        return KINDS.get((self.length, self.force), "")
+
+    def __mul__(self, other: Unit) -> Unit:  # type: ignore[override]
+        return Unit(self.size * other.size, self.length + other.length, self.force + other.force)
+
+    def __pow__(self, power: int) -> Unit:
+        return Unit(self.size**power, power * self.length, power * self.force)
+
+    def into(self, other: Unit) -> float:
+        """What a number of this unit is multiplied by to be of the other; rounded once."""
+        return float(self.size / other.size)
+
+
+KINDS = {(1, 0): "length", (2, 0): "area", (0, 1): "force", (-2, 1): "pressure"}
+
+_PREFIXES = {"G": 9, "M": 6, "k": 3, "": 0, "c": -2, "m": -3, "µ": -6, "n": -9, "p": -12}
+_ONE = Unit(Fraction(1), 0, 0)
+
+#: By name, as shown: those with prefixes, then the others.
+UNITS = {
+    f"{prefix}{symbol}": Unit(Fraction(10) ** power, *powers, f"{prefix}{symbol}")
+    for symbol, powers in (("m", (1, 0)), ("N", (0, 1)), ("Pa", (-2, 1)))
+    for prefix, power in _PREFIXES.items()
+} | {
+    name: Unit(Fraction(size), *powers, name)
+    for name, size, powers in (
+        *(("Å", "1e-10", (1, 0)), ("in", "0.0254", (1, 0)), ("dyn", "1e-5", (0, 1))),
+        *(("kgf", "9.80665", (0, 1)), ("lbf", "4.4482216152605", (0, 1))),
+        *(("bar", "1e5", (-2, 1)), ("psi", "6894.757293168361", (-2, 1))),
+    )
+}
+
+#: Other names of units; u for µ is understood.
+_ALSO = {"A": "Å", "Angstrom": "Å", "micron": "µm", "microns": "µm", "kp": "kgf"}
+_FACTOR = re.compile(r"(.*?)(?:\^|\*\*)?([+-]?\d)?")
+_POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
+
+
+def parsed(name: str) -> Unit | None:
+    """The unit of a name such as µm, N/mm² or kPa; None where it is none."""
+    if len(name) > 40:
+        return None
+    upper, *under = name.strip().translate(_POWERS).split("/")
+    found = _ONE
+    for part, sign in [(upper, 1), *((each, -1) for each in under)]:
+        for factor in re.split(r"\s+|·|\*(?!\*)", part.replace("**", "^").strip()):
+            symbol, power = _FACTOR.fullmatch(factor).groups()  # type: ignore[union-attr]
+            symbol = _ALSO.get(symbol, symbol)
+            if symbol not in UNITS:
+                symbol = re.sub("^u", "µ", symbol)
+            if symbol not in UNITS:
+                return None
+            found *= UNITS[symbol] ** (sign * int(power or 1))
+            shown = symbol
+    return found._replace(name=shown if name.strip().isalpha() else name.strip())
+
+
+def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:
+    """The unit of a kind by any of its names; None for none said. Raises InputError."""
+    if not name.strip():
+        return None
+    expected, unit = f"a unit of {kind}", parsed(name)
+    if unit is None:
+        near = nearest(name, [each for each, unit in UNITS.items() if unit.kind == kind])
+        raise InputError(what, found=repr(name), expected=f"{expected}; {near}", where=where)
+    if unit.kind != kind:
+        measures = f", a unit of {unit.kind}" if unit.kind else ""
+        raise InputError(what, found=f"{name}{measures}", expected=expected, where=where)
+    return unit
+
+
+def one_unit(what: str, given: str | None, found: str) -> Unit | None:
+    """The unit of length that the caller gives or the file names; never two."""
+    said, there = known_unit(what, given or ""), known_unit(what, found)
+    if said and there and said.size != there.size:
+        expected = f"{there.name}, as the file says, or none given"
+        raise InputError(what, found=said.name, expected=expected)
+    return said or there
+
+
+class UnitNames(NamedTuple):
+    """How a scene's units of length and force are called, "" where nobody says."""
+
+    length: str = ""
+    force: str = ""
+
+    def unit(self, kind: str) -> Unit | None:
+        """The scene's unit of a kind; None where it names none."""
+        length, force = (parsed(name) if name else None for name in self)
+        if kind == "area" and length:
+            return (length**2)._replace(name=f"{self.length}²")
+        if kind == "pressure" and length and force:
+            return (force * length**-2)._replace(name=self.pressure)
+        return {"length": length, "force": force}.get(kind)
+
+    @property
+    def pressure(self) -> str:
+        """The name of the unit of pressure, "" unless both are named."""
+        return f"{self.force}/{self.length}²" if self.length and self.force else ""
+
+
+NAMELESS = UnitNames()
+
+
+def force_of(pressure: Unit, length: Unit) -> str:
+    """The name of the force that a pressure on a square makes, as mN of GPa and µm; "" for none."""
+    made = pressure * length**2
+    names = [name for name, unit in UNITS.items() if unit[:3] == made[:3]]
+    return names[0] if names else ""

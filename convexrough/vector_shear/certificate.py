@@ -1,0 +1,289 @@
+r"""What is proved of a state of vector friction, whoever found it, in the order of the proof.
+
+Forces q and displacements are in own units; stars mark the state of the true loads P, which are
+balls. Every asperity i that is proved to touch obeys, with its ceiling k_i and the rise X,
+
+    eta_i = X - (B q)_i,    q_i = q(eta_i),    sum q = T,
+
+where q(eta) is along eta, of length P [1 - (1 - |eta|/k)^(3/2)], or P beyond the ceiling; it is the
+gradient of a convex function of eta. All other asperities together bear at most `stray`.
+
+1. The trial. Any eta is the displacement that exactly the forces q(eta) need on the true loads:
+   only the balance v_i = eta_i + (B q(eta))_i - X and the total are missed.
+2. The total. If sum q(eta) misses T by m, some s with |s| <= r makes sum q(eta + s) = T, where
+   r lambda(r) >= m and lambda(r) bounds from below the slope of this sum within r (`_shift`). On
+   the circle |s| = r the convex function less T.s rises outwards, so its minimum is inside.
+3. The residual of q' = q(eta + s), with the rise X + s, is e_i = |v_i + (B (q' - q))_i| and what
+   `stray` adds. A sliding component is P_i times a unit vector: on its face, with true loads.
+4. The theorem of `convex.theorem`:  || q* - q' ||_H <= || e ||_{H^-1} / mu,  h_i = 2 k_i / (3 P_i).
+5. The rise. eta*_i = eta_i + w_i + (X* - X) with w_i = -v_i - (B (q* - q))_i, so that |X* - X| is
+   an s as in step 2, for sums that w changes.
+6. Words. i slides where |eta*_i| > k_i for sure, and does not where |eta*_i| < k_i or |q*_i| < P_i.
+
+The energy E is convex: E(q) - E(q*) <= sum e_i |q_i - q*_i| + X.(sum q - T) of any forces q.
+docs/theory/friction-proofs.md has the slopes of step 2, and what is left close to gross sliding.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array
+from convexrough.convex.theorem import distance
+from convexrough.friction.levels import AT_THE_END
+from convexrough.numbers.balls import Ball, quietly
+from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
+from convexrough.vector_shear.loaded import Loaded
+from convexrough.vector_shear.problem import VectorProblem, VectorState, along
+
+#: Radii that are tried for step 2, each so much larger than the one before. Heuristics.
+TRIALS, WIDER = 24, 1.5
+
+#: Above the rounding of a unit vector, and of a share |eta| / k.
+ROUNDED = 8 * ROUNDOFF
+
+
+class VectorBounds(NamedTuple):
+    """Proved bounds on a state, in own units; infinite where nothing is proved.
+
+    increments, slips : (n,) |q - q*| and |slip - slip*|;  rise : |X - X*|
+    sliding, partial : (n,) proved to slide, and not to
+    excess : the energy of the forces above the least
+    """
+
+    proved: bool
+    increments: Array
+    slips: Array
+    rise: float
+    sliding: NDArray[np.bool_]
+    partial: NDArray[np.bool_]
+    excess: float = np.inf
+
+    @classmethod
+    def unproved(cls, n: int) -> VectorBounds:
+        """Nothing is known of n asperities."""
+        unknown, no = np.full(n, np.inf), np.zeros(n, dtype=bool)
+        return cls(False, unknown, unknown, np.inf, no, no)
+
+
+@quietly
+def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
+    """Bounds on a state of which increments, rise and slips are believed to be nothing.
+
+    total : (2,) T
+    """
+    known = problem.scalar
+    if known.scope == "none" or not known.sure.any():
+        return VectorBounds.unproved(len(problem))
+    found = VectorBounds.unproved(len(problem))
+    if np.isfinite(state.rise).all() and problem.margin > 0:
+        found = _by_convexity(problem, known, state, total)
+    if not (found.sliding | found.partial).all():
+        found = _merged(found, _by_exhaustion(problem, known, state, total))
+    return found._replace(excess=_excess(problem, state, total, found.increments))
+
+
+def _by_convexity(
+    problem: VectorProblem, known: Loaded, state: VectorState, total: Ball
+) -> VectorBounds:
+    """Steps 1 to 6."""
+    sure, softness = known.sure, known.softness
+    reach = problem.reach
+    limits, ceilings = known.held, known.ceiling_balls
+
+    # 1. The trial, and by how much it misses the balance and the total.
+    eta = state.rise - problem.couple(state.increments)
+    q = _forces(eta, limits, ceilings)
+    forces, blur = q.value.T, np.hypot(*q.error)
+    imbalance = (Ball.exact(eta) + problem.couple(forces) - state.rise).size
+    off = np.hypot(*imbalance.T)
+    off += problem.product_error * (known.influence.matrix @ np.hypot(*forces.T))
+    off = (off + reach @ blur + known.stray_effect * (1.0 + problem.bias)) * (1 + SAFETY)
+    missing = float(np.hypot(*(q.sum() - total).size)) + known.stray
+
+    # 2. The shift that restores the total.
+    size = np.hypot(*eta.T)
+    shift = _shift(problem, eta, np.zeros(len(eta)), missing)
+    if shift == np.inf:
+        return VectorBounds.unproved(len(eta))
+    moved = _steepest(known, size - shift) * shift
+
+    # 3. and 4. The residual, and the theorem.
+    residual = np.where(sure, off + reach @ moved, 0.0)
+    within = distance(residual, 1.0 / softness, problem.margin)
+    distances = within * np.sqrt(softness) + moved
+
+    # 5. The rise.
+    coupled = within * np.sqrt(reach**2 @ np.where(sure, softness, 0.0)) + reach @ moved
+    turned = (off + coupled) * (1 + SAFETY)
+    carried = float(np.where(sure, _steepest(known, size - turned) * turned, 0.0).sum())
+    rise = _shift(problem, eta, turned, (missing + carried) * (1 + SAFETY))
+
+    # 6. Words, and bounds for the state as it was given.
+    doubt = (turned + rise) * (1 + SAFETY) + ROUNDED * size
+    distances = np.fmin(distances, _steepest(known, size - doubt) * doubt) * (1 + SAFETY)
+    sliding = sure & (size - doubt > ceilings.upper)
+    bears_more = np.hypot(*forces.T) * (1 + ROUNDED) + blur + distances < limits.lower
+    partial = sure & ((size + doubt < ceilings.lower) | bears_more)
+    increments = distances + blur + np.hypot(*(forces - state.increments).T) * (1 + SAFETY)
+    increments = np.where(sure, increments, known.most + np.hypot(*state.increments.T))
+    # What a vector has beyond a disc changes by no more than the vector and the radius do.
+    slips = along(np.maximum(size - ceilings.value, 0.0), eta, size)
+    slip_errors = np.hypot(*(slips - state.slips).T) + doubt + ceilings.error
+    slip_errors = np.where(partial, np.hypot(*state.slips.T), np.where(sure, slip_errors, np.inf))
+    return VectorBounds(bool(np.isfinite(rise)), increments, slip_errors, rise, sliding, partial)
+
+
+def _forces(eta: Array, limits: Ball, ceilings: Ball) -> Ball:
+    """(2, n) q(eta):  with z the positive part of 1 - |eta|/k,
+
+    P/k [1 + z / (1 + z^(1/2))] eta  up to the ceiling, and P eta/|eta| beyond: nothing cancels.
+    """
+    exact = Ball.exact(np.ascontiguousarray(eta.T))
+    squares = exact * exact
+    share = (squares[0] + squares[1]).sqrt() / ceilings
+    left, beyond = (1.0 - share).positive_part(), (share - 1.0).positive_part()
+    return exact * (limits / ceilings * (1.0 + left / (1.0 + left.sqrt())) / (1.0 + beyond))
+
+
+def _slopes(scale: Array, share: Array) -> tuple[Array, Array]:
+    """(n,) the eigenvalues of dq/deta along eta and across, which fall as |eta| grows.
+
+    scale : P/k;  share : |eta|/k
+    """
+    left = np.maximum(1.0 - share, 0.0)
+    root = np.sqrt(left)
+    return 1.5 * scale * root, scale * (1.0 + left / (1.0 + root)) / np.maximum(share, 1.0)
+
+
+def _steepest(known: Loaded, size: Array) -> Array:
+    """(n,) upper bounds on the slopes of q at displacements no shorter than this."""
+    share = np.fmax(size, 0.0) / known.ceiling_balls.upper * (1.0 - ROUNDED)
+    _, across = _slopes(known.held.upper / known.ceiling_balls.lower, share)
+    return np.asarray(np.where(known.sure, across * (1 + SAFETY), 0.0))
+
+
+def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) -> float:
+    """The r of step 2, where each eta_i is anywhere within turned_i; infinite if none is found.
+
+    In a direction z the slope of q_i is at least radial + (across - radial) sin^2 of the angle
+    between z and eta_i, at the longest eta_i. All together, by Minkowski's inequality, with sines
+    that are off by theta_i:  lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
+    """
+    known, size = problem.scalar, np.hypot(*eta.T)
+    if not np.isfinite(turned).all() or not missing < np.inf:
+        return np.inf
+    scale = known.held.lower / known.ceiling_balls.upper
+    direction = along(np.ones(len(size)), eta, size)
+
+    def least_slope(reached: Array) -> float:
+        share = (size + reached) / known.ceiling_balls.lower * (1.0 + ROUNDED)
+        radial, across = np.where(known.sure, _slopes(scale, share), 0.0)
+        extra = across - radial
+        angle = np.minimum(reached / np.maximum(size, 1e-300), 1.0) + ROUNDED
+        _, axes = np.linalg.eigh((direction * extra[:, None]).T @ direction)
+        sines, cosines = (direction @ axes).T
+        least = float(extra @ sines**2 - abs(extra @ (sines * cosines)))
+        root = np.sqrt(max(least, 0.0)) - np.sqrt(float(extra @ angle**2))
+        return float(radial.sum() + max(root, 0.0) ** 2) * (1 - SAFETY)
+
+    slope = least_slope(turned)
+    if not slope > 0:
+        return np.inf
+    radius = missing / slope * (1 + 1e-9)
+    for _ in range(TRIALS):
+        if not np.isfinite(radius) or radius * least_slope(turned + radius) > missing * (
+            1 + SAFETY
+        ):
+            return radius
+        radius = radius * WIDER + 1e-300
+    return np.inf
+
+
+def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Array) -> float:
+    """Bound on E(q) - E(q*), of forces within friction to rounding; infinite if X is.
+
+    e_i is the distance of X - (B q)_i from the deflection of q_i, or from the ray of those of q_i.
+    """
+    q, X, known = state.increments, state.rise, problem.scalar
+    if not np.isfinite(X).all() or problem.margin == 0.0:
+        return np.inf
+    size = problem.sizes(q)
+    eta, own = X - problem.couple(q), known.deflections(size)
+    length = np.hypot(*q.T)
+    along_q = (eta * along(np.ones(len(q)), q, length)).sum(axis=1)
+    nearest = np.where(size < known.loads, own, np.maximum(along_q, own))
+    off = np.hypot(*(eta - along(nearest, q, length)).T)
+    # One roundoff of a size near P changes the deflection by far more than one.
+    steep = known.deflections(np.minimum(size * (1 + ROUNDED), known.loads)) - own
+    sums = own + known.influence.matrix @ size + float(np.hypot(*X))
+    off = off + steep + (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * sums
+    moved = np.fmin(errors, length + known.most)
+    short = (Ball.exact(np.ascontiguousarray(q.T)).sum() - total) * X
+    return float(off @ moved + short.size.sum()) * (1 + SAFETY)
+
+
+def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
+    """What either of two proofs says."""
+    return VectorBounds(
+        found.proved or other.proved,
+        np.fmin(found.increments, other.increments),
+        np.fmin(found.slips, other.slips),
+        min(found.rise, other.rise),
+        found.sliding | other.sliding,
+        found.partial | other.partial,
+    )
+
+
+def _by_exhaustion(
+    problem: VectorProblem, known: Loaded, state: VectorState, total: Ball
+) -> VectorBounds:
+    """docs/theory/friction-proofs.md, "Close to gross sliding".
+
+    The sum of P_i - q_i.t is at most `unused`. So each q is within (2 P unused)^(1/2) of P t, all
+    together in the same sense; then X.t is no less than what it is at any asperity, and a sliding
+    force that is turned costs friction.
+    """
+    sure, reach, unproved = known.sure, problem.reach, VectorBounds.unproved(len(problem))
+    P, ceilings = np.where(sure, known.loads, 0.0), known.ceiling_balls
+    size = float(np.hypot(*total.value))
+    if size == 0.0:
+        return unproved
+    t = total.value / size
+    squares = total * total
+    left = known.held.sum() - (squares[0] + squares[1]).sqrt()
+    unused = max(float(left.upper), 0.0) + known.stray
+    most = np.where(sure, known.most, 0.0)
+    turned = np.minimum(np.sqrt(2.0 * most * unused), 2.0 * most)
+    errors = np.where(sure, known.errors, known.most) + turned + 2 * ROUNDED * P
+    errors = errors + np.hypot(*(state.increments - P[:, None] * t).T)
+
+    # B q by what is known of q: `coupled` at P t, within `blur`.
+    coupled, across = problem.couple(P[:, None] * t), np.array([-t[1], t[0]])
+    blur = reach @ np.where(sure, known.errors, 0.0) + np.sqrt(2.0 * unused * (reach**2 @ most))
+    blur += (1.0 + problem.bias) * known.stray_effect
+    blur += (problem.product_error + 2 * ROUNDED) * (reach @ P)
+    least = np.where(sure, known.held.lower, np.inf)
+    lacking = unused / least
+    lowest = ceilings.lower * (1.0 - lacking - lacking ** (2 / 3) - ROUNDED) + coupled @ t - blur
+    least_rise = lowest.max(where=sure & (lacking < 1), initial=-np.inf)  # of X.t
+    highest = ceilings.upper + blur  # of | X - coupled | where it sticks
+    pushed = least_rise - coupled @ t > highest * (1 + SAFETY)
+    # Were it to stick, displacements would be small, and forces turned by what differs across t.
+    weights, side = np.where(sure, least, 0.0), coupled @ across
+    mean = float(weights @ side) / float(weights.sum())
+    spread = np.sqrt(weights @ (side - mean) ** 2) - np.sqrt(weights @ blur**2)
+    longest = highest + float(np.hypot(*np.ptp(coupled, axis=0))) + float(blur.max())
+    sliding = sure & (pushed | (spread * (1 - SAFETY) > np.sqrt(2.0 * unused) * longest))
+    complete = known.stray == 0 and bool(sure.all())
+    proved = bool(sliding.any()) or complete
+    # Where nothing turns, the only state is its own mirror image: all along t, so that not all
+    # slide below the limit. If all but one do, that one sticks.
+    straight = problem.bias == 0.0 and problem.margin > 0 and unused < float(least.min())
+    below = float(left.lower) > AT_THE_END * ROUNDOFF * size
+    last = complete and straight and below and int(sliding.sum()) == len(P) - 1
+    partial = ~sliding & last
+    return unproved._replace(proved=proved, increments=errors, sliding=sliding, partial=partial)

@@ -1,0 +1,189 @@
+"""The loaded asperities of a contact: Mindlin's law of each, and how well their loads are known.
+
+With increments u of the loads P that asperities hold in friction, the displacement that asperity i
+must take up is eta_i = ceiling_i deflection(u_i / P_i), and beyond ceiling_i = k P^(2/3) it slides.
+Forces are in f times the unit of loads, displacements in c_t f times the unit of lengths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices, among_zeros
+from convexrough.contact import Contact
+from convexrough.convex.newton_step import correct
+from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.shear import limited
+from convexrough.influence import Influence, couple
+from convexrough.influence.shells import shells
+from convexrough.normal.boxes import Scope
+from convexrough.normal.level import Response
+from convexrough.normal.units import Units
+from convexrough.numbers.balls import Ball, where
+from convexrough.roundoff import SAFETY
+from convexrough.scene.scene import Scene
+from convexrough.sphere import annulus
+
+#: Below this part of P the state is elastic, proportional to the force, to all digits.
+ELASTIC = Fraction(1, 10**15)
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """n loaded asperities of a contact. Arrays are (n,), in own units.
+
+    scope    : of the contact's certificate, "none" where nothing is proved
+    touching : their indices in the scene
+    loads, errors : P, and bounds on its errors;  ceilings : k P^(2/3)
+    influence : A among them;  shells : added to the diagonal of A they make it semidefinite
+    sure     : proved to touch
+    held, ceiling_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
+    softness : the most of 3 P / (2 k P^(2/3)) where sure, 0 elsewhere
+    stray    : most that all asperities that are neither sure nor open carry together
+    stray_effect : most that this moves each of the others, were it a normal load
+    """
+
+    levels: FrictionLevels
+    scene: Scene
+    scope: Scope
+    units: Units
+    touching: Indices
+    loads: Array
+    errors: Array
+    ceilings: Array
+    influence: Influence
+    shells: Array
+    sure: NDArray[np.bool_]
+    held: Ball
+    ceiling_balls: Ball
+    softness: Array
+    stray: float
+    stray_effect: float
+
+    @classmethod
+    def of(cls, contact: Contact) -> Loaded:
+        """Those of a contact, which keeps them; InputError where the scene has no friction."""
+        return contact.keep(cls._assemble)
+
+    @classmethod
+    def _assemble(cls, contact: Contact) -> Loaded:
+        levels, scene = contact.keep(FrictionLevels), contact.scene
+        level, units = levels.top, levels.units
+        loaded = np.flatnonzero(level.loads.value > 0)
+        touching = levels.candidates[loaded]
+        modulus = scene.material.contact_modulus
+        influence = couple(
+            scene, touching, units.force / units.length / (np.pi * modulus), contact.influence
+        )
+        P, k = level.loads[loaded], level.problem.exact.coefficients
+        k = k if len(k) == 1 else k[loaded]
+        ceilings = k * P.two_thirds()
+        sure = level.touching[loaded] & P.positive & ceilings.positive
+        left = ~level.open
+        left[loaded[sure]] = False
+        stray = float(np.maximum(level.loads.upper, 0.0)[left].sum()) * (1 + SAFETY)
+        nothing = Ball.exact(np.zeros(len(loaded)))
+        return cls(
+            levels=levels,
+            scene=scene,
+            scope=contact.certificate.scope if levels.proved else "none",
+            units=units,
+            touching=touching,
+            loads=P.value,
+            errors=P.error,
+            ceilings=ceilings.value,
+            influence=influence,
+            shells=shells(influence),
+            sure=sure,
+            held=where(sure, P, nothing),
+            ceiling_balls=where(sure, ceilings, nothing + 1.0),
+            softness=np.where(sure, (1.5 * P.cbrt() / k).upper, 0.0),
+            stray=stray,
+            stray_effect=stray * level.problem.largest_entry * (1 + SAFETY) if stray else 0.0,
+        )
+
+    def __len__(self) -> int:
+        return len(self.loads)
+
+    @property
+    def force_unit(self) -> float:
+        """What increments are shear forces in [force]."""
+        return float(self.levels.force_unit.value)
+
+    @property
+    def travel_unit(self) -> float:
+        """What tangential displacements are counted in [length]."""
+        return float(self.levels.travel_unit.value)
+
+    @property
+    def most(self) -> Array:
+        """(n,) upper bounds on P."""
+        return (self.loads + self.errors) * (1 + SAFETY)
+
+    def height(self, force: float) -> Fraction:
+        """T = Q / f [force]; P where it is that to rounding: gross sliding."""
+        f = Fraction(float(self.levels.coefficient.value))
+        return limited(self.levels.load, Fraction(force) / f)
+
+    def first_loading(self, height: Fraction) -> tuple[Array, Array]:
+        """(n,) u and eta of the scalar law under T [force]."""
+        if height < ELASTIC * self.levels.load:
+            shares = self.elastic * float(height / Fraction(self.units.force))
+            return shares, shares / self.stiffest
+        top, low = self.levels.top, self.levels.at(self.levels.load - height)
+        place = np.searchsorted(self.levels.candidates, self.touching)
+        u, eta = top.loads - low.loads, top.indentation - low.indentation
+        return u.value[place], eta.value[place]
+
+    def increments(self, deflections: Array) -> Array:
+        """u(eta), saturated at P."""
+        u: Array = self.loads * annulus.force(annulus.width_at(deflections / self.ceilings))
+        return u
+
+    def deflections(self, increments: Array) -> Array:
+        """The local deflection of an asperity that does not slide, of u >= 0."""
+        left = (self.loads - increments) / self.loads
+        x = annulus.width_between(increments / self.loads, left)
+        eta: Array = self.ceilings * annulus.deflection(x)
+        return eta
+
+    def slopes(self, deflections: Array) -> Array:
+        """c = du/deta, 0 where sliding."""
+        c: Array = self.stiffest * (1.0 - annulus.width_at(deflections / self.ceilings))
+        return c
+
+    @cached_property
+    def stiffest(self) -> Array:
+        """(n,) c at eta = 0: 2 E* a."""
+        c: Array = 1.5 * self.loads / self.ceilings
+        return c
+
+    @cached_property
+    def elastic(self) -> Array:
+        """(n,) shares q of a vanishing T, all sticking: (H + A) q is the same everywhere."""
+        c = self.stiffest
+        y = correct(
+            self.influence,
+            self.shells,
+            np.sqrt(c),
+            -np.ones(len(c)),
+            balanced=False,
+            tolerance=1e-12,
+        )
+        shares: Array = c * y
+        return np.asarray(shares / shares.sum())
+
+    @property
+    def tangent(self) -> Response:
+        """The same, as proved of the normal solution."""
+        return self.levels.top.tangent
+
+    def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
+        """(..., n) values, among zeros for all other asperities of the scene."""
+        return among_zeros(values, self.touching, len(self.scene), axis=-1)

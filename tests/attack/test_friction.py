@@ -1,0 +1,232 @@
+"""Friction under attack: where asperities are dragged back, near gross sliding, along paths.
+
+The judges are bristles in steps, exact levels, and arguments in whole numbers.
+"""
+
+import json
+from fractions import Fraction
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+from gradient_oracle import DIGITS
+from levels_reference import SCENES, Bristles, cycle_loss, friction_state
+from path_scenes import LARGEST, PAPER, shaded
+from scenes import MATERIAL
+
+import convexrough as cr
+from convexrough import checker
+
+P = LARGEST["paper"]
+
+
+@cache
+def around(load: float) -> cr.Contact:
+    """Three equal contacts around a shorter one, so crowded that they lift it out again."""
+    turn = 2 * np.pi * np.arange(3) / 3
+    points = np.vstack(([0.0, 0.0], np.column_stack((np.cos(turn), np.sin(turn)))))
+    asperities = cr.Asperities(points, 1.0, [-0.05, 0.0, 0.0, 0.0])
+    contact = cr.press(
+        cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit"), load=load
+    )
+    assert contact.certificate.scope == "global"
+    return contact
+
+
+def inside(tip: float, share: float) -> cr.Contact:
+    """Two asperities, the small one inside the other's disc, with about this share of its load."""
+    apart = 0.5 / 2.8
+    height = 1 / (6 * np.pi * apart) - 0.25 + 0.25 * share ** (2 / 3) / tip ** (1 / 3)
+    asperities = cr.Asperities([[0.0, 0.0], [apart, 0.0]], [1.0, tip], [0.0, height])
+    contact = cr.press(
+        cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit"), approach=0.25
+    )
+    assert (contact.loads > 0).all()
+    return contact
+
+
+CROWDED = [(around, 4.0, 0.5), (around, 3.5, 0.5), (lambda P: cr.press(shaded(), load=P), 3.0, 0.5)]
+
+
+@pytest.mark.parametrize(("make", "load", "fraction"), CROWDED)
+def test_forces_where_order_fails(make, load, fraction) -> None:  # type: ignore[no-untyped-def]
+    """Bristles are good to 1e-7 of the largest force here, and the forces are 2e-6 off, or more."""
+    contact, force = make(load), fraction * 0.5 * load
+    state = cr.shear(contact, force=force)
+    true = Bristles(contact).to(np.linspace(0, force, 101)[1:]).forces
+    slack = 5e-7 * true.max()
+    assert (np.abs(state.forces - true) <= state.certificate.force_errors + slack).all()
+    judged = cr.certify_shear(contact, state.forces, force=force)
+    assert (np.abs(state.forces - true) <= judged.force_errors + slack).all()
+
+
+@pytest.mark.parametrize("load", [3.0, 3.5, 4.0])
+def test_losses_where_order_fails(load: float) -> None:
+    """Bristles are good to 1e-5 of the loss, and the loss is 2e-4 off, or more."""
+    contact = around(load)
+    for fraction in (0.5, 0.8):
+        force = fraction * 0.5 * load
+        cycle, true = cr.cycle(contact, maximum=force), cycle_loss(contact, force)
+        assert abs(cycle.loss - true) <= cycle.loss_error + 2e-5 * true
+
+
+def test_histories_where_order_fails() -> None:
+    contact = around(4.0)
+    forces = 0.5 * contact.load * np.array([0.8, -0.6, 0.5])
+    path, state = cr.history(contact, forces=forces), Bristles(contact)
+    for i, (before, after) in enumerate(pairwise((0.0, *forces))):
+        true = state.to(np.linspace(before, after, 201)[1:]).lost
+        assert abs(path.losses[i] - true) <= path.loss_errors[i] + 2e-5 * true
+
+
+@pytest.mark.parametrize("load", [3.0, 3.5, 4.0])
+def test_no_proof_of_a_loss_where_order_fails(load: float) -> None:
+    """A refusal is right, and a proof of the state of one step."""
+    contact = around(load)
+    for fraction in (0.3, 0.8):
+        try:
+            proof = contact.proof(sheared=[cr.shear(contact, force=fraction * 0.5 * load)])
+        except cr.ProofError:
+            continue
+        claim = proof.document["claims"]["shear"][0]
+        assert (claim["order"], claim["loss"]) == ("proved for one step", None)
+
+
+def test_no_false_word_near_gross_sliding() -> None:
+    """P lacks more than the small one could ever take back, so the large one cannot slide."""
+    contact = inside(1e-3, 1e-5)
+    force = (1 - 1e-12) * 0.5 * contact.load
+    assert Bristles(contact).to(np.linspace(0, 0.495 * contact.load, 401)[1:]).bent[1].min() > 0
+    # The small one has turned and slides forward, as it does from here on.
+    words = cr.shear(contact, force=force).status
+    assert words[0] != "sliding"
+    assert words[1] != "partial"
+
+
+def test_no_false_word_of_given_forces() -> None:
+    contact = inside(0.01, 0.005)
+    force = 0.99 * 0.5 * contact.load
+    true = Bristles(contact).to(np.linspace(0, force, 801)[1:])
+    assert (np.abs(true.forces) < 0.999 * 0.5 * contact.loads).all()  # so both stick
+    words = cr.certify_shear(contact, cr.shear(contact, force=force).forces, force=force).status
+    assert (words != "sliding").all()
+
+
+def test_no_slip_of_what_does_not_touch() -> None:
+    """The middle of three is open, and the proof is too coarse to tell."""
+    points = np.array([[0.0, 0.0], [0.003, 0.0], [-0.003, 0.0]])
+    low, high = -3e-5, 0.0
+
+    def pressed(height: float) -> cr.Contact:
+        scene = cr.Scene(
+            1.0, cr.Asperities(points, 0.02, [height, 0.0, 0.0]), MATERIAL, 0.5, geometry="summit"
+        )
+        return cr.press(scene, approach=3e-5)
+
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (middle, high) if pressed(middle).loads[0] == 0 else (low, middle)
+    contact = pressed(low - 1e-11)
+    assert contact.status[0] == "open"
+    state = cr.shear(contact, force=0.15 * contact.load)
+    document = json.loads(json.dumps(contact.proof(sheared=[state]).document))
+    radii = document["pressed"]["radii"]
+    document["pressed"]["radii"] = [[float(f"{float.fromhex(r[0]):.4e}").hex()] for r in radii]
+    proved = checker.prove(document, lambda line: None)
+    assert proved["status"][0] == "undecided"
+    assert proved["shear"][0]["slips"][0].low == 0
+
+
+@pytest.mark.parametrize("fraction", [3e-4, 0.5])
+def test_gradients_of_one_asperity_are_within_their_bounds(fraction: float) -> None:
+    """The approach all but cancels the drop, so that its rounding is felt."""
+    rng = np.random.default_rng(3)
+    for _ in range(6):
+        place = rng.uniform(1, 2, 2)
+        scene = cr.Scene(
+            300.0, cr.Asperities([place], 0.144), MATERIAL, friction=0.5, geometry="summit"
+        )
+        low = 1 + 10 ** rng.uniform(-5, -2)
+        contact = cr.press(scene, approach=float(place @ place) / 600 * low)
+        force = fraction * 0.5 * contact.load
+        true = friction_state(contact, force, "approach")
+        state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
+        with ctx.workdps(DIGITS):
+            for found, slopes in (
+                (state.gradient(displacement=1.0), true.displacement_slopes("approach")),
+                (cycle.gradient(), true.loss_slopes("approach")),
+            ):
+                off = abs(arb(float(found.heights[0])) - slopes.heights[0])
+                assert off <= arb(float(found.height_errors[0]))
+
+
+def test_gradients_of_gaps_are_within_their_bounds() -> None:
+    """Lift the only one that touches under a held load: each gap grows by as much."""
+    points = [[0.0, 0.0], [0.01, 0.0], [-0.01, 0.0], [0.0, 0.01]]
+    asperities = cr.Asperities(points, 0.02, [0.0, -1e-3, -1e-3, -1e-3])
+    contact = cr.press(cr.Scene(1.0, asperities, MATERIAL, geometry="summit"), load=1e-8)
+    assert contact.status.tolist() == ["contact", "open", "open", "open"]
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        weights = rng.standard_normal(4)
+        gradient = contact.gradient(gaps=weights)
+        true = sum(map(Fraction, weights[1:].tolist()))
+        assert abs(Fraction(gradient.heights[0]) - true) <= Fraction(gradient.height_errors[0])
+
+
+def test_the_smallest_shear_is_borne() -> None:
+    path = cr.load_path(PAPER, loads=[P, P], forces=[0.0, -1e-17 * P])
+    missing = abs(path.asperity_forces[-1].sum() - path.forces[-1])
+    assert missing <= path.asperity_force_errors[-1].sum() + 1e-30 * P
+
+
+@pytest.mark.parametrize("share", [1e-24, 1e-28])
+def test_a_path_through_almost_no_load(share: float) -> None:
+    scene, approach = SCENES["dense"]
+    load = cr.press(scene, approach=approach).load
+    shear = np.array([0.1, 0.3 * share, 0.2]) * load
+    path = cr.load_path(scene, loads=np.array([1.0, share, 1.0]) * load, forces=shear)
+    assert (path.displacement_errors <= 1e-8 * path.displacements.max()).all()
+    assert (path.loss_errors <= 1e-8 * 0.25 * load * approach).all()
+
+
+@pytest.mark.parametrize("fraction", [1e-6, 1e-5, 1e-4])
+def test_a_steady_cycle_at_constant_load_is_a_cycle(fraction: float) -> None:
+    force = fraction * 0.5 * P
+    settled = cr.steady(PAPER, loads=[P, P], forces=[force, -force])
+    energy = cr.cycle(cr.press(PAPER, load=P), maximum=force).loss
+    assert settled.loss == pytest.approx(energy, rel=1e-8)
+    assert settled.loss_error <= 1e-8 * energy
+
+
+def random_path(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Many steps at the limit |dQ| = f |dP|, where the front hardly runs."""
+    rng = np.random.default_rng(seed)
+    points = [(float(rng.uniform(0.2, 1)), 0.0)]
+    for _ in range(8):
+        (load, force), kind = points[-1], rng.integers(3)
+        after = float(np.clip(load + rng.uniform(-0.3, 0.3) * 10 ** rng.uniform(-6, 0), 0.01, 1))
+        slope = rng.choice([-0.5, 0.5]) * (1.0, 1 + 1e-9, rng.uniform(0, 2))[kind]
+        limit = 0.5 * after
+        points.append((after, float(np.clip(force + slope * (after - load), -limit, limit))))
+    P_Q = P * np.array(points)
+    return P_Q[:, 0], P_Q[:, 1]
+
+
+def test_energies_never_fall() -> None:
+    for seed in range(5):
+        loads, forces = random_path(seed)
+        assert (np.diff(cr.load_path(PAPER, loads=loads, forces=forces).losses) >= 0).all()
+
+
+def test_the_general_step_knows_how_well_it_does() -> None:
+    """Energies within a part in a thousand, or none: along a path where order fails."""
+    forces = 0.5 * 4.0 * np.array([0.0, 0.8, 0.4, 0.6, -0.2])
+    path = cr.load_path(around(4.0).scene, loads=np.full(5, 4.0), forces=forces)
+    assert path.order == "fails"
+    state = Bristles(around(4.0))
+    for i, (before, after) in enumerate(pairwise(forces), start=1):
+        true = state.to(np.linspace(before, after, 101)[1:]).lost
+        assert np.isnan(path.losses[i]) or path.losses[i] == pytest.approx(true, rel=1e-3)

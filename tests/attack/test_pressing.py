@@ -1,0 +1,90 @@
+"""Certificates under attack at the ends of arithmetic; judged in whole numbers and in 60 digits."""
+
+from fractions import Fraction
+from typing import Any
+
+import multiprecision
+import numpy as np
+import pytest
+from flint import arb, ctx
+from scenes import MATERIAL, PAPER_APPROACH, STEEL, paper, reference
+
+import convexrough as cr
+
+
+def excess(scene: cr.Scene, loads: Any, exact: multiprecision.Reference) -> float:
+    """The energy of loads above that of the solution: g'P and a Bregman distance, no difference."""
+    with ctx.workdps(120):
+        R, E = arb(scene.sphere_radius), arb(scene.material.contact_modulus)
+        energy = arb(0)
+        points = [[arb(float(x)) for x in point] for point in scene.asperities.positions]
+        for sign, P in ((1, [arb(float(load)) for load in loads]), (-1, exact.loads)):
+            for i, (x, y) in enumerate(points):
+                rho, z = (
+                    arb(float(each[i]))
+                    for each in (scene.asperities.tip_radii, scene.asperities.heights)
+                )
+                k = (arb(9) / 16 / (E * E) * (1 / R + 1 / rho)).root(3)
+                own = arb(3) / 5 * k * P[i].root(3) ** 5 if P[i] > 0 else arb(0)
+                felt = sum(
+                    load / (arb.pi() * E * ((x - u) ** 2 + (y - v) ** 2).sqrt())
+                    for j, ((u, v), load) in enumerate(zip(points, P, strict=True))
+                    if j != i
+                )
+                D = exact.approach + z - (x * x + y * y) / (2 * R)
+                energy += sign * (own + P[i] * (felt / 2 - D))
+        return float(energy)
+
+
+@pytest.mark.parametrize("radius", [0.7, 1.3])
+def test_the_duality_gap_where_heights_cancel_drops(radius: float) -> None:
+    """Summits on a bowl: the indentation of 1e-12 is a difference of numbers near 10."""
+    points = 3.0 * np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    asperities = cr.Asperities(points, 1.0, (points**2).sum(axis=1) / (2 * radius))
+    scene = cr.Scene(radius, asperities, MATERIAL, geometry="summit")
+    contact = cr.press(scene, approach=1e-12, influence="lattice")
+    exact = reference(scene, approach=1e-12)
+    assert contact.certificate.duality_gap >= excess(scene, contact.loads, exact)
+
+
+@pytest.mark.parametrize("load", [1e-320, 5e-324])
+def test_the_duality_gap_of_loads_that_underflow(load: float) -> None:
+    """The solution carries nothing and has no energy; these loads have some."""
+    asperities = cr.Asperities([[0.0, 0.0], [0.01, 0.0]], 0.02, [-1e-8, -1e-8])
+    scene = cr.Scene(1.0, asperities, MATERIAL, geometry="summit")
+    gap = cr.certify(scene, [load, 0.0], approach=5e-9).duality_gap
+    assert Fraction(gap) >= Fraction(5e-9) * Fraction(load)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("load", [1e-310, 5e-324])
+def test_bounds_of_the_smallest_loads_on_a_lattice(load: float) -> None:
+    scene, given = paper(), np.full(61, load)
+    judged = cr.certify(scene, given, approach=PAPER_APPROACH, influence="lattice")
+    exact = reference(scene, approach=PAPER_APPROACH)
+    off = np.abs(multiprecision.errors(given, exact.loads))
+    assert judged.scope == "none" or (off <= judged.load_errors).all()
+    assert judged.duality_gap >= excess(scene, given, exact)
+
+
+def test_errors_of_a_claim_are_not_short_by_a_rounding() -> None:
+    """Of loads far from the solution, whose own bound is less than what their distance loses."""
+    scene, exact = paper(), reference(paper(), approach=PAPER_APPROACH)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        claimed = 10.0 ** rng.uniform(-7, 0, 61)
+        verdict = cr.verify(scene, claimed, approach=PAPER_APPROACH)
+        with ctx.workprec(500):
+            for load, true, error in zip(claimed, exact.loads, verdict.errors, strict=True):
+                assert abs(arb(float(load)) - true) <= arb(float(error))
+
+
+@pytest.mark.parametrize("load", [0.003, 0.03])
+def test_an_open_summit_under_its_neighbours_disc_is_told_of(load: float) -> None:
+    """1.5 micrometres apart, and 20 nm lower: the disc reaches farther than the summit."""
+    asperities = cr.Asperities([[0.0, 0.0], [1.5e-6, 0.0]], 2e-4, [0.0, -2e-8])
+    contact = cr.press(cr.Scene(0.01, asperities, STEEL, geometry="summit"), load=load)
+    assert contact.status.tolist() == ["contact", "open"]
+    assert contact.contact_radii[0] > 1.5e-6
+    assert any("disc" in line for line in contact.warnings)
+    assert "disc" in repr(contact)

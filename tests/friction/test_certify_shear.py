@@ -1,0 +1,189 @@
+"""Shear forces from anywhere: right ones are proved, wrong ones never get a wrong word or bound."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, in_doubt, off, pressed
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from levels_reference import reference as exact
+from scenes import paper, twins
+
+import convexrough as cr
+
+ATTACKS = ["digits", "noise", "drop", "swap", "scale", "zero", "full", "wild", "backwards"]
+
+
+def spoiled(forces: Any, limits: Any, kind: str, rng: Any) -> Any:
+    """Forces with something wrong."""
+    wrong = np.array(forces)
+    loaded = np.flatnonzero(limits)
+    i, j = rng.choice(loaded, 2, replace=False)
+    if kind == "digits":
+        digits = rng.integers(1, 12)
+        wrong = np.array([float(f"{each:.{digits}e}") for each in wrong])
+    elif kind == "noise":
+        wrong *= 1 + 10.0 ** rng.uniform(-14, 0) * rng.standard_normal(len(wrong))
+    elif kind == "drop":
+        wrong[i] = 0.0
+    elif kind == "swap":
+        wrong[[i, j]] = wrong[[j, i]]
+    elif kind == "scale":
+        wrong[i] *= 10.0 ** rng.uniform(-3, 3)
+    elif kind == "zero":
+        wrong[:] = 0.0
+    elif kind == "full":
+        wrong = np.array(limits)
+    elif kind == "wild":
+        wrong = 10.0 ** rng.uniform(-30, 30, len(wrong)) * rng.choice([-1, 1], len(wrong))
+    else:
+        wrong = -wrong
+    return wrong
+
+
+def assert_covers(judged: cr.ShearCertificate, forces: Any, truth: Any) -> None:
+    """No bound is too small and no word is wrong, by 80 digits."""
+    for i, true in enumerate(truth.forces):
+        assert off(forces[i], true) <= judged.force_errors[i]
+        assert judged.status[i] != ("partial" if truth.slips[i] > 0 else "sliding")
+        assert (judged.status[i] != "open") | (not truth.loads[i] > 0)
+
+
+@pytest.mark.parametrize("fraction", FRACTIONS)
+@pytest.mark.parametrize("influence", KINDS)
+@pytest.mark.parametrize("name", NAMES)
+def test_right_forces_are_proved(name: str, influence: Any, fraction: float) -> None:
+    contact, truth = pressed(name, influence), exact(name, fraction)
+    force = fraction * FRICTION * contact.load
+    state = cr.shear(contact, force=force)
+    judged = cr.certify_shear(contact, state.forces, force=force)
+    assert judged.holds
+    assert (judged.status == state.status).all()
+    assert_covers(judged, state.forces, truth)
+    assert judged.force_errors.max() < 1.01 * state.certificate.force_errors.max()
+    for i, slip in enumerate(truth.slips):
+        assert off(state.slips[i], slip) <= 2 * judged.slip_errors[i]
+    assert off(state.displacement, truth.displacement) <= 2 * judged.displacement_error
+
+
+@pytest.mark.parametrize("digits", [4, 6, 9])
+@pytest.mark.parametrize("fraction", [1e-6, 0.1, 0.35, 0.5, 0.9, 0.999])
+@pytest.mark.parametrize("name", NAMES)
+def test_few_digits_are_enough_for_the_words(name: str, fraction: float, digits: int) -> None:
+    """And the bounds are of the size of what was rounded off."""
+    contact, truth = pressed(name), exact(name, fraction)
+    force = fraction * FRICTION * contact.load
+    state = cr.shear(contact, force=force)
+    forces = np.array([float(f"{each:.{digits - 1}e}") for each in state.forces])
+    judged = cr.certify_shear(contact, forces, force=force)
+    assert judged.holds
+    assert (judged.status == state.status).all()
+    assert_covers(judged, forces, truth)
+    assert judged.force_errors.max() < 10 * np.abs(forces - state.forces).max() + 1e-10 * force
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.sampled_from(NAMES),
+    st.sampled_from(FRACTIONS),
+    st.sampled_from(ATTACKS),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from(KINDS),
+)
+def test_attacks(name: str, fraction: float, kind: str, seed: int, influence: Any) -> None:
+    contact = pressed(name, influence)
+    force = fraction * FRICTION * contact.load
+    forces = spoiled(
+        cr.shear(contact, force=force).forces,
+        FRICTION * contact.loads,
+        kind,
+        np.random.default_rng(seed),
+    )
+    assert_covers(cr.certify_shear(contact, forces, force=force), forces, exact(name, fraction))
+
+
+@pytest.mark.parametrize("digits", [3, 5, 8])
+@pytest.mark.parametrize("fraction", [0.1, 0.37, 0.999])
+@pytest.mark.parametrize("kind", ["digits", "noise", "drop", "full"])
+def test_doubt_about_the_loads_is_counted(kind: str, fraction: float, digits: int) -> None:
+    contact, truth = pressed("paper"), exact("paper", fraction)
+    force = fraction * FRICTION * contact.load
+    forces = spoiled(
+        cr.shear(contact, force=force).forces,
+        FRICTION * contact.loads,
+        kind,
+        np.random.default_rng(digits),
+    )
+    judged = cr.certify_shear(in_doubt(contact, digits, "approach"), forces, force=force)
+    assert_covers(judged, forces, truth)
+
+
+def test_forces_where_there_is_no_load_count_fully() -> None:
+    contact = pressed("paper")
+    force = 0.5 * FRICTION * contact.load
+    forces = np.array(cr.shear(contact, force=force).forces)
+    i = int(np.argmin(contact.loads))
+    forces[i] = 1e-9
+    judged = cr.certify_shear(contact, forces, force=force)
+    assert judged.force_errors[i] >= 1e-9
+    assert judged.status[i] == "open"
+    assert judged.holds
+    beyond = np.array(cr.shear(contact, force=force).forces)
+    j = int(np.argmax(contact.loads))
+    beyond[j] = 3 * FRICTION * contact.loads[j]
+    assert cr.certify_shear(contact, beyond, force=force).force_errors[j] >= (
+        2 * FRICTION * contact.loads[j]
+    )
+
+
+def test_the_other_direction_and_none() -> None:
+    contact = pressed("rough")
+    force = 0.4 * FRICTION * contact.load
+    forces = cr.shear(contact, force=force).forces
+    there = cr.certify_shear(contact, forces, force=force)
+    back = cr.certify_shear(contact, -forces, force=-force)
+    assert np.array_equal(there.force_errors, back.force_errors)
+    assert np.array_equal(there.status, back.status)
+    wrong = cr.certify_shear(contact, forces, force=-force)
+    assert (wrong.force_errors[contact.loads > 0] >= forces[contact.loads > 0]).all()
+    still = cr.certify_shear(contact, 0.0, force=0.0)
+    assert still.holds
+    assert still.force_errors.max() < 1e-25
+
+
+def test_gross_sliding() -> None:
+    contact = pressed("paper")
+    limit = FRICTION * contact.load
+    judged = cr.certify_shear(contact, FRICTION * contact.loads, force=limit)
+    assert judged.status[0] == "undecided"  # the highest still touches at the level 0
+    assert (judged.status[1:][contact.loads[1:] > 0] == "sliding").all()
+    assert (judged.force_errors <= 1e-9 * limit).all()
+
+
+def test_where_nothing_touches_or_is_proved() -> None:
+    scene = cr.Scene(1.0, paper().asperities, paper().material, friction=0.5, geometry="summit")
+    apart = cr.press(scene, approach=-1e-6)
+    judged = cr.certify_shear(apart, np.full(len(scene), 1e-9), force=0.0)
+    np.testing.assert_allclose(judged.force_errors, np.full(len(scene), 1e-9), rtol=1e-11)
+    assert (judged.status == "open").all()
+    close, load = twins()
+    crowded = cr.press(close, load=load)
+    judged = cr.certify_shear(crowded, crowded.loads * 0.1, force=0.1 * crowded.load)
+    assert judged.scope == "none"
+    assert not judged.holds
+    assert (judged.status == "undecided").all()
+
+
+def test_wrong_input() -> None:
+    contact = pressed("paper")
+    with pytest.raises(cr.InputError, match="gross sliding"):
+        cr.certify_shear(contact, contact.loads, force=contact.load)
+    with pytest.raises(cr.InputError, match=r"forces: found shape \(2,\)"):
+        cr.certify_shear(contact, [1.0, 2.0], force=0.0)
+    with pytest.raises(cr.InputError, match=r"forces\[3\]"):
+        cr.certify_shear(contact, np.where(np.arange(61) == 3, np.nan, 0.0), force=0.0)
+    with pytest.raises(cr.InputError, match="force: found nan"):
+        cr.certify_shear(contact, contact.loads, force=np.nan)
+    with pytest.raises(cr.InputError, match="friction"):
+        cr.certify_shear(cr.press(paper(), approach=5e-5), 0.0, force=0.0)

@@ -1,0 +1,276 @@
+"""Cycles and histories: memory, Masing's rule, and the energy counted in independent ways."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from friction_scenes import FRICTION, KINDS, pressed, with_friction
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scenes import NAMED, PAPER_APPROACH, paper, random_scenes
+
+import convexrough as cr
+from convexrough.influence.coupling import inverse_distances
+from convexrough.sphere import hertz, mindlin
+
+NU = 0.3
+
+
+def limit_of(contact: cr.Contact) -> float:
+    return FRICTION * contact.load
+
+
+def test_reference_losses_of_the_papers_example() -> None:
+    contact = pressed("paper")
+    limit = limit_of(contact)
+    half = cr.cycle(contact, maximum=0.5 * limit)
+    assert half.loss_normalised == pytest.approx(0.00621, abs=5e-6)
+    assert half.smooth_normalised == pytest.approx(0.00587, abs=5e-6)
+    assert (half.status == "sliding").sum() == 6
+    tiny = cr.cycle(contact, maximum=1e-6 * limit)
+    assert tiny.loss_normalised == pytest.approx(2.0110718711e-20, rel=1e-10)
+    below, above = cr.cycles(contact, np.array([0.387, 0.389]) * limit)
+    assert below.loss_normalised < below.smooth_normalised
+    assert above.loss_normalised > above.smooth_normalised
+
+
+def complementary_energy(contact: cr.Contact) -> float:
+    """V = sum (3/5) k P^(5/3) + P'AP / 2 - d'P, in the scene's own units."""
+    scene, P = contact.scene, contact.loads
+    k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
+    inverse = inverse_distances(scene.contact_points, scene.contact_points)
+    coupled = inverse @ P / (np.pi * scene.material.contact_modulus)
+    return float(0.6 * k @ P ** (5 / 3) + P @ coupled / 2 - scene.offsets @ P)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_three_ways_to_the_energy(name: str) -> None:
+    """Asperity by asperity; the trapezoid error of the indentation curve; the area of the loop."""
+    scene, approach = NAMED[name]
+    contact = cr.press(with_friction(scene), approach=approach)
+    limit = limit_of(contact)
+    ratio = mindlin.ratio(NU)
+    for fraction in (0.2, 0.5, 0.9):
+        cycle = cr.cycle(contact, maximum=fraction * limit)
+        assert cycle.balance_defect < 1e-12
+        assert cycle.asperity_losses.sum() == pytest.approx(cycle.loss, rel=1e-14)
+        # The closed form: two normal solutions, their optimal values V and multipliers D0.
+        reduced = cr.press(scene, load=(1 - fraction) * contact.load)
+        middle = (contact.load - reduced.load) * (contact.approach + reduced.approach) / 2
+        error = complementary_energy(contact) - complementary_energy(reduced) - middle
+        closed = 8 * ratio * FRICTION**2 * error
+        assert cycle.loss == pytest.approx(closed, rel=1e-13 / fraction**3)
+        # The polygon through the loop's points converges on it from inside, at second order.
+        errors = [1 - cycle.loop(points).area / cycle.loss for points in (40, 80, 160)]
+        assert 0 < errors[0] < 0.05
+        assert errors[1] / errors[0] == pytest.approx(0.25, abs=0.03)
+        assert errors[2] / errors[1] == pytest.approx(0.25, abs=0.03)
+
+
+def test_the_loop_is_closed_and_odd() -> None:
+    contact = pressed("rough")
+    limit = limit_of(contact)
+    loop = cr.cycle(contact, maximum=0.7 * limit).loop(101)
+    assert loop.forces[0] == loop.forces[-1] == 0.7 * limit
+    assert loop.forces.min() == -0.7 * limit
+    assert_allclose(loop.displacements[0], loop.displacements[-1], rtol=1e-12)
+    assert_allclose(loop.asperity_forces[0], loop.asperity_forces[-1], rtol=1e-12, atol=1e-20)
+    assert loop.displacements.min() == pytest.approx(-loop.displacements.max(), rel=1e-12)
+    assert_allclose(loop.asperity_forces.sum(axis=1), loop.forces, atol=1e-12 * limit)
+
+
+def test_partial_reversal_depends_on_the_range_alone() -> None:
+    contact = pressed("rough")
+    limit = limit_of(contact)
+    symmetric = cr.cycle(contact, maximum=0.3 * limit)
+    for top in (0.9, 0.5, 0.6):
+        shifted = cr.cycle(contact, maximum=top * limit, minimum=(top - 0.6) * limit)
+        assert shifted.loss == pytest.approx(symmetric.loss, rel=1e-12)
+        loop = shifted.loop(400)
+        assert loop.area == pytest.approx(symmetric.loss, rel=1e-3)
+        assert loop.forces.max() == top * limit
+        assert_allclose(loop.displacements[0], loop.displacements[-1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("influence", KINDS)
+def test_sliding_shakes_down(influence: str) -> None:
+    """An asperity that slides on first loading does not in a cycle of less range than its onset."""
+    contact = pressed("paper", influence)
+    limit = limit_of(contact)
+    onsets = cr.onset_of_sliding(contact)
+    first = cr.shear(contact, force=0.6 * limit)
+    assert (first.status == "sliding").sum() == 6
+    amplitude = np.nanmin(onsets)
+    still = cr.cycle(contact, maximum=0.6 * limit, minimum=0.6 * limit - 1.999 * amplitude)
+    again = cr.cycle(contact, maximum=0.6 * limit, minimum=0.6 * limit - 2.001 * amplitude)
+    assert (still.status == "sliding").sum() == 0
+    assert still.sliding_losses.sum() == 0
+    assert (again.status == "sliding").sum() == 6
+    assert again.sliding_losses.sum() > 0
+
+
+def plain_history(contact: cr.Contact, forces: list[float]) -> list[float]:
+    """Displacements by an independent model: elastic-slider elements fitted to first loading.
+
+    Any concave first-loading curve is that of springs with sliders in parallel; their displacement
+    control obeys Masing and memory by construction. The force is inverted by bisection.
+    """
+    limit = limit_of(contact)
+    grid = np.concatenate(([0.0], limit * (1 - np.linspace(1, 0, 80) ** 2)))[1:]
+    path = cr.history(contact, forces=grid)
+    x, q = path.displacements, grid
+    stiffness = np.concatenate((np.diff(q) / np.diff(x), [0.0]))
+    springs = stiffness[:-1] - stiffness[1:]
+    yields = x[1:]
+    position, anchors = 0.0, np.zeros(len(springs))
+
+    def force_at(target: float) -> tuple[float, np.ndarray]:
+        moved = np.clip(anchors, target - yields, target + yields)
+        return float(springs @ (target - moved)), moved
+
+    out = []
+    for force in forces:
+        low, high = -3 * x[-1], 3 * x[-1]
+        for _ in range(200):
+            middle = (low + high) / 2
+            if force_at(middle)[0] < force:
+                low = middle
+            else:
+                high = middle
+        position = (low + high) / 2
+        anchors = force_at(position)[1]
+        out.append(position)
+    return out
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.floats(-0.95, 0.95), min_size=1, max_size=25))
+def test_histories_against_springs_with_sliders(fractions: list[float]) -> None:
+    contact = pressed("paper")
+    forces = [fraction * limit_of(contact) for fraction in fractions]
+    ours = cr.history(contact, forces=forces).displacements
+    scale = cr.shear(contact, force=0.95 * limit_of(contact)).displacement
+    assert_allclose(ours, plain_history(contact, forces), atol=1e-2 * scale)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.floats(-1, 1), min_size=2, max_size=30), st.integers(1, 28))
+def test_stopping_on_the_way_changes_nothing(fractions: list[float], where: int) -> None:
+    """A stop between two forces is no turning point: same states and energy afterwards."""
+    contact = pressed("rough")
+    forces = np.array(fractions) * limit_of(contact)
+    where = min(where, len(forces) - 1)
+    stop = 0.3 * forces[where - 1] + 0.7 * forces[where]
+    plain = cr.history(contact, forces=forces)
+    stopped = cr.history(contact, forces=np.insert(forces, where, stop))
+    keep = np.delete(np.arange(len(forces) + 1), where)
+    scale = limit_of(contact)
+    assert_allclose(stopped.asperity_forces[keep], plain.asperity_forces, atol=1e-11 * scale)
+    assert_allclose(stopped.displacements[keep], plain.displacements, atol=1e-15)
+    assert_allclose(stopped.losses[keep], plain.losses, rtol=1e-9, atol=1e-9 * plain.losses.max())
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.floats(-0.5, 0.5), min_size=0, max_size=12))
+def test_return_point_memory_and_wiping_out(inner: list[float]) -> None:
+    """Whatever happens inside +-0.5, coming back to a turning point beyond restores the state."""
+    contact = pressed("paper", "lattice" if len(inner) % 2 else "dense")
+    limit = limit_of(contact)
+    before = cr.history(contact, forces=np.array([0.6, -0.6, 0.6]) * limit)
+    path = np.array([0.6, -0.6, *inner, 0.6, 0.8]) * limit
+    after = cr.history(contact, forces=path)
+    assert_allclose(after.asperity_forces[-2], before.asperity_forces[-1], atol=1e-12 * limit)
+    assert after.displacements[-2] == pytest.approx(before.displacements[-1], rel=1e-11)
+    fresh = cr.shear(contact, force=0.8 * limit)
+    assert_allclose(after.asperity_forces[-1], fresh.forces, atol=1e-12 * limit)
+    assert after.displacements[-1] == pytest.approx(fresh.displacement, rel=1e-12)
+
+
+@settings(max_examples=4, deadline=None)
+@given(st.lists(st.floats(-1, 1), min_size=1, max_size=2))
+def test_history_energy_is_the_area(fractions: list[float]) -> None:
+    """Work done along a path that ends in a closed cycle, less that of the path before it."""
+    contact = pressed("paper")
+    limit = limit_of(contact)
+    turns = np.array([0.0, 1.0, *fractions, -1.0, 1.0]) * limit
+    fine = np.concatenate([np.linspace(a, b, 30)[1:] for a, b in pairwise(turns)])
+    path = cr.history(contact, forces=fine)
+    begin = 28  # the first visit of the limit; the end is the same state again
+    work = np.trapezoid(path.forces[begin:], path.displacements[begin:])
+    spent = path.losses[-1] - path.losses[begin]
+    assert spent == pytest.approx(work, rel=1e-2)
+    assert (np.diff(path.losses) >= -1e-12 * path.losses[-1]).all()
+
+
+def test_first_loading_costs_a_quarter_and_each_branch_a_half() -> None:
+    contact = pressed("paper")
+    limit = limit_of(contact)
+    energy = cr.cycle(contact, maximum=0.6 * limit).loss
+    path = cr.history(contact, forces=np.array([0.6, -0.6, 0.6, -0.6]) * limit)
+    assert_allclose(path.losses, energy * np.array([0.25, 0.75, 1.25, 1.75]), rtol=1e-12)
+    assert_allclose(np.array(path.slips.sum(axis=1)) / path.slips[0].sum(), [1, -1, 1, -1])
+
+
+@pytest.mark.parametrize("influence", KINDS)
+def test_each_state_of_a_history_is_certified(influence: str) -> None:
+    """Bounds on the displacement add up over the turning points that a state hangs on."""
+    contact = pressed("rough", influence)
+    limit = limit_of(contact)
+    path = cr.history(contact, forces=np.array([0.6, -0.2, 0.3, 0.3, -0.6, 0.9]) * limit)
+    assert (path.displacement_errors > 0).all()
+    assert (path.displacement_errors < 1e-8 * np.abs(path.displacements)).all()
+    single = cr.shear(contact, force=0.6 * limit).certificate.displacement_error
+    # Found by another solver, so its residual, which is part of the bound, is another.
+    assert path.displacement_errors[0] == pytest.approx(single, rel=0.02)
+    assert path.displacement_errors[1] > path.displacement_errors[0]
+    assert path.displacement_errors[3] == path.displacement_errors[2]
+
+
+@pytest.mark.parametrize("forces", [[0.0], [0.0, 0.0, 0.3, 0.3], [0.5, 0.5, -0.5, 0.5, 0.5], []])
+def test_standing_still(forces: list[float]) -> None:
+    contact = pressed("paper")
+    path = cr.history(contact, forces=np.array(forces) * limit_of(contact))
+    assert path.asperity_forces.shape == (len(forces), 61)
+    for m in range(1, len(forces)):
+        if forces[m] == forces[m - 1]:
+            assert_allclose(path.asperity_forces[m], path.asperity_forces[m - 1], atol=1e-20)
+            assert path.losses[m] == pytest.approx(path.losses[m - 1], rel=1e-12)
+
+
+@settings(max_examples=15, deadline=None)
+@given(random_scenes(crowding=0.9), st.floats(1e-6, 1.0))
+def test_random_cycles(drawn: tuple[cr.Scene, float], fraction: float) -> None:
+    scene, approach = drawn
+    contact = cr.press(with_friction(scene), approach=approach)
+    if contact.load == 0:
+        return
+    cycle = cr.cycle(contact, maximum=fraction * limit_of(contact))
+    assert cycle.balance_defect < 1e-10
+    assert cycle.loss > 0
+    assert (cycle.asperity_losses >= 0).all()
+
+
+def test_bad_input() -> None:
+    contact = pressed("paper")
+    limit = limit_of(contact)
+    with pytest.raises(cr.InputError, match=r"maximum\[0\].*gross sliding"):
+        cr.cycle(contact, maximum=1.1 * limit)
+    with pytest.raises(cr.InputError, match=r"maximum\[0\].*at least the minimum"):
+        cr.cycle(contact, maximum=0.1 * limit, minimum=0.2 * limit)
+    with pytest.raises(cr.InputError, match=r"forces\[1\].*gross sliding"):
+        cr.history(contact, forces=[0.0, -2 * limit])
+    with pytest.raises(cr.InputError, match="expected 2 values"):
+        cr.cycles(contact, [0.1 * limit, 0.2 * limit], [0.0])
+    with pytest.raises(cr.InputError, match="coefficient of friction"):
+        cr.cycle(cr.press(paper(), approach=PAPER_APPROACH), maximum=0.0)
+
+
+def test_no_amplitude_and_no_load() -> None:
+    contact = pressed("paper")
+    cycle = cr.cycle(contact, maximum=0.0)
+    assert cycle.loss == 0
+    assert cycle.balance_defect == 0
+    light = cr.press(contact.scene, approach=-1e-6)
+    assert cr.cycle(light, maximum=0.0).loss == 0
+    assert cr.history(light, forces=[0.0]).displacements[0] == 0

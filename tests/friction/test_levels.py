@@ -1,0 +1,85 @@
+"""States, cycles and paths against levels in a hundred digits: values, and proved bounds."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+from levels_reference import DIGITS, FRICTION, SCENES, Friction, displaced, pressed, reference
+
+import convexrough as cr
+
+#: Half a unit in the last place of the largest, and what a bound may be of it.
+ULP, BOUND = 2.0**-53, 1e-14
+
+#: Entries of the geometry "closest" are proved to fewer digits by the operator as it is.
+FRACTIONS = [1e-3, 0.37, 0.999]
+
+
+def off(values: Any, true: Any) -> np.ndarray:
+    values, true = np.atleast_1d(values), np.atleast_1d(true)
+    return np.array(
+        [float(abs(arb(float(a)) - b).upper()) for a, b in zip(values, true, strict=True)]
+    )
+
+
+def assert_known(values: Any, errors: Any, true: Any, bound: float) -> None:
+    """Within four units in the last place of the largest, within the bounds, and these small."""
+    wrong, largest = off(values, true), float(np.abs(values).max())
+    assert (wrong <= np.atleast_1d(errors)).all()
+    assert wrong.max() <= 8 * ULP * largest
+    assert np.max(errors) <= bound * largest
+
+
+@pytest.mark.parametrize("fraction", FRACTIONS)
+@pytest.mark.parametrize("holding", ["approach", "load"])
+@pytest.mark.parametrize("name", SCENES)
+def test_states_and_cycles(name: str, holding: Any, fraction: float) -> None:
+    contact, true = pressed(name, holding), reference(name, fraction, holding)
+    force = fraction * FRICTION * contact.load
+    state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
+    proof = state.certificate
+    assert state.order == cycle.order == "proved"
+    assert proof.holds
+    with ctx.workdps(DIGITS):
+        assert_state(state, true)
+        assert_known(cycle.loss, cycle.loss_error, true.energy, BOUND)
+        moved = cycle.displacement_amplitude
+        assert_known(moved, cycle.displacement_error, true.displacement, BOUND)
+        shares = off(cycle.asperity_losses, true.energies)
+        assert shares.max() <= 8 * ULP * cycle.asperity_losses.max()
+        assert_known(
+            cycle.slips, cycle.slip_errors, 2 * true.slips, BOUND
+        ) if true.slips.any() else None
+        path = cr.history(contact, forces=force * np.array([1.0, -1.0, 1.0]))
+        assert_known(
+            path.losses, path.loss_errors, true.energy * np.array([arb(1), 3, 5]) / 4, BOUND
+        )
+        assert_known(path.displacements[2], path.displacement_errors[2], true.displacement, BOUND)
+    if fraction >= 0.1:
+        assert cycle.balance_defect < 1e-13
+
+
+def assert_state(state: cr.ShearState, true: Friction) -> None:
+    proof = state.certificate
+    assert_known(state.forces, proof.force_errors, true.forces, BOUND)
+    assert_known(state.displacement, proof.displacement_error, true.displacement, BOUND)
+    assert_known(state.stick_radii, proof.stick_radius_errors, true.stick_radii, BOUND)
+    assert (off(state.slips, true.slips) <= proof.slip_errors).all()
+    assert off(state.slips, true.slips).max() <= 8 * ULP * state.displacement
+    loaded = state.contact.loads > 0
+    assert (state.status[loaded] == np.where(true.sticks, "partial", "sliding")[loaded]).all()
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9])
+@pytest.mark.parametrize("name", ["paper", "rough"])
+def test_a_prescribed_displacement(name: str, share: float) -> None:
+    contact = pressed(name)
+    moved = share * cr.shear(contact, force=FRICTION * contact.load).displacement
+    state = cr.shear(contact, displacement=moved)
+    assert state.displacement == moved
+    assert state.certificate.displacement_error == 0.0
+    true = displaced(contact, moved, "approach")
+    with ctx.workdps(DIGITS):
+        assert_known(state.forces, state.certificate.force_errors, true.forces, BOUND)
+        assert_known(state.force, state.certificate.force_error, true.f * true.T, BOUND)

@@ -1,0 +1,208 @@
+"""Load paths: values of independent prototypes, limits, balances, and bad input."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+from path_scenes import LARGEST, ONE, PAPER, TWO, follow, path_of
+
+import convexrough as cr
+from convexrough.influence import couple
+from convexrough.sphere import mindlin
+
+#: (scene, path): after each point X, W, front over the largest load, how many slide of how many
+#: touch. Prototypes: bristles, and a step per asperity.
+VALUES = {
+    ("paper", "one"): [
+        (0, 0, None, 0, 31),
+        (7.3276448474924e-06, 2.3814820748506e-14, 0.3, 12, 31),
+        (7.3276448474924e-06, 2.3814820748506e-14, None, 0, 37),
+        (-1.4399972915528e-06, 4.6792832656792e-14, 0.575, 6, 37),
+        (-2.5831383947188e-06, 8.7606501029899e-14, 0.425, 6, 37),
+        (4.7938665937403e-06, 9.1658880935531e-14, 0.525, 6, 37),
+        (2.7969942282077e-06, 9.2975537297004e-14, 0.475, 0, 31),
+    ],
+    ("paper", "two"): [
+        (1.5178571428571e-05, 0, None, 0, 37),
+        (-4.6663907908195e-06, 9.7302648312866e-14, 0.2 / 3, 6, 19),
+        (7.4348708668891e-06, 9.7302648312866e-14, None, 0, 37),
+        (-1.2316486990249e-05, 1.8212590535391e-13, 9.3 / 23, 6, 37),
+        (1.2989846073507e-06, 2.3011480491173e-13, 0.1 / 3, 0, 7),
+        (1.7759489868342e-05, 2.3011480491173e-13, None, 0, 37),
+    ],
+    ("rough", "one"): [
+        (0, 0, None, None, None),
+        (7.3379853300463e-06, 2.2832062336922e-14, 0.3, None, None),
+        (7.3379853300463e-06, 2.2832062336922e-14, None, 0, 37),
+        (-1.3427625834495e-06, 4.5552987585023e-14, 0.575, 5, 37),
+        (-2.6022295255495e-06, 9.1131662914572e-14, 0.425, 11, 37),
+        (4.7235760733582e-06, 9.5300530487399e-14, 0.525, 6, 37),
+        (2.7644990653442e-06, 9.6907198852105e-14, 0.475, 1, 31),
+    ],
+}
+POINTS = {"one": ONE, "two": TWO}
+
+#: Q_i / (f P*) at one asperity of each ring, F E D C B A, after the fourth point.
+RING = [0, 1, 7, 13, 19, 31]
+FORCES = {
+    "one": [
+        -9.9418772118850e-05,
+        -1.2070839330947e-04,
+        -7.0973243179081e-04,
+        -1.6145256766410e-03,
+        -8.2252119475348e-03,
+        -6.0880398078360e-03,
+    ],
+    "two": [
+        -1.9297872492929e-02,
+        -2.3160920041346e-02,
+        -2.4555639934336e-02,
+        -1.9957310529648e-02,
+        -1.2635373055962e-02,
+        -3.8390713005919e-03,
+    ],
+}
+
+
+@pytest.mark.parametrize(("name", "which"), VALUES)
+def test_values_of_the_prototypes(name: str, which: str) -> None:
+    path = follow(name, POINTS[which])
+    touching = (path.status != "open").sum(axis=1)
+    sliding = (path.status == "sliding").sum(axis=1)
+    for k, (X, W, front, slide, touch) in enumerate(VALUES[name, which]):
+        assert path.displacements[k] == pytest.approx(X, rel=1e-12, abs=1e-19)
+        assert path.losses[k] == pytest.approx(W, rel=1e-11, abs=1e-28)
+        assert path.fronts[k] / LARGEST[name] == pytest.approx(front or np.nan, nan_ok=True)
+        if touch is not None:
+            assert (sliding[k], touching[k]) == (slide, touch)
+    assert not (path.status == "undecided").any()
+    assert path.order == "proved"
+    assert path.presses <= 3 * len(path.loads)
+    # How well it is proved.
+    assert (path.asperity_force_errors < 1e-13 * LARGEST[name]).all()
+    assert (path.displacement_errors < 2e-12 * np.abs(path.displacements).max()).all()
+    assert (path.loss_errors < 1e-10 * path.losses[-1]).all()
+    assert (path.displacement_errors[1:] > 0).all()
+    if name == "paper":
+        assert_allclose(
+            path.asperity_forces[3, RING] / (0.5 * LARGEST[name]), FORCES[which], rtol=1e-11
+        )
+
+
+@pytest.mark.parametrize("name", ["paper", "rough"])
+def test_balances(name: str) -> None:
+    """Forces add up, Coulomb's bound holds, and every asperity's displacements add up to X."""
+    path = follow(name, TWO)
+    scene = path.scene
+    assert_allclose(path.asperity_forces.sum(axis=1), path.forces, atol=1e-14 * LARGEST[name])
+    assert (np.abs(path.asperity_forces) <= 0.5 * path.asperity_loads + 1e-14 * LARGEST[name]).all()
+    touching = path.status == "sliding"
+    signs = np.array([[float(curve.slopes[-1])] for curve in path.curves])
+    assert_allclose(
+        (signs * path.asperity_forces)[touching], 0.5 * path.asperity_loads[touching], rtol=1e-9
+    )
+    scale = 1.0 / (np.pi * scene.material.contact_modulus)
+    A = couple(scene, np.arange(len(scene)), scale, "dense")
+    moved = mindlin.ratio(scene.material.poisson_ratio) * A.apply(path.asperity_forces.T).T
+    total = path.asperity_displacements + moved
+    expected = np.broadcast_to(path.displacements[:, None], total.shape)
+    assert_allclose(total, expected, atol=1e-12 * 1e-5)
+
+
+@pytest.mark.parametrize("name", ["paper", "rough"])
+def test_constant_load_is_a_history(name: str) -> None:
+    scene, P, Q = path_of(name, [(1, t) for t in (0.6, -0.2, 0.3, 0.3, -0.6, 0.9, -0.95)])
+    contact = cr.press(scene, load=P[0])
+    past = cr.history(contact, forces=Q)
+    path = cr.load_path(scene, start=contact, loads=P, forces=Q)
+    loaded = contact.loads > 0
+    assert_allclose(path.displacements, past.displacements, rtol=1e-13, atol=1e-18)
+    assert_allclose(path.asperity_forces, past.asperity_forces, atol=1e-13 * Q.max())
+    assert_allclose(
+        path.asperity_displacements[:, loaded],
+        past.asperity_displacements[:, loaded],
+        atol=1e-13 * np.abs(past.displacements).max(),
+    )
+    assert_allclose(path.losses, past.losses, rtol=1e-12)
+    difference = np.abs(path.displacements - past.displacements)
+    assert (difference <= path.displacement_errors + past.displacement_errors).all()
+    assert (np.abs(path.losses - past.losses) <= path.loss_errors + 1e-13 * past.losses).all()
+
+
+def test_what_a_path_costs_is_its_work() -> None:
+    """W = the integral of Q dX less the change of stored energy, which is that of the curve."""
+    path = follow("paper", [(0.8, 0.3), (0.5, -0.2), (0.9, 0.5)])
+    points = np.column_stack((path.loads, path.forces / 0.5))
+    curve = path.curves[-1]
+    pairs = zip(curve.levels, curve.heights, strict=True)
+    slow = np.array([(float(level), float(height)) for level, height in pairs])
+    missed = []
+    for parts in (16, 32):
+        cut = _cut(np.vstack(([0.0, 0.0], points)), parts)
+        assert cut.losses[-1] == pytest.approx(path.losses[-1], rel=1e-11, abs=0.0)
+        # Stored energy: the work along the path without slip to the same state.
+        stored = _cut(slow, parts)
+        assert stored.losses[-1] < 1e-12 * path.losses[-1]
+        missed.append((_work(cut) - _work(stored)) / path.losses[-1] - 1)
+    assert abs(missed[1]) < 2e-3
+    assert abs(missed[1]) < 0.4 * abs(missed[0])
+
+
+def _cut(corners: NDArray[np.float64], parts: int) -> cr.LoadPath:
+    """Each segment in parts, finer where it begins: near no load X goes as P^(2/3)."""
+    along = (np.arange(1, parts + 1)[:, None] / parts) ** 2
+    fine = np.concatenate([a + along * (b - a) for a, b in pairwise(corners)])
+    return cr.load_path(PAPER, loads=fine[:, 0], forces=0.5 * fine[:, 1])
+
+
+def _work(path: cr.LoadPath) -> float:
+    """By the trapezoid rule."""
+    Q, X = np.append(0.0, path.forces), np.append(0.0, path.displacements)
+    return float(np.trapezoid(Q, X))
+
+
+def test_pulled_off_and_pressed_again() -> None:
+    path = follow("paper", [(1, 0.5), (0, 0), (0.6, 0), (0.6, 0.3)])
+    assert path.displacements[1] == 0.0
+    assert (path.forces[1] == 0).all()
+    assert path.status[1, 0] == "undecided"  # the highest just touches
+    assert (path.status[1, 1:] == "open").all()
+    fresh = follow("paper", [(0.6, 0), (0.6, 0.3)])
+    assert path.displacements[3] == pytest.approx(fresh.displacements[1], rel=1e-13, abs=0.0)
+    assert_allclose(path.forces[3], fresh.forces[1], atol=1e-14 * LARGEST["paper"])
+
+
+def test_unloading_at_constant_shear_slips() -> None:
+    path = follow("paper", [(1, 0), (1, 0.3), (0.5, 0.3)])
+    assert path.losses[2] > path.losses[1]
+    assert path.fronts[2] == pytest.approx(0.2 * LARGEST["paper"], abs=0.0)
+
+
+def test_bad_input() -> None:
+    largest = LARGEST["paper"]
+
+    def follow(loads: object, forces: object, scene: cr.Scene = PAPER) -> None:
+        cr.load_path(scene, loads=loads, forces=forces)  # type: ignore[arg-type]
+
+    with pytest.raises(cr.InputError, match=r"forces\[1\].*gross sliding, 0.2 beyond"):
+        follow([largest, largest], [0.0, 0.6 * largest])
+    with pytest.raises(cr.InputError, match=r"loads\[1\].*not negative"):
+        follow([largest, -largest], [0.0, 0.0])
+    with pytest.raises(cr.InputError, match=r"forces\[1\].*before contact is lost"):
+        follow([largest, 0.0], [0.0, 1e-9 * largest])
+    with pytest.raises(cr.InputError, match="at least one"):
+        follow([], [])
+    with pytest.raises(cr.InputError, match="2 loads and 1 forces"):
+        follow([largest, largest], [0.0])
+    with pytest.raises(cr.InputError, match=r"loads\[0\].*finite"):
+        follow([np.nan], [0.0])
+    with pytest.raises(cr.InputError, match=r"forces\[0\].*finite"):
+        follow([largest], [np.inf])
+    with pytest.raises(cr.InputError, match="coefficient of friction"):
+        follow([largest], [0.0], replace(PAPER, friction=None))
+    other = cr.press(replace(PAPER, friction=0.4), load=largest)
+    with pytest.raises(cr.InputError, match="another scene"):
+        cr.load_path(PAPER, loads=[largest], forces=[0.0], start=other)

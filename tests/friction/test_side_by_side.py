@@ -1,0 +1,137 @@
+"""The conic step against Newton's method and the memory curve, and the three side by side."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from path_scenes import LARGEST, ONE, PAPER, TWO, path_of, shaded
+from scenes import random_scenes
+
+import convexrough as cr
+from convexrough.friction import conic_step
+from convexrough.friction.conic_pieces import Piece, pieces_of
+from convexrough.friction.curve import MemoryCurve
+from convexrough.solvers.programs import RawAnswer
+
+
+@pytest.mark.parametrize("points", [ONE, TWO])
+def test_three_ways_to_one_path(points: list[tuple[float, float]]) -> None:
+    scene, P, Q = path_of("paper", points)
+    found = cr.compare_paths(scene, loads=P, forces=Q)
+    assert [each.way for each in found.entries] == ["general step", "memory curve", "conic step"]
+    assert [each.outcome for each in found.entries] == ["answered"] * 3
+    apart = [(each.force_disagreement, each.displacement_disagreement) for each in found.entries]
+    assert apart[0] == (0.0, 0.0)
+    assert max(apart[1]) < 1e-12
+    assert max(apart[2]) < 1e-5
+
+
+@settings(max_examples=6, deadline=None)
+@given(random_scenes(crowding=0.7, most=10), st.integers(0, 2**32 - 1))
+def test_random_paths_as_cone_programs(drawn: tuple[cr.Scene, float], seed: int) -> None:
+    scene, approach = drawn
+    largest = cr.press(scene, approach=approach).load
+    if largest == 0:
+        return
+    rng = np.random.default_rng(seed)
+    P = rng.uniform(0.2, 1.0, 5) * largest
+    Q = 0.5 * P * rng.uniform(-0.9, 0.9, 5)
+    found = cr.compare_paths(replace(scene, friction=0.5), loads=P, forces=Q)
+    conic = found.entries[2]
+    assert conic.outcome == "answered" or "dense" in conic.message
+    if conic.outcome == "answered":
+        assert conic.force_disagreement < 1e-4
+        assert conic.displacement_disagreement < 1e-4
+
+
+def test_without_order_the_curve_is_refused_and_the_steps_agree() -> None:
+    scene = shaded()
+    largest = cr.press(scene, approach=1.0).load
+    P, Q = np.array([0.8, 1.0]) * largest, 0.5 * np.array([0.2, 0.5]) * largest
+    found = cr.compare_paths(scene, loads=P, forces=Q)
+    assert found.order == "fails"
+    assert found.entries[1].outcome == "refused"
+    assert found.entries[1].path is None
+    conic = found.entries[2]
+    assert conic.outcome == "answered", conic.message
+    assert conic.force_disagreement < 1e-4
+    assert "refused: an indentation falls" in repr(found)
+    assert np.isnan(found.to_xarray()["asperity_forces"][1]).all()
+    found.plot()
+
+
+def test_a_crowded_scene_is_refused_by_the_cones() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0]])
+    material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
+    scene = cr.Scene(
+        1e9, cr.Asperities(points, np.ones(2)), material, friction=0.5, geometry="summit"
+    )
+    P = cr.press(scene, approach=2.0).load
+    found = cr.compare_paths(scene, loads=[P], forces=[0.1 * P])
+    assert found.entries[2].outcome == "failed"
+    assert "too dense for a convex program" in found.entries[2].message
+
+
+def test_a_wrong_answer_of_the_solver_shows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing repairs the cone program's answer on its way to the comparison."""
+    honest = conic_step.run_clarabel
+
+    def liar(*arguments: object, **settings: object) -> RawAnswer:
+        raw = honest(*arguments, **settings)  # type: ignore[arg-type]
+        return raw._replace(x=raw.x * 0.99)
+
+    monkeypatch.setattr(conic_step, "run_clarabel", liar)
+    scene, P, Q = path_of("paper", ONE)
+    conic = cr.compare_paths(scene, loads=P, forces=Q).entries[2]
+    assert conic.force_disagreement > 1e-3
+
+
+@pytest.mark.parametrize("own", [0.7, 1.0, 1.4])
+def test_the_pieces_join_to_the_deflection(own: float) -> None:
+    """Slopes of W are what one update of the curve gives, on a curve with three layers."""
+    k = 1.3
+    curve = MemoryCurve.pressed(0.5)
+    for point in ((0.6, 0.05), (1.0, 0.3), (1.0, 0.1)):
+        curve, _ = curve.go(*point)
+    pieces = pieces_of(curve, own, k)
+    load = (own / k) ** 1.5
+
+    def force(deflection: float) -> float:
+        after, _ = curve.go(own, deflection)
+        levels = np.array([float(each) for each in after.levels])
+        loads = (levels / k) ** 1.5 / load
+        return float(np.diff(loads) @ np.array([float(each) for each in after.slopes]))
+
+    for deflection in np.linspace(-0.98, 0.98, 29) * own:
+        part = force(deflection)
+        on = [piece for piece in pieces if piece.distance(part) < 1e-12]
+        assert on
+        for piece in on:
+            assert own * piece.deflection(part) == pytest.approx(deflection, abs=1e-9)
+        values = [piece.cost(part) + piece.energy for piece in on]
+        assert_allclose(values, values[0], atol=1e-12)
+
+
+def test_the_pieces_cover_all_that_friction_bears() -> None:
+    pieces = pieces_of(MemoryCurve.pressed(1.0).go(1.0, 0.4)[0], 1.2, 1.0)
+    ends = np.array([piece.forces() for piece in pieces])
+    assert ends.min() == pytest.approx(-1.0)
+    assert ends.max() == pytest.approx(1.0)
+    assert isinstance(pieces[0], Piece)
+
+
+def test_gross_sliding_is_left_to_the_curve() -> None:
+    """At Q = f P Newton's method has nothing that sticks to hold on to."""
+    P = LARGEST["paper"]
+    found = cr.compare_paths(PAPER, loads=[P, P], forces=[0.1 * P, 0.5 * P])
+    assert found.entries[0].outcome == "failed"
+    assert found.entries[1].outcome == "answered"
+    assert found.entries[1].force_disagreement == 0.0
+
+
+def test_bad_input() -> None:
+    with pytest.raises(cr.InputError, match="gross sliding"):
+        cr.compare_paths(PAPER, loads=[1e-7], forces=[1e-7])

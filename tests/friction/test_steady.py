@@ -1,0 +1,212 @@
+"""Closed paths: values of the prototypes, closed forms, and today's cycles as the special case."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from path_scenes import LARGEST, SCENES, path_of, shaded
+from scenes import random_scenes
+
+import convexrough as cr
+from convexrough.arrays import Array
+from convexrough.friction import general_step
+from convexrough.friction.levels import FrictionLevels
+
+
+def octagon(name: str) -> tuple[cr.Scene, Array, Array]:
+    t = np.arange(8) * np.pi / 4
+    points = np.column_stack((1 + 0.4 * np.cos(t), 0.5 * np.sin(t + np.pi / 4))) / 1.4
+    return path_of(name, [tuple(point) for point in points])
+
+
+def settled(case: tuple[cr.Scene, Array, Array]) -> cr.Cycle:
+    scene, P, Q = case
+    return cr.steady(scene, loads=P, forces=Q)
+
+
+def test_the_octagon() -> None:
+    found = settled(octagon("paper"))
+    mean = LARGEST["paper"] / 1.4
+    assert found.loss_first == pytest.approx(9.5663629049784e-14, rel=1e-12, abs=0.0)
+    assert found.loss == pytest.approx(1.9339188634987e-13, rel=1e-12, abs=0.0)
+    assert found.level / mean == pytest.approx(0.4318019484661, rel=1e-12)
+    assert found.force_level / (0.5 * mean) == pytest.approx(-0.2146446609407, rel=1e-12)
+    assert found.order == "proved"
+    assert found.loss_error < 1e-10 * found.loss
+    assert found.asperity_losses.sum() == pytest.approx(found.loss, rel=1e-3, abs=0.0)
+    words, counts = np.unique(found.status, return_counts=True)
+    assert dict(zip(words.tolist(), counts.tolist(), strict=True)) == {
+        "intermittent": 6,
+        "open": 24,
+        "partial": 19,
+        "sliding": 12,
+    }
+    assert settled(octagon("rough")).loss == pytest.approx(1.9572569969746e-13, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "loss"), [("paper", 1.4398575935045e-13), ("rough", 1.3935046228750e-13)]
+)
+def test_a_straight_line(name: str, loss: float) -> None:
+    """Against its closed form, a divided difference of V, too."""
+    found = settled(path_of(name, [(0.9, 0.4), (0.5, -0.4)]))
+    assert found.loss == pytest.approx(loss, rel=1e-12, abs=0.0)
+    assert found.level / LARGEST[name] == pytest.approx(0.3)
+    P, p, q = 0.7, 0.2, 0.4
+    levels = cr.press(SCENES[name], load=LARGEST[name]).keep(FrictionLevels)
+    points = [levels.at(Fraction(x) * levels.load) for x in (P - q, P - p, P + p)]
+    unit = levels.units.force * levels.units.length
+    V = [float(each.energy.value) * unit / LARGEST[name] for each in points]
+    still, low, high = V
+    bracket = (high - still) / (p + q) + (low - still) / (q - p) - (high - low) / (2 * p)
+    bracket -= float(points[0].approach.value) * levels.units.length
+    travel = (2 - 0.3) / (2 * (1 - 0.3)) * 0.5**2
+    assert found.loss == pytest.approx(4 * travel * q * LARGEST[name] * bracket, rel=1e-10, abs=0.0)
+
+
+def test_loads_that_follow_cost_nothing() -> None:
+    found = settled(path_of("paper", [(0.9, 0.2), (0.5, -0.1)]))
+    assert found.loss == 0
+    assert found.level == pytest.approx(0.5 * LARGEST["paper"], abs=0.0)
+    assert set(found.status) == {"stuck", "intermittent", "open"}
+
+
+@pytest.mark.parametrize(
+    ("degrees", "loss"), [(0, 2.3311e-13), (45, 2.2997e-13), (90, 4.879666e-14), (135, 1.0184e-13)]
+)
+def test_ellipses(degrees: float, loss: float) -> None:
+    """The stuck level in closed form; the loss converges at second order."""
+    mean, phase = LARGEST["paper"] / 1.4, np.radians(degrees)
+    al, be = 0.4, 0.5
+    losses = []
+    for chords in (24, 48, 96):
+        P, Q = cr.elliptic_path(
+            load=mean,
+            load_amplitude=al * mean,
+            force_amplitude=0.5 * be * mean,
+            phase=phase,
+            friction=0.5,
+            chords=chords,
+        )
+        found = cr.steady(SCENES["paper"], loads=P, forces=Q)
+        rounds = [np.sqrt(al**2 + be**2 + 2 * c * al * be * np.sin(phase)) for c in (1, -1)]
+        assert found.level / mean == pytest.approx(1 - sum(rounds) / 2, rel=1e-12)
+        losses.append(found.loss)
+    assert losses[-1] == pytest.approx(loss, rel=5e-4, abs=0.0)
+    assert abs(losses[2] / losses[1] - 1) < 0.45 * abs(losses[1] / losses[0] - 1) + 1e-9
+
+
+@pytest.mark.parametrize("name", ["paper", "rough"])
+def test_constant_load_is_a_cycle(name: str) -> None:
+    scene, P, Q = path_of(name, [(1, 0.7), (1, -0.3)])
+    contact = cr.press(scene, load=P[0])
+    cycle = cr.cycle(contact, maximum=Q[0], minimum=Q[1])
+    found = cr.steady(scene, loads=P, forces=Q)
+    assert found.loss == pytest.approx(cycle.loss, rel=1e-11, abs=0.0)
+    assert_allclose(
+        found.asperity_losses, cycle.asperity_losses, rtol=1e-8, atol=1e-12 * cycle.loss
+    )
+    assert (found.status == cycle.status).all()
+    first = cr.shear(contact, force=0.5 * (Q[0] - Q[1]))
+    assert_allclose(found.slips, 2 * first.slips, atol=1e-12 * first.displacement)
+    sticking = found.status == "partial"
+    assert_allclose(found.stick_radii[sticking], first.stick_radii[sticking], rtol=1e-9)
+
+
+@settings(max_examples=8, deadline=None)
+@given(random_scenes(crowding=0.7, most=12), st.integers(0, 2**32 - 1))
+def test_every_later_cycle_is_the_same(drawn: tuple[cr.Scene, float], seed: int) -> None:
+    scene, approach = drawn
+    largest = cr.press(scene, approach=approach).load
+    if largest == 0:
+        return
+    rng = np.random.default_rng(seed)
+    P = rng.uniform(0.1, 1.0, 4)
+    T = P * rng.uniform(-0.9, 0.9, 4)
+    scene = replace(scene, friction=0.4)
+    found = cr.steady(scene, loads=P * largest, forces=0.4 * T * largest)
+    past = rng.uniform(0.1, 1.0, 2)
+    loads = np.concatenate((past, *[P] * 3, P[:1])) * largest
+    forces = np.concatenate((0.9 * past, *[T] * 3, T[:1])) * 0.4 * largest
+    path = cr.load_path(scene, loads=loads, forces=forces)
+    cost = path.losses[14] - path.losses[10]
+    doubt = path.loss_errors[-1] + path.loss_errors[10] + found.loss_error
+    assert cost == pytest.approx(found.loss, abs=doubt)
+    assert_allclose(path.asperity_forces[10], path.asperity_forces[14], atol=1e-14 * largest)
+
+
+def test_losses_against_phase() -> None:
+    """Rows are closed paths of their own; the smooth sphere has a closed form in step."""
+    scene, P = SCENES["paper"], 0.7 * LARGEST["paper"]
+    p, t = 0.2 * P, 0.3 * P
+    found = cr.phase_losses(
+        scene,
+        load=P,
+        load_amplitude=p,
+        force_amplitude=0.5 * t,
+        phases=[0.0, 0.7, np.pi / 2],
+        factors=[1.0, 0.5],
+        chords=12,
+    )
+    assert found.phases.tolist() == [0.0, 0.7, np.pi / 2] * 2
+    assert found.factors.tolist() == [1.0] * 3 + [0.5] * 3
+    loads, forces = cr.elliptic_path(
+        load=P, load_amplitude=p, force_amplitude=0.5 * t, phase=0.7, friction=0.5, chords=12
+    )
+    alone = cr.steady(scene, loads=loads, forces=forces)
+    assert found.losses[1] == alone.loss
+    assert found.levels[1] == alone.level
+    assert found.sliding[1] == np.isin(alone.status, ("sliding", "intermittent")).sum()
+
+    def energy(s: float) -> float:  # V of the smooth sphere, R = 1: D0 = (3 s / 4)^(2/3)
+        return 0.6 * s * float((0.75 * s) ** (2 / 3))
+
+    def mean(a: float, b: float) -> float:
+        return (energy(b) - energy(a)) / (b - a)
+
+    bracket = mean(P - t, P + p) + mean(P - t, P - p) - mean(P - p, P + p)
+    bracket -= (0.75 * (P - t)) ** (2 / 3)
+    line = 4 * (2 - 0.3) / (2 * (1 - 0.3)) * 0.5**2 * t * bracket
+    assert found.smooth[2] == pytest.approx(line, rel=1e-9, abs=0.0)
+    assert found.losses[2] < 0.5 * found.losses[0]
+    assert found.order == "proved"
+
+
+def test_where_order_fails_nothing_is_said_of_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few steps are enough to see that a cycle is the path that it stands for."""
+    for name in ("SETTLED", "SETTLED_MOTION"):
+        monkeypatch.setattr(general_step, name, np.inf)
+    scene = shaded()
+    largest = cr.press(scene, approach=1.4).load
+    P, Q = np.array([0.8, 1.0]) * largest, np.array([-0.1, 0.1]) * largest
+    found = cr.steady(scene, loads=P, forces=Q)
+    assert found.order == "fails"
+    assert np.isinf([found.loss_error, found.loss_first_error]).all()
+    assert set(found.status) == {"undecided"}
+    path = cr.load_path(
+        scene, loads=np.append(np.tile(P, 2), P[0]), forces=np.append(np.tile(Q, 2), Q[0])
+    )
+    assert found.loss == pytest.approx(path.losses[4] - path.losses[2], rel=1e-9)
+    assert found.loss > 0
+
+
+def test_bad_input() -> None:
+    scene, P, Q = octagon("paper")
+    with pytest.raises(cr.InputError, match="gross sliding"):
+        cr.steady(scene, loads=P, forces=4 * Q)
+    with pytest.raises(cr.InputError, match="at least one"):
+        cr.steady(scene, loads=[], forces=[])
+    with pytest.raises(cr.InputError, match=r"loads\[0\].*not negative"):
+        cr.steady(scene, loads=-P, forces=Q)
+    with pytest.raises(cr.InputError, match=r"forces\[0\].*before contact is lost"):
+        cr.steady(scene, loads=[0.0, P[1]], forces=[1e-9, 0.0])
+    with pytest.raises(cr.InputError, match="finite"):
+        cr.steady(scene, loads=[np.inf], forces=[0.0])
+    with pytest.raises(cr.InputError, match="phases: found none"):
+        cr.phase_losses(scene, load=P[0], load_amplitude=0.0, force_amplitude=0.0, phases=[])
+    with pytest.raises(cr.InputError, match="chords"):
+        cr.elliptic_path(load=1.0, load_amplitude=0.1, force_amplitude=0.1, friction=0.5, chords=2)

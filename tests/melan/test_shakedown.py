@@ -1,0 +1,407 @@
+"""Limits of shakedown: values of the prototypes, and histories a little below and above each."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from flint import arb, arb_mat
+from numpy.testing import assert_allclose
+from path_scenes import LARGEST, PAPER, ROUGH, SCENES, shaded
+from scenes import solve_exactly, twins
+
+import convexrough as cr
+from convexrough.arrays import Array
+from convexrough.melan import program as melan
+from convexrough.melan import shakedown
+from convexrough.solvers.programs import ConeProgram, RawAnswer, run_clarabel
+from convexrough.vector_shear.problem import VectorProblem
+
+P, RADIUS = LARGEST["paper"], 0.5 * LARGEST["paper"]
+SWING = RADIUS * np.array([1.0, -1.0])
+
+#: An asperity of the rings B and A: the last but one and the last to touch.
+B, A = 19, 31
+
+
+def turned(angle: float, chords: int = 96) -> tuple[Array, Array]:
+    """The amplitudes of an ellipse: 0.1 and 0.2 of the mean load, which is 0.9 of the largest."""
+    return cr.elliptic_path(
+        load=0.0,
+        load_amplitude=0.09 * P,
+        force_amplitude=0.5 * 0.18 * P,
+        phase=np.radians(angle),
+        friction=0.5,
+        chords=chords,
+    )
+
+
+def test_exact_limits_at_constant_load() -> None:
+    found = cr.shakedown(PAPER, loads=P, force_amplitudes=SWING)
+    assert found.factor == pytest.approx(0.351719571750, rel=1e-11)
+    assert found.factors[B] == pytest.approx(0.616512127452, rel=1e-11)
+    assert found.lower <= found.factor <= found.upper
+    assert found.gap < 1e-10
+    assert found.order == "proved"
+    assert found.gross == pytest.approx(1.0)
+    # The same as the onset of sliding on first loading.
+    contact = cr.press(PAPER, load=P)
+    onset = cr.onset_of_sliding(contact)
+    loaded = contact.loads > 0
+    assert_allclose(found.factors[loaded], onset[loaded] / RADIUS, rtol=1e-9)
+    assert np.isnan(found.factors[~loaded]).all()
+    assert np.flatnonzero(found.mechanism > 0.5).tolist() == list(range(31, 37))
+
+
+@pytest.mark.parametrize(
+    ("angle", "a", "b"),
+    [
+        (0, 1.250804608223, 2.566569395968),
+        (45, 1.309538047714, 2.687086579329),
+        (90, 1.398442065278, 2.869511819177),
+    ],
+)
+def test_exact_limits_around_ellipses(angle: float, a: float, b: float) -> None:
+    p, q = turned(angle)
+    found = cr.shakedown(PAPER, loads=0.9 * P, load_amplitudes=p, force_amplitudes=q)
+    assert found.factor == pytest.approx(a, rel=1e-11)
+    assert found.factors[B] == pytest.approx(b, rel=1e-11)
+    assert found.lower <= a * (1 + 1e-12)
+    assert found.upper >= a * (1 - 1e-12)
+
+
+@pytest.mark.parametrize("angle", [None, 0, 45, 90])
+def test_paths_below_and_above_the_limit(angle: float | None) -> None:
+    """1 % below no asperity of a ring slides in a later cycle; 1 % above all do, as L* says."""
+    p, q = (np.zeros(2), SWING) if angle is None else turned(angle, chords=8)
+    mean, m = P if angle is None else 0.9 * P, len(p)
+    limit = cr.shakedown(PAPER, loads=mean, load_amplitudes=p, force_amplitudes=q)
+    for asperity, part in product((A, B), (0.99, 1.01)):
+        slides = part > 1
+        factor = part * limit.factors[asperity]
+        loads, forces = mean + factor * p, factor * q
+        found = cr.steady(PAPER, loads=loads, forces=forces)
+        assert found.status[asperity] == ("sliding" if slides else "partial")
+        path = cr.load_path(PAPER, loads=np.tile(loads, 2), forces=np.tile(forces, 2))
+        drift = path.drifts[m:, asperity]
+        slip = found.slips[asperity]
+        assert np.ptp(drift) == pytest.approx(slip, abs=1e-12 * path.displacements.max())
+        assert (slip > 0) == slides
+
+
+@pytest.mark.parametrize(("name", "exact", "elastic"), [("rough", 0.3101185108701, 0.2238120185)])
+def test_rough(name: str, exact: float, elastic: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The limit alone, without those of all asperities."""
+    monkeypatch.setattr(shakedown, "MOST_ONSETS", 0)
+    swing = 0.5 * LARGEST[name] * np.array([1.0, -1.0])
+    found = cr.shakedown(ROUGH, loads=LARGEST[name], force_amplitudes=swing)
+    assert found.factor == pytest.approx(exact, rel=1e-9)
+    assert found.lower <= found.factor <= found.upper
+    below = cr.shakedown(ROUGH, loads=LARGEST[name], force_amplitudes=swing, kind="elastic")
+    assert below.factor == pytest.approx(elastic, rel=1e-9)
+
+
+def test_elastic_limit() -> None:
+    """Lower than the exact one, as the edge of a light contact is soft once it slips."""
+    found = cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="elastic")
+    assert found.factor == pytest.approx(0.2571338521083, rel=1e-11)
+    assert found.witness.sum() == pytest.approx(0.0, abs=1e-12 * P)
+    contact = cr.press(PAPER, load=P)
+    assert (np.abs(found.witness) <= 0.5 * contact.loads * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize(
+    ("ratio", "along", "across"),
+    [
+        (0.0, 0.2571338521, 0.2571338521),
+        (0.3, 0.2492494516, 0.2419789620),
+        (0.5, 0.2429058344, 0.2305870527),
+    ],
+)
+def test_vector_limits(ratio: float, along: float, across: float) -> None:
+    scene = replace(PAPER, material=cr.Material(1.0, ratio))
+    for direction, limit in ((0, along), (1, across)):
+        swing = np.zeros((2, 2))
+        swing[:, direction] = SWING
+        found = cr.shakedown(scene, loads=P, force_amplitudes=swing, kind="vector")
+        assert found.factor == pytest.approx(limit, rel=1e-9)
+        assert found.lower <= found.upper
+        assert found.gap < 1e-8
+
+
+def test_vector_limits_of_other_paths() -> None:
+    def limit(path: Array, mean: tuple[float, float] = (0.0, 0.0)) -> float:
+        return cr.shakedown(
+            PAPER,
+            loads=P,
+            forces=RADIUS * np.array(mean),
+            force_amplitudes=RADIUS * path,
+            kind="vector",
+        ).factor
+
+    angles = 2 * np.pi * np.arange(24) / 24
+    circle = np.column_stack((np.cos(angles), np.sin(angles)))
+    assert limit(circle) == pytest.approx(0.2419789620, rel=1e-8)
+    assert limit(np.array([[0, 0], [1.0, 0]])) == pytest.approx(0.49849890, rel=1e-8)
+    assert limit(np.array([[0, 0], [1.0, 0], [1, 1]])) == pytest.approx(0.34487646, rel=1e-7)
+    across = np.array([[0, 1.0], [0, -1.0]])
+    assert limit(across, (0.5, 0.0)) == pytest.approx(0.24197896, rel=1e-7)
+
+
+def test_the_mechanism_proves_the_upper_bound() -> None:
+    """Its slips, closed over a cycle, evaluated here once more with the package's kernel only."""
+    swing = np.column_stack((SWING, 0 * SWING))
+    found = cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="vector")
+    net = found.mechanism.sum(axis=0)
+    touching = cr.press(PAPER, load=P).loads > 0
+    assert_allclose(net[touching], np.broadcast_to(net[0], (37, 2)), atol=1e-9)
+    assert np.hypot(*found.mechanism.T).max() == pytest.approx(1.0)
+
+
+def test_a_path_that_follows_never_slides() -> None:
+    found = cr.shakedown(
+        PAPER, loads=P, load_amplitudes=[0.1 * P, 0.0], force_amplitudes=[0.02 * P, 0.0]
+    )
+    assert found.factor == np.inf
+
+
+#: What interior-point answers leave of a slip that has died out, over one that has not.
+LEFT = 1e-5
+
+
+class Stuck:
+    """Asperities that stick until they slide, at constant load: |q_i| <= P_i, step by step.
+
+    Each step is Moreau's: the least (1/2) d'K d over forces q = before + d within friction that add
+    up. Its multipliers are the slips. Vectors, n of them, in the order x_1, y_1, ...
+    """
+
+    def __init__(self, stiffness: Array, limits: Array) -> None:
+        self.K, self.P, self.q = stiffness, limits, np.zeros(2 * len(limits))
+        self.slip = np.zeros(len(limits))
+
+    def go(self, total: Array) -> None:
+        from scipy.sparse import csc_matrix, vstack
+
+        n, scale = len(self.P), np.abs(self.K).max()
+        balance = np.tile(np.eye(2), n)
+        rows = np.zeros((3 * n, 2 * n))
+        rows[3 * np.arange(n) + 1, 2 * np.arange(n)] = -1.0
+        rows[3 * np.arange(n) + 2, 2 * np.arange(n) + 1] = -1.0
+        constant = np.zeros(3 * n)
+        constant[::3] = self.P
+        unit = self.P.max()
+        program = ConeProgram(
+            csc_matrix(np.triu(self.K) / scale),
+            -self.K @ (self.q / unit) / scale,
+            csc_matrix(vstack([csc_matrix(balance), csc_matrix(rows)])),
+            np.append(total, constant) / unit,
+            2,
+        )
+        raw = run_clarabel(program, "stuck", 1e-11)
+        self.q = raw.x * unit
+        self.slip = raw.multipliers[2::3] * unit * scale
+
+
+@pytest.mark.parametrize("kind", ["elastic", "vector"])
+def test_cycles_below_and_above_melans_limit(kind: str) -> None:
+    """From a first loading that slides: slip dies out 1 % below, and goes on 1 % above.
+
+    Vectors turn towards the state at rest slowly: the slip of a cycle halves in some ten of them.
+    """
+    contact = cr.press(PAPER, load=P)
+    problem = VectorProblem.of(contact)
+    n = len(problem)
+    mean = np.array([0.3, 0.1 if kind == "vector" else 0.0]) * P
+    swing = np.array([[1.0, 0.0], [-1.0, 0.0]]) * P
+    if kind == "vector":
+        limit = cr.shakedown(
+            PAPER, loads=P, forces=0.5 * mean, force_amplitudes=0.5 * swing, kind="vector"
+        )
+        kernel = problem.kernel
+    else:
+        limit = cr.shakedown(
+            PAPER, loads=P, forces=0.5 * mean[0], force_amplitudes=0.5 * swing[:, 0], kind="elastic"
+        )
+        kernel = np.kron(problem.scalar.influence.matrix, np.eye(2))
+    K = kernel + np.diag(np.repeat(problem.stiffness, 2))
+    unit = problem.scalar.units.force
+    slid = {}
+    for part in (0.99, 1.01):
+        state = Stuck(K, problem.scalar.loads)
+        slips = []
+        for _ in range(40):
+            cycle = 0.0
+            for turn in swing:
+                state.go((mean + part * limit.factor * turn) / unit)
+                cycle += float(np.abs(state.slip).max())
+            slips.append(cycle)
+        slid[part] = slips
+    assert n == 37
+    assert slid[0.99][0] > 1e-3 * slid[1.01][-1]  # something slides at first
+    assert slid[0.99][-1] < 0.03 * slid[1.01][-1]
+    assert slid[0.99][-1] < 0.5 * slid[0.99][19] + LEFT * slid[1.01][-1]
+    assert slid[1.01][-1] == pytest.approx(slid[1.01][-2], rel=0.05)
+
+
+def exact_shares(scene: cr.Scene, load: float, vector: bool) -> tuple[list[arb], list[list[arb]]]:
+    """P_i and the forces Y_i under a unit force along y, in balls: shares no code with the package.
+
+    By the scalar kernel, or by Cerruti's tensor, c_t B = (1/pi G r) [(1 - nu) I + nu d d'].
+    """
+    loads = solve_exactly(scene, load=load).loads
+    touching = [i for i, each in enumerate(loads) if each > 0]
+    points = [[arb(float(x)) for x in scene.asperities.positions[i]] for i in touching]
+    nu, size = arb(scene.material.poisson_ratio), 2 if vector else 1
+    n = len(touching)
+    stiffness = arb_mat(size * n, size * n)
+    for a, i in enumerate(touching):
+        R = 1 / (1 / arb(scene.sphere_radius) + 1 / arb(float(scene.asperities.tip_radii[i])))
+        radius = (loads[i] * R * 3 / 4).root(3)
+        for c in range(size):
+            stiffness[size * a + c, size * a + c] = 1 / (2 * radius)
+        for b in range(n):
+            if a == b:
+                continue
+            d = [x - y for x, y in zip(points[a], points[b], strict=True)]
+            r = (d[0] * d[0] + d[1] * d[1]).sqrt()
+            if not vector:
+                stiffness[a, b] = 1 / (arb.pi() * r)
+                continue
+            for c in range(2):
+                for e in range(2):
+                    tensor = (1 - nu if c == e else arb(0)) + nu * d[c] * d[e] / r**2
+                    stiffness[2 * a + c, 2 * b + e] = 2 * tensor / ((2 - nu) * arb.pi() * r)
+    together = arb_mat(size * n, size)
+    for a in range(n):
+        for c in range(size):
+            together[size * a + c, c] = arb(1)
+    moved = stiffness.solve(together)
+    shares = moved * (together.transpose() * moved).inv()
+    last = size - 1
+    return [loads[i] for i in touching], [
+        [shares[size * a + c, last] for c in range(size)] for a in range(n)
+    ]
+
+
+@pytest.mark.parametrize("kind", ["elastic", "vector"])
+@pytest.mark.parametrize("name", ["paper", "rough"])
+def test_enclosures_hold_the_limit_in_ball_arithmetic(kind: str, name: str) -> None:
+    """Under a force to and fro the state at rest is 0 by symmetry: lambda = min P_i / |q_i|."""
+    scene, load = SCENES[name], LARGEST[name]
+    swing = 0.5 * load * np.array([1.0, -1.0])
+    amplitudes = np.column_stack((0 * swing, swing)) if kind == "vector" else swing
+    found = cr.shakedown(scene, loads=load, force_amplitudes=amplitudes, kind=kind)  # type: ignore[arg-type]
+    loads, shares = exact_shares(scene, load, kind == "vector")
+    sizes = [sum((y * y for y in each), arb(0)).sqrt() for each in shares]
+    limits = [P / (size * arb(load)) for P, size in zip(loads, sizes, strict=True)]
+    least = min(limits, key=float)
+    assert arb(found.lower) < least < arb(found.upper)
+    assert found.proved
+    assert found.gap < 1e-9
+
+
+@pytest.mark.parametrize("lie", ["nothing", "noise", "doubled", "backwards"])
+def test_a_solver_that_lies_does_not_move_the_limit(
+    lie: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The bounds get worse, and stay true; or the answer is refused."""
+    swing = np.array([[0.0, 1.0], [0.3, -0.8], [-0.6, 0.1]]) * RADIUS
+    honest = melan.run_clarabel
+    truth = cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="vector")
+    rng = np.random.default_rng(5)
+
+    def liar(*arguments: object) -> RawAnswer:
+        raw = honest(*arguments)  # type: ignore[arg-type]
+        x, z = raw.x, raw.multipliers
+        if lie == "nothing":
+            return raw._replace(x=0 * x, multipliers=1e-3 * rng.standard_normal(len(z)))
+        if lie == "noise":
+            noise = [1 + 0.05 * rng.standard_normal(len(each)) for each in (x, z)]
+            return raw._replace(x=x * noise[0], multipliers=z * noise[1])
+        if lie == "doubled":
+            return raw._replace(x=2 * x, multipliers=2 * z)
+        return raw._replace(x=-x, multipliers=-z)
+
+    monkeypatch.setattr(melan, "run_clarabel", liar)
+    found = cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="vector")
+    assert found.lower <= truth.upper
+    assert found.upper >= truth.lower
+    assert found.gap > truth.gap or lie == "doubled"
+
+
+def test_without_order_no_exact_limit_is_claimed() -> None:
+    scene = shaded()
+    load = cr.press(scene, approach=1.4).load
+    found = cr.shakedown(scene, loads=load, force_amplitudes=[0.1 * load, -0.1 * load])
+    assert found.order == "fails"
+    assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
+
+
+def test_a_negative_share_has_no_closed_form() -> None:
+    """The shaded asperity is pushed back by a shear force on all: nothing is claimed."""
+    scene = shaded()
+    load = cr.press(scene, approach=1.4).load
+    swing = [0.1 * load, -0.1 * load]
+    found = cr.shakedown(scene, loads=load, force_amplitudes=swing, kind="elastic")
+    assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
+
+
+@pytest.mark.parametrize("kind", ["elastic", "vector"])
+def test_a_contact_that_is_not_proved_proves_no_limit(kind: str) -> None:
+    """Two side by side, at no least of the energy: nobody can say what they carry."""
+    scene, load = twins()
+    assert "undecided" in cr.press(scene, load=load).status
+    swing = 0.1 * load * np.array([1.0, -1.0])
+    amplitudes = np.column_stack((swing, 0 * swing)) if kind == "vector" else swing
+    found = cr.shakedown(scene, loads=load, force_amplitudes=amplitudes, kind=kind)  # type: ignore[arg-type]
+    assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
+    assert found.factor > 0
+
+
+@pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
+def test_one_asperity_slides_on_only_as_all_do(kind: str) -> None:
+    alone = cr.Asperities([[0.0, 0.0]], 1.0)
+    scene = cr.Scene(1.0, alone, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
+    swing = np.array([1e-7, -1e-7])
+    amplitudes = np.column_stack((swing, 0 * swing)) if kind == "vector" else swing
+    found = cr.shakedown(scene, loads=1e-6, force_amplitudes=amplitudes, kind=kind)  # type: ignore[arg-type]
+    assert found.factor == pytest.approx(5.0)
+    assert found.gross == pytest.approx(5.0)
+    assert found.proved
+    assert found.gap < 1e-10
+
+
+def test_the_mechanism_closes_exactly() -> None:
+    swing = np.column_stack((SWING, 0.3 * SWING))
+    contact = cr.press(PAPER, load=P)
+    slips = melan.solve(contact, np.zeros(2), swing / 0.5).slips[:, contact.loads > 0]
+    net = slips.sum(axis=0)
+    assert (net == net[0]).all()
+    assert (slips == np.round(slips)).all()
+
+
+def test_bad_input() -> None:
+    with pytest.raises(cr.InputError, match="force_amplitudes"):
+        cr.shakedown(PAPER, loads=P, force_amplitudes=[0.0, 0.0])
+    with pytest.raises(cr.InputError, match="force_amplitudes: found none"):
+        cr.shakedown(PAPER, loads=P, force_amplitudes=[])
+    with pytest.raises(cr.InputError, match=r"force_amplitudes\[0\].*finite"):
+        cr.shakedown(PAPER, loads=P, force_amplitudes=[np.nan, 1.0])
+    with pytest.raises(cr.InputError, match="load_amplitudes: found 3 values, expected 2, as"):
+        cr.shakedown(PAPER, loads=P, load_amplitudes=[1e-9, 0, 0], force_amplitudes=SWING)
+    for wrong in ([["a", 0.0]], [[np.inf, 0.0]], np.zeros((0, 2))):
+        with pytest.raises(cr.InputError, match="force_amplitudes"):
+            cr.shakedown(PAPER, loads=P, force_amplitudes=wrong, kind="vector")
+    with pytest.raises(cr.InputError, match="kind"):
+        cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="plastic")  # type: ignore[arg-type]
+    with pytest.raises(cr.InputError, match=r"load_amplitudes.*only .exact."):
+        cr.shakedown(
+            PAPER, loads=P, load_amplitudes=0.1 * P, force_amplitudes=SWING, kind="elastic"
+        )
+    with pytest.raises(cr.InputError, match="forces"):
+        cr.shakedown(PAPER, loads=P, forces=P, force_amplitudes=SWING)
+    with pytest.raises(cr.InputError, match="shape"):
+        cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="vector")
+    with pytest.raises(cr.InputError, match="loads"):
+        cr.shakedown(PAPER, loads=-P, force_amplitudes=SWING)

@@ -1,0 +1,253 @@
+"""Balls against ball arithmetic of 4,000 bits: no number of an operand leaves the result."""
+
+import itertools
+import operator
+from collections.abc import Callable
+from fractions import Fraction
+from math import isfinite
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from convexrough.numbers.balls import Ball, where
+from convexrough.numbers.kernels import residual
+from convexrough.numbers.pairs import CHUNK, PAIR_ROUNDOFF, Pair, two_sum
+
+#: Bits that hold sums and products of any float64 numbers.
+BITS = 4000
+
+INF = float("inf")
+
+
+@st.composite
+def numbers(draw: st.DrawFn) -> tuple[float, float, float]:
+    """A midpoint (high, low) and a radius: of all sizes, at all distances from 0."""
+    kind = draw(st.sampled_from(["plain"] * 6 + ["zero", "subnormal", "huge"]))
+    high = draw(st.floats(1, 10)) * 10.0 ** draw(st.integers(-150, 150))
+    high = {"zero": 0.0, "subnormal": 5e-324 * int(draw(st.integers(1, 99))), "huge": 1e305}.get(
+        kind, high
+    ) * draw(st.sampled_from([-1, 1]))
+    high, low = two_sum(high, high * 2.0**-54 * draw(st.sampled_from([0.0, -0.9, 0.3])))
+    share = draw(st.sampled_from([0.0, 1e-30, 1e-17, 0.3, 1.0, 7.0, INF]))
+    radius = share * abs(high) if high else draw(st.sampled_from([0.0, 1e-200, 1.0, INF]))
+    return float(high), float(low), radius
+
+
+def balls(rows: list[tuple[float, float, float]]) -> Ball:
+    high, low, radius = np.array(rows).T
+    return Ball(Pair(high, low), radius)
+
+
+def exact(x: float) -> arb:
+    return arb(float(x))
+
+
+def samples(ball: Ball, i: int) -> list[arb]:
+    """The middle, both ends and others; where the radius is infinite, numbers of many sizes."""
+    middle = exact(ball.mid.high[i]) + exact(ball.mid.low[i])
+    radius = ball.radius[i]
+    if radius == INF:
+        return [middle, arb(0), arb(1), arb(-1), arb("1e200"), arb("-1e-200")]
+    return [middle + exact(radius) * share for share in (-1, arb(-1) / 3, 0, arb(1) / 2, 1)]
+
+
+def holds(ball: Ball, i: int, number: arb) -> bool:
+    """Whether the number, known to many digits, is in the ball; what is none asks for all."""
+    radius = ball.radius[i]
+    assert isfinite(ball.mid.high[i] + ball.mid.low[i])
+    if radius == INF:
+        return True
+    middle = exact(ball.mid.high[i]) + exact(ball.mid.low[i])
+    return bool(number.is_finite() and abs(number - middle) <= exact(radius))
+
+
+@pytest.fixture(autouse=True)
+def many_bits() -> Any:
+    with ctx.workprec(BITS):
+        yield
+
+
+some = st.lists(numbers(), min_size=6, max_size=6)
+
+
+@settings(max_examples=50, deadline=None)
+@given(some, some, st.sampled_from([operator.add, operator.sub, operator.mul, operator.truediv]))
+def test_arithmetic(first: Any, second: Any, operation: Callable[[Any, Any], Any]) -> None:
+    x, y = balls(first), balls(second)
+    found = operation(x, y)
+    for i in range(len(x)):
+        for a, b in itertools.product(samples(x, i), samples(y, i)):
+            if operation is operator.truediv and b == 0:
+                assert found.radius[i] == INF
+            else:
+                assert holds(found, i, operation(a, b))
+
+
+def _positive(x: arb) -> arb:
+    return x if x > 0 else arb(0)
+
+
+def _cube_root(x: arb) -> arb:
+    return x.root(3) if x > 0 else arb(0)
+
+
+FUNCTIONS: dict[str, Callable[[arb], arb]] = {
+    "positive_part": _positive,
+    "sqrt": lambda x: _positive(x).sqrt(),
+    "cbrt": _cube_root,
+    "two_thirds": lambda x: _cube_root(x) ** 2,
+    "__neg__": lambda x: -x,
+}
+
+
+@settings(max_examples=50, deadline=None)
+@given(some, st.sampled_from(sorted(FUNCTIONS)))
+def test_functions(rows: Any, name: str) -> None:
+    x = balls(rows)
+    found = getattr(x, name)()
+    for i in range(len(x)):
+        assert all(holds(found, i, FUNCTIONS[name](a)) for a in samples(x, i))
+
+
+@settings(max_examples=20, deadline=None)
+@given(some, some, some, some)
+def test_residual(k: Any, P: Any, v: Any, D: Any) -> None:
+    """The kernel: k P^(2/3) + v - D."""
+    operands = [balls(rows) for rows in (k, P, v, D)]
+    found = residual(*operands)
+    for i in range(6):
+        ks, Ps, vs, Ds = (samples(each, i)[::2] for each in operands)
+        powers = [_cube_root(P) ** 2 for P in Ps]
+        for a, x, b, c in itertools.product(ks, powers, vs, Ds):
+            assert holds(found, i, a * x + b - c)
+
+
+def test_residual_is_sharp() -> None:
+    """Of exact numbers, a few roundoffs of its terms; many at once as few; k may be one for all."""
+    rng = np.random.default_rng(1)
+    P = Pair.exact(rng.random(CHUNK + 5) * (rng.random(CHUNK + 5) < 0.7))
+    k, v, D = Ball.exact(0.7), Ball.exact(P.high + 0.1), Ball.exact(P.high**0.5)
+    found = residual(k, Ball.exact(P), v, D)
+    few = residual(k, Ball.exact(P)[:61], v[:61], D[:61])
+    formula = k * Ball.exact(P).two_thirds() + v - D
+    assert (found.radius <= PAIR_ROUNDOFF * (P.high ** (2 / 3) + v.size + D.size)).all()
+    assert ((found - formula).size <= 2.1 * (found.radius + formula.radius)).all()
+    np.testing.assert_array_equal(found[:61].mid, few.mid)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(numbers(), max_size=40), st.integers(0, 2**32 - 1))
+def test_sums_of_products(rows: Any, seed: int) -> None:
+    """`sum` and `dot` along the last axis, also of nothing."""
+    x = balls(rows) if rows else balls([(0.0, 0.0, 0.0)])[:0]
+    y = x[np.random.default_rng(seed).permutation(len(x))]
+    one, two = x.sum(), Ball.stacked([x * y, x]).sum()
+    for k in range(5):
+        a, b = ([samples(z, i)[k] for i in range(len(z))] for z in (x, y))
+        assert holds(one[None], 0, sum(a, arb(0)))
+        assert holds(two, 1, sum(a, arb(0)))
+        assert holds(x.dot(y)[None], 0, sum(map(operator.mul, a, b), arb(0)))
+
+
+@settings(max_examples=50, deadline=None)
+@given(some)
+def test_ends(rows: Any) -> None:
+    x = balls(rows)
+    for i in range(len(x)):
+        for a in samples(x, i):
+            for end, sign in ((x.lower[i], -1), (x.upper[i], 1)):
+                assert abs(end) == INF or sign * (exact(end) - a) >= 0
+            assert x.size[i] == INF or abs(a) <= exact(x.size[i])
+            assert x.error[i] == INF or abs(a - exact(x.value[i])) <= exact(x.error[i])
+            assert not (x.positive[i] and a <= 0)
+            assert not (x.negative[i] and a >= 0)
+    finite = np.isfinite(x.lower) & np.isfinite(x.upper)
+    between = Ball.between(x.lower[finite], x.upper[finite])
+    for i, j in enumerate(np.flatnonzero(finite)):
+        assert holds(between, i, exact(x.lower[j]))
+        assert holds(between, i, exact(x.upper[j]))
+
+
+@pytest.mark.parametrize("scale", [1e-90, 1.0, 1e90])
+def test_few_digits_are_lost(scale: float) -> None:
+    """Of exact numbers, little more than a roundoff of pairs; of differences relative to them."""
+    rng = np.random.default_rng(0)
+    x, y = (Ball.exact(scale * rng.uniform(0.1, 9.0, 300)) for _ in range(2))
+    few = 3 * PAIR_ROUNDOFF
+    for found in (x + y, x - y, x * y, x / y, x.sqrt(), x.cbrt(), x.two_thirds(), x.sum()):
+        assert (found.radius <= few * np.abs(found.value)).all()
+    assert (x.dot(y).radius <= 2 * few * x.dot(y).value).all()
+    # A radius grows by what the slope asks for.
+    wide = Ball.around(x.mid, 1e-9 * x.value)
+    for found, factor in ((wide.sqrt(), 1.0), (wide.cbrt(), 1.0), (wide * 2.0, 1.0), (wide * y, 1)):
+        assert (found.radius <= 1.001e-9 * factor * found.value).all()
+    assert ((wide * wide).radius <= 2.001e-9 * (x * x).value).all()
+
+
+def test_near_zero() -> None:
+    """Roots of what may be 0 are within the root of the radius; what is exactly 0 stays so."""
+    ball = Ball.around(np.array([0.0, 1e-8, -1e-9, -1.0]), np.array([1e-6, 1e-6, 1e-6, 0.5]))
+    assert (ball.cbrt().radius[:3] <= 1.001e-2).all()
+    assert (ball.two_thirds().radius[:3] <= 1.001e-4).all()
+    assert ball.sqrt().size[3] < 1e-300
+    nothing = Ball.exact(np.zeros(2))
+    unknown = Ball.around(np.zeros(2), INF)
+    assert (nothing * unknown).size.max() < 1e-300
+    assert nothing.two_thirds().size.max() < 1e-300
+
+
+def test_what_is_no_number_is_unknown() -> None:
+    one = Ball.exact(np.ones(4))
+    for bad in (
+        Ball.exact(np.full(4, 1e300)) * np.full(4, 1e300),
+        one / np.zeros(4),
+        one / Ball.around(np.full(4, 0.5), 0.6),
+        Ball.around(np.array([INF, -INF, np.nan, INF]), 0.0),
+        Ball.around(np.ones(4), np.nan),
+        Ball.between(np.full(4, -INF), np.ones(4)),
+    ):
+        assert (bad.radius == INF).all()
+        assert np.isfinite(bad.value).all()
+        assert (bad + 1.0).radius[0] == INF
+
+
+def test_many_at_once() -> None:
+    """Chunks on all cores are as one; one number stands for all."""
+    rng = np.random.default_rng(2)
+    x = Ball.around(rng.random((2, 3 * CHUNK)), 1e-20)
+    k = Ball.around(0.7, 1e-19)
+    at_once, by_row = k * x.two_thirds() - x, [k * x[i].two_thirds() - x[i] for i in (0, 1)]
+    assert at_once.shape == (2, 3 * CHUNK)
+    parts = [k * x[0][:9].two_thirds() - x[0][:9], by_row[0][:9], at_once[0][:9]]
+    for other in parts:
+        np.testing.assert_array_equal(other.mid, parts[0].mid)
+        np.testing.assert_array_equal(other.radius, parts[0].radius)
+    assert (x[:, :1] * x[0]).shape == x.shape
+    np.testing.assert_array_equal((x[:, :1] * x[0]).value[1], (x[1, 0] * x[0]).value)
+
+
+def test_building() -> None:
+    third = Fraction(1, 3)
+    ball = Ball.exact(third)
+    assert ball.shape == ()
+    assert holds(ball[None], 0, arb(1) / 3)
+    assert ball.radius < 1e-29
+    assert len(Ball.exact([1.0, 2.0])) == 2
+    chosen = where(np.array([True, False]), Ball.exact(np.ones(2)), Ball.around(np.zeros(2), 0.5))
+    np.testing.assert_array_equal(chosen.value, [1, 0])
+    np.testing.assert_allclose(chosen.radius, [0, 0.5], rtol=1e-11)
+    assert ((1.0 - third * chosen) / 2.0).shape == (2,)
+
+
+def test_one_number_stands_for_all_of_many() -> None:
+    """Also where it is an array of one, and before those of many."""
+    many = Ball.exact(np.linspace(1.0, 2.0, CHUNK + 1))
+    one = Ball.exact(np.array([3.0]))
+    for found in (one * many, many * one):
+        np.testing.assert_array_equal(found.value, 3.0 * many.value)
+    none = Ball.exact(np.zeros(CHUNK + 1))
+    assert residual(one, many, none, none).shape == (CHUNK + 1,)

@@ -1,0 +1,179 @@
+"""Scene files of two bodies, and of bases that are no sphere: what is read, refused and said."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scene_files import HEXAGONAL, scene_text
+
+import convexrough as cr
+from convexrough.run.scene_file import read_scene
+
+INF = float("inf")
+WITHIN = f"{HEXAGONAL}within = 0.0102\n"
+ONE = "contact_modulus = 1.0\npoisson_ratio = 0.3\n"
+TWO = """[material.sphere]
+youngs_modulus = 210e3
+poisson_ratio = 0.3
+hardness = 8e3
+[material.base]
+youngs_modulus = 70e3
+poisson_ratio = 0.33
+"""
+
+
+def text(radius: str = "1.0", material: str = ONE, asperities: str = WITHIN, **more: str) -> str:
+    written = scene_text(asperities, **more).replace("radius = 1.0", f"radius = {radius}", 1)
+    return written.replace(ONE, material)
+
+
+def read(tmp_path: Path, *args: Any, **more: Any) -> cr.SceneFile:
+    path = tmp_path / "scene.toml"
+    path.write_text(text(*args, **more), encoding="utf-8")
+    return read_scene(path)
+
+
+@pytest.mark.parametrize(
+    ("radius", "expected"),
+    [
+        ("inf", INF),
+        ("[1.0, 2]", (1.0, 2.0)),
+        ("[inf, 0.5]", (INF, 0.5)),
+        ("[2.0, 2.0]", 2.0),
+        ("[inf, inf]", INF),
+    ],
+)
+def test_bases(tmp_path: Path, radius: str, expected: Any) -> None:
+    assert read(tmp_path, radius).scene.sphere_radius == expected
+
+
+def test_two_bodies(tmp_path: Path) -> None:
+    steel, soft = cr.Material.from_youngs(210e3, 0.3, 8e3), cr.Material.from_youngs(70e3, 0.33)
+    assert read(tmp_path, material=TWO).scene.material == cr.Material.pair(steel, soft)
+
+
+@pytest.mark.parametrize("radius", ["inf", "[inf, 1.0]"])
+@pytest.mark.parametrize("normal", ["approach = 5e-5", "load = 1e-7"])
+def test_a_base_without_an_end_needs_an_extent(tmp_path: Path, radius: str, normal: str) -> None:
+    with pytest.raises(cr.InputError, match=r"\[asperities\] within: missing, needed with a flat"):
+        read(tmp_path, radius, asperities=HEXAGONAL, normal=normal)
+
+
+@pytest.mark.parametrize("normal", ["approach = 5e-5", "load = 3e-7"])
+def test_an_ellipsoid_reaches_as_far_as_any_could_touch(tmp_path: Path, normal: str) -> None:
+    rough = f"{HEXAGONAL}height_std = 1e-6\ntip_radius_cv = 0.1\nseed = 3"
+    file = read(tmp_path, "[1.0, 2.5]", asperities=rough, normal=normal)
+    given: dict[str, Any] = {"approach": file.approach, "load": file.load}
+    contact = cr.press(file.scene, **given)
+    reached = file.scene.asperities.distances.max() + 0.0025
+    wider = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=2 * reached)
+    wider = wider.roughened(height_std=1e-6, tip_radius_cv=0.1, seed=3)
+    again = cr.press(cr.Scene((1.0, 2.5), wider, file.scene.material, geometry="summit"), **given)
+    n = len(file.scene)
+    assert again.certificate.scope == "global"
+    assert again.loads[:n] == pytest.approx(contact.loads, rel=1e-10, abs=1e-25)
+    assert not again.loads[n:].any()
+
+
+WRONG = [
+    ({"radius": "-inf"}, "[sphere] radius: found -inf, expected a positive number, or inf where"),
+    ({"radius": "nan"}, "[sphere] radius: found nan, expected a positive number, or inf where"),
+    ({"radius": "[1.0, 2.0, 3.0]"}, "[sphere] radius: found [1.0, 2.0, 3.0], expected two radii"),
+    ({"radius": "[1.0, -2.0]"}, "[sphere] radius[1]: found -2.0, expected a positive number, or"),
+    ({"radius": "1e99"}, "[sphere] radius: found 1e+99, expected a size from"),
+    (
+        {"material": f"contact_modulus = 1.0\n{TWO}"},
+        "[material] contact_modulus: not used with two bodies",
+    ),
+    (
+        {"material": TWO.replace("70e3", "-70e3")},
+        "[material] base.youngs_modulus: found -70000.0, expected a positive number",
+    ),
+    (
+        {"material": TWO.replace("hardness", "hardnes")},
+        '[material] sphere.hardnes: unknown key, did you mean "hardness"?',
+    ),
+    ({"material": TWO[: TWO.index("[material.base]")]}, "[material] base: missing"),
+    (
+        {"material": TWO.replace("poisson_ratio = 0.33\n", "")},
+        "[material] base.poisson_ratio: missing",
+    ),
+    ({"material": "sphere = 3\nbase = 4\n"}, "[material] sphere: found 3, expected a table"),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), WRONG)
+def test_mistakes(tmp_path: Path, given: dict[str, str], message: str) -> None:
+    with pytest.raises(cr.InputError) as caught:
+        read(tmp_path, **given)
+    assert message in str(caught.value)
+
+
+STAGES = """[friction]
+coefficient = 0.5
+[shear]
+fractions = [0.3]
+[cycle]
+maximum = [0.1, 0.4]
+[history]
+fractions = [0.5, -0.2]
+[gradient]
+of = "loss"
+fraction = 0.2
+"""
+
+
+@pytest.mark.parametrize("radius", ["inf", "[1.0, 2.5]", "[1.0, inf]"])
+def test_a_whole_run(command: Any, tmp_path: Path, radius: str) -> None:
+    """With a proof that the checker accepts."""
+    (tmp_path / "scene.toml").write_text(text(radius, TWO, normal="load = 0.02", more=STAGES))
+    outcome = command("run", "scene.toml", "--out", "found", "--proof", "--no-figures")
+    assert outcome.status == 0, outcome.err
+    assert "Dundurs' beta = -0.117, neglected" in outcome.out
+    smooth = radius == "[1.0, 2.5]"
+    assert ("smooth W/W0" in outcome.out) == smooth
+    assert ("no smooth reference" in outcome.out) != smooth
+    summary = json.loads((tmp_path / "found" / "summary.json").read_text())
+    assert summary["normal"]["mismatch"] == pytest.approx(-0.1167, abs=1e-4)
+    assert (summary["cycle"][0]["loss_normalised"] is not None) == smooth
+    assert summary["cycle"][0]["loss"] > 0
+    assert "sphere_radius" not in summary["gradient"]["by"]
+    assert command("check", "found/proof.json").status == 0
+
+
+def test_figures_without_a_smooth_reference(command: Any, tmp_path: Path) -> None:
+    more = "[friction]\ncoefficient = 0.5\n[cycle]\nmaximum = [0.1, 0.4]\n"
+    (tmp_path / "scene.toml").write_text(text("inf", TWO, normal="load = 0.02", more=more))
+    assert command("run", "scene.toml", "--out", "found").status == 0
+    for kind in ("svg", "png"):
+        drawn = {path.stem for path in (tmp_path / "found").glob(f"*.{kind}")}
+        assert drawn == {"pressure", "loads", "hysteresis", "loss"}
+
+
+def test_like_bodies_have_nothing_to_say(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(text())
+    assert "Dundurs" not in command("run", "scene.toml", "--no-figures").out
+
+
+def test_the_slider_page_is_of_spheres(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(text("inf", normal="load = 1e-7", more=STAGES))
+    outcome = command("run", "scene.toml", "--no-figures", "--html")
+    assert "slider page: found a flat base, expected a scene whose base is a sphere" in outcome.err
+    assert outcome.status == 2
+
+
+def test_losses_against_phase_beside_a_smooth_ellipsoid_or_none() -> None:
+    from scenes import MATERIAL, paper
+
+    array = paper().asperities
+
+    def losses(base: Any, **more: Any) -> Any:
+        scene = cr.Scene(base, array, MATERIAL, friction=0.5, geometry="summit")
+        swing: Any = dict(load_amplitude=6e-8, force_amplitude=2e-8, phases=[1.0], chords=6)
+        return cr.phase_losses(scene, load=3e-7, **swing)
+
+    assert (losses((1.0, 2.0)).smooth > 0).all()
+    flat = losses(INF)
+    assert (flat.losses > 0).all()
+    assert (flat.smooth != flat.smooth).all()  # no number

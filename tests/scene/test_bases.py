@@ -1,0 +1,265 @@
+"""Bases that are no sphere: flat, ellipsoid, cylinder. 50 digits, exact fractions, limits."""
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import multiprecision
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from proof_oracle import false_claims
+from scenes import MATERIAL, paper, rough, solve_exactly
+from scipy.optimize import minimize
+
+import convexrough as cr
+from convexrough import checker
+from convexrough.errors import InputError
+from convexrough.gradients.scene import Geometry
+from convexrough.normal.problem import NormalProblem
+from convexrough.numbers.pairs import Pair
+from convexrough.scene.scene import reach
+
+INF = float("inf")
+BASES: dict[str, Any] = {"flat": INF, "ellipsoid": (1.0, 2.5), "cylinder": (INF, 0.8)}
+GEOMETRIES = ("summit", "closest")
+
+each_base = pytest.mark.parametrize("base", BASES.values(), ids=BASES.keys())
+each_geometry = pytest.mark.parametrize("geometry", GEOMETRIES)
+
+
+def on(base: Any, geometry: Any = "summit", friction: float = 0.5) -> cr.Scene:
+    """91 asperities with random heights and tip radii."""
+    return replace(rough(geometry), sphere_radius=base, friction=friction)
+
+
+def test_two_equal_radii_are_a_sphere() -> None:
+    assert (
+        cr.Scene((2.0, 2.0), paper().asperities, MATERIAL, geometry="summit").sphere_radius == 2.0
+    )
+    assert (
+        cr.Scene([INF, INF], paper().asperities, MATERIAL, geometry="summit").sphere_radius == INF
+    )  # type: ignore[arg-type]
+
+
+@each_geometry
+def test_nearly_equal_radii_are_nearly_a_sphere(geometry: Any) -> None:
+    """Only what is summed by axes differs."""
+    sphere, other = (cr.press(on(R, geometry), load=3e-7) for R in (1.0, (1.0, 1.0 + 1e-12)))
+    assert_allclose(other.loads, sphere.loads, rtol=1e-9)
+    assert other.approach == pytest.approx(sphere.approach, rel=1e-11)
+
+
+@pytest.mark.parametrize("base", [(0.7, 3.0), (INF, 0.4), INF])
+def test_closest_points_by_minimisation(base: Any) -> None:
+    """The contact point and drop of "closest" minimise the gap of the two paraboloids."""
+    x, y, tip = 1.3, -0.8, 0.6
+    scene = cr.Scene(base, cr.Asperities([[x, y]], tip), MATERIAL, geometry="closest")
+    bend = 1 / np.broadcast_to(base, 2)
+
+    def gap(point: Any) -> float:
+        return float((bend @ point**2 + ((point - [x, y]) ** 2).sum() / tip) / 2)
+
+    best = minimize(gap, [x, y], tol=1e-14)
+    assert_allclose(scene.contact_points[0], best.x, atol=1e-5)
+    assert scene.drops[0] == pytest.approx(best.fun, rel=1e-8, abs=1e-14)
+    assert 1 / scene.relative_radii[0] == pytest.approx(bend.mean() + 1 / tip, rel=1e-15)
+
+
+@pytest.mark.parametrize("base", [1.0, *BASES.values()])
+@each_geometry
+def test_offsets_to_twice_the_digits(base: Any, geometry: Any) -> None:
+    scene = on(base, geometry)
+    problem = NormalProblem.assemble(scene, approach=5e-5)
+    found, length = problem.twofold_offsets(), Fraction(problem.units.length)
+    a = scene.asperities
+    radii = base if isinstance(base, tuple) else (base, base)
+    for place, i in enumerate(problem.candidates.tolist()):
+        further = Fraction(a.tip_radii[i]) if geometry == "closest" else Fraction(0)
+        drop = Fraction(0)
+        for p, R in zip(a.positions[i], radii, strict=True):
+            if R < INF:
+                drop += Fraction(p) ** 2 / (2 * (Fraction(R) + further))
+        size = drop + abs(Fraction(a.heights[i]))
+        off, exact = _exactly(found, place), Fraction(a.heights[i]) - drop
+        assert abs(off * length - exact) <= size / 2**98
+        assert abs(Fraction(scene.offsets[i]) - exact) <= Fraction(scene.offset_errors[i])
+
+
+def test_one_asperity_under_a_flat_base_is_hertz() -> None:
+    load, tip = 1e-8, 0.02
+    asperity = cr.Asperities([[0.3, -0.1]], tip, 1e-6)
+    contact = cr.press(cr.Scene(INF, asperity, MATERIAL, geometry="summit"), load=load)
+    exact = (9 * load**2 / (16 * tip)) ** (1 / 3)
+    assert contact.approach + 1e-6 == pytest.approx(exact, rel=1e-14)
+    assert contact.contact_radii[0] == pytest.approx((0.75 * load * tip) ** (1 / 3), rel=1e-14)
+    assert contact.certificate.scope == "global"
+
+
+@each_base
+@each_geometry
+@pytest.mark.parametrize("control", [{"approach": 4e-5}, {"load": 3e-7}])
+def test_loads_are_those_to_50_digits(base: Any, geometry: Any, control: Any) -> None:
+    scene = on(base, geometry)
+    contact = cr.press(scene, **control)
+    exact = solve_exactly(scene, start=contact.loads, **control)
+    assert contact.certificate.scope == "global"
+    off = np.abs(multiprecision.errors(contact.loads, exact.loads))
+    assert (off <= contact.certificate.load_errors).all()
+    assert off.max() <= 1e-13 * contact.loads.max()
+    assert abs(multiprecision.errors(contact.approach, exact.approach)[0]) <= (
+        contact.certificate.approach_error + 1e-16 * contact.approach
+    )
+
+
+@pytest.mark.parametrize("within", [0.03, 0.12])  # by one start of Newton's method and the other
+@pytest.mark.parametrize("control", [{"load": 2e-6}, {"approach": 2e-6}, {"approach": -5e-7}])
+def test_many_under_a_flat_base(within: float, control: Any) -> None:
+    regular = cr.Asperities.square(spacing=0.0035, tip_radius=0.02, within=within)
+    rough = regular.roughened(height_std=1e-6, tip_radius_cv=0.1, seed=2)
+    scene = cr.Scene(INF, rough, MATERIAL, friction=0.4, geometry="summit")
+    contact = cr.press(scene, **control)
+    assert contact.certificate.scope == "global"
+    assert not (contact.status == "undecided").any()
+    assert contact.certificate.load_error <= 1e-12 * contact.loads.max()
+    shallow = contact.loads[rough.heights < -contact.approach]
+    assert (shallow == 0).all()
+    if "load" in control:
+        ceiling = NormalProblem.assemble(scene, load=contact.load)
+        assert contact.approach <= ceiling.ceiling * ceiling.units.length
+    state = cr.shear(contact, force=0.1 * contact.load)
+    assert state.certificate.scope == "global"
+
+
+@each_base
+def test_symmetries(base: Any) -> None:
+    """Turned by a right angle with its axes swapped, the scene is the same."""
+    scene = on(base, "closest")
+    radii = base[::-1] if isinstance(base, tuple) else base
+    a = scene.asperities
+    turned = cr.Asperities(a.positions @ [[0.0, 1.0], [-1.0, 0.0]], a.tip_radii, a.heights)
+    other = cr.press(replace(scene, asperities=turned, sphere_radius=radii), load=3e-7)
+    assert_allclose(other.loads, cr.press(scene, load=3e-7).loads, rtol=1e-10, atol=1e-22)
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_reach(geometry: Any) -> None:
+    """No asperity beyond it could touch, along the axis where the base bends away least."""
+    given: Any = dict(tip_radius=0.1, height=1e-5, geometry=geometry)
+    edge = reach(1e-4, sphere_radius=(0.5, 2.0), **given)
+    for factor, sign in ((0.999, 1), (1.001, -1)):
+        asperity = cr.Asperities([[0.0, edge * factor]], 0.1, 1e-5)
+        scene = cr.Scene((0.5, 2.0), asperity, MATERIAL, geometry=geometry)
+        assert np.sign(1e-4 + scene.offsets[0]) == sign
+    assert reach(1e-4, sphere_radius=INF, **given) == INF
+    assert reach(-1e-4, sphere_radius=(1.0, INF), **given) == 0
+
+
+@pytest.mark.parametrize("base", [(1.0, 2.5), INF, (0.8, INF)])
+@each_geometry
+def test_proof_files(base: Any, geometry: Any) -> None:
+    """Proved in fractions, and true by 50 digits; with another radius the file is refused."""
+    contact = cr.press(on(base, geometry), load=3e-7)
+    state = cr.shear(contact, force=0.05 * contact.load)
+    document = contact.proof(sheared=[state]).document
+    assert checker.prove(document, lambda line: None)
+    assert document["claims"]["scope"] == "global"
+    assert not false_claims(document)
+    radius = document["scene"]["sphere_radius"]
+    assert isinstance(radius, list) == isinstance(base, tuple)
+    for other in ("0x1.0p+0", ["inf", "0x1.8000000000000p-1"], [radius], ["inf"], "nan", "-inf"):
+        spoiled = {**document, "scene": {**document["scene"], "sphere_radius": other}}
+        with pytest.raises((checker.Refused, checker.Unreadable)):
+            checker.prove(spoiled, lambda line: None)
+
+
+@each_base
+@each_geometry
+def test_gradients(base: Any, geometry: Any) -> None:
+    """By heights, tips and positions against differences; forwards the same."""
+    scene, random = on(base, geometry), np.random.default_rng(4)
+    n, step = len(scene), 1e-4
+    dz, dt = 1e-6 * random.standard_normal(n), 1e-2 * random.standard_normal(n)
+    dp = 1e-4 * random.standard_normal((n, 2))
+
+    def loss(t: float) -> Any:
+        a = scene.asperities
+        moved = cr.Asperities(a.positions + t * dp, a.tip_radii + t * dt, a.heights + t * dz)
+        contact = cr.press(replace(scene, asperities=moved), load=3e-7)
+        return contact, cr.cycle(contact, maximum=3e-8)
+
+    contact, cycle = loss(0.0)
+    gradient, direction = cycle.gradient(), cr.Direction(heights=dz, tip_radii=dt, positions=dp)
+    slope = float(gradient.heights @ dz + gradient.tip_radii @ dt + (gradient.positions * dp).sum())
+    (above, top), (below, bottom) = loss(step), loss(-step)
+    assert slope == pytest.approx((top.loss - bottom.loss) / (2 * step), rel=1e-4)
+    forwards = contact.change(direction).approach
+    assert forwards == pytest.approx((above.approach - below.approach) / (2 * step), rel=1e-5)
+    assert gradient.sphere_radius is None
+    assert np.isfinite(gradient.height_errors).all()
+
+
+@pytest.mark.parametrize("base", [1.0, *BASES.values()])
+@each_geometry
+def test_law_and_contact_points_to_twice_the_digits(base: Any, geometry: Any) -> None:
+    """What proved bounds of gradients are computed from."""
+    scene = on(base, geometry)
+    problem = NormalProblem.assemble(scene, load=3e-7)
+    bends = [
+        Fraction(0) if R == INF else 1 / Fraction(R) for R in np.broadcast_to(base, 2).tolist()
+    ]
+    k, points = problem.exact.coefficients.mid, Geometry.of(problem).contact_points.mid
+    for place, i in enumerate(problem.candidates.tolist()):
+        rho = Fraction(scene.asperities.tip_radii[i])
+        law = _exactly(k, min(place, len(k.high) - 1)) / Fraction(problem.units.local)
+        assert abs(law**3 / (Fraction(9, 16) * (sum(bends) / 2 + 1 / rho)) - 1) < Fraction(1, 2**92)
+        for axis, (p, c) in enumerate(zip(scene.asperities.positions[i], bends, strict=True)):
+            exact = Fraction(p) / (1 + (c * rho if geometry == "closest" else 0))
+            assert abs(_exactly(points, (place, axis)) - exact) <= abs(exact) / 2**96
+
+
+def _exactly(value: Pair, place: Any) -> Fraction:
+    return Fraction(value.high[place]) + Fraction(value.low[place])
+
+
+def test_no_gradient_by_the_radius_of_what_is_no_sphere() -> None:
+    scene = on(INF)
+    contact = cr.press(scene, load=3e-7)
+    with pytest.raises(
+        InputError, match="sphere_radius: found a flat base, expected a scene whose"
+    ):
+        contact.change(cr.Direction(sphere_radius=1e-3))
+    with pytest.raises(InputError, match="by sphere_radius: found an ellipsoid"):
+        cr.Objective(scene=on((1.0, 2.0)), of="load", by=["sphere_radius"], approach=4e-5)
+    objective = cr.Objective(scene=scene, of="load", by=["heights"], approach=4e-5)
+    assert objective(objective.start)[0] == pytest.approx(cr.press(scene, approach=4e-5).load)
+
+
+@each_base
+def test_change_to_closest(base: Any) -> None:
+    """The estimate of what the geometry does, against what it does."""
+    from convexrough.contact import closest_changes
+
+    scene = on(base)
+    contact = cr.press(scene, approach=4e-5)
+    there = cr.press(replace(scene, geometry="closest"), approach=4e-5)
+    heavy = contact.loads > 0.1 * contact.loads.max()
+    changes = (there.loads - contact.loads)[heavy] / contact.loads[heavy]
+    estimated = closest_changes(contact)[heavy] / contact.loads[heavy]
+    assert_allclose(estimated, changes, atol=0.15 * np.abs(changes).max() + 1e-14)
+
+
+BAD = [
+    ((1.0, -2.0), r"sphere_radius\[1\]: found -2.0, expected a positive number"),
+    ((1.0, 2.0, 3.0), "sphere_radius: found .*, expected a number, or the two radii"),
+    (float("nan"), "sphere_radius: found nan"),
+    (-INF, "sphere_radius: found -inf"),
+    ((1.0, "a"), r"sphere_radius\[1\]: found 'a'"),
+    (1e99, "sphere_radius: found .* choose other units"),
+]
+
+
+@pytest.mark.parametrize(("radius", "message"), BAD)
+def test_bad_radii(radius: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        cr.Scene(radius, paper().asperities, MATERIAL, geometry="summit")

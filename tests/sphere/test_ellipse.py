@@ -1,0 +1,171 @@
+"""The smooth ellipsoid: Legendre's integrals, quadrature, a fine bed of asperities, its losses."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import MATERIAL
+from scipy.integrate import quad
+from scipy.special import ellipe, ellipk
+
+import convexrough as cr
+from convexrough.sphere import ellipse
+from convexrough.sphere.hertz import indentation, local_coefficient
+from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
+
+ALONE = cr.Asperities([(0.0, 0.0)], 1.0)  # of no consequence
+
+
+def smooth(radii: Any, load: float, nu: float = 0.3) -> SmoothEllipsoid:
+    found = cr.smooth(
+        cr.Scene(radii, ALONE, cr.Material(3.0, nu), friction=0.4, geometry="summit"), load=load
+    )
+    assert isinstance(found, SmoothEllipsoid)
+    return found
+
+
+@pytest.mark.parametrize("radii", [(1.0, 1.001), (2.0, 0.7), (0.1, 4.0), (1.0, 1e6)])
+def test_semi_axes_and_approach_by_legendres_integrals(radii: tuple[float, float]) -> None:
+    """Johnson (3.26), with a the longer axis and e^2 = 1 - b^2/a^2."""
+    hertz = smooth(radii, load=2e-6)
+    a, b = sorted(hertz.semi_axes, reverse=True)
+    assert (hertz.semi_axes[0] > hertz.semi_axes[1]) == (radii[0] > radii[1])
+    m = 1 - (b / a) ** 2
+    size = hertz.peak_pressure / 3.0 * b / (m * a**2)  # p0 / E* and so on
+    flatter, sharper = max(radii), min(radii)
+    near_round = {"rel": 1e-9} if m < 0.01 else {"rel": 1e-12}  # K - E cancels there
+    assert size * (ellipk(m) - ellipe(m)) == pytest.approx(1 / (2 * flatter), **near_round)
+    assert size * ((a / b) ** 2 * ellipe(m) - ellipk(m)) == pytest.approx(
+        1 / (2 * sharper), **near_round
+    )
+    assert hertz.approach == pytest.approx(hertz.peak_pressure / 3.0 * b * ellipk(m), rel=1e-12)
+    assert hertz.peak_pressure * 2 / 3 * np.pi * a * b == pytest.approx(2e-6, rel=1e-14)
+
+
+def test_its_pressure_makes_the_gap_vanish() -> None:
+    """Boussinesq's integral in polar coordinates about a point of the contact."""
+    radii, load = (1.0, 0.4), 5e-6
+    hertz = smooth(radii, load)
+    axes = np.array(hertz.semi_axes)
+
+    def moved(point: Any) -> float:
+        def along(angle: float) -> float:
+            way = np.array([np.cos(angle), np.sin(angle)]) / axes
+            at = np.array(point) / axes
+            A, B, C = way @ way, at @ way, 1 - at @ at
+            # the integral of sqrt(C - 2 B s - A s^2) over s from 0 to where it vanishes
+            q = C + B * B / A
+            t = B / np.sqrt(A * q)
+            return float(q / (2 * np.sqrt(A)) * (np.pi / 2 - np.arcsin(t) - t * np.sqrt(1 - t * t)))
+
+        total = quad(along, 0, 2 * np.pi, epsabs=0, epsrel=1e-11, limit=200)[0]
+        return hertz.peak_pressure * total / (np.pi * 3.0)
+
+    for x, y in ((0.0, 0.0), (0.6, 0.0), (0.0, 0.7), (0.5, -0.5)):
+        at = np.array([x, y]) * axes
+        expected = hertz.approach - at[0] ** 2 / (2 * radii[0]) - at[1] ** 2 / (2 * radii[1])
+        assert moved(at) == pytest.approx(expected, rel=1e-9)
+
+
+def test_equal_radii_give_the_sphere() -> None:
+    sphere = cr.smooth(
+        cr.Scene(2.0, ALONE, cr.Material(3.0, 0.3), 0.4, geometry="summit"), load=1e-6
+    )
+    for off in (0.0, 1e-9):
+        a, b = ellipse.semi_axes(1e-6, 3.0, (2.0, 2.0 * (1 + off)))
+        assert_allclose([a, b], sphere.contact_radius, rtol=1e-9 if off else 1e-14)
+        approach = ellipse.approach(1e-6, 3.0, (a, b))
+        assert approach == pytest.approx(sphere.approach, rel=1e-9 if off else 1e-14)
+
+
+def test_the_sphere_of_the_same_approach() -> None:
+    for load in (1e-8, 1e-5):
+        hertz = smooth((0.5, 2.0), load)
+        sphere = cr.smooth(
+            cr.Scene(hertz.radius, ALONE, cr.Material(3.0, 0.3), 0.4, geometry="summit"), load=load
+        )
+        assert sphere.approach == pytest.approx(hertz.approach, rel=1e-14)
+        assert hertz.radius == pytest.approx(smooth((0.5, 2.0), 1.0).radius, rel=1e-13)
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.1])
+def test_what_the_mean_curvature_neglects(ratio: float) -> None:
+    """An approach less by e^2 / 18, e the difference of the relative curvatures over the mean."""
+    radii = 1 / (1 + ratio / 2), 1 / (1 - ratio / 2)
+    exact = ellipse.approach(1.0, 1.0, ellipse.semi_axes(1.0, 1.0, radii))
+    mean = float(indentation(1.0, local_coefficient(1.0, 1.0)))
+    assert 1 - exact / mean == pytest.approx(ratio**2 / 18, rel=2 * ratio**2)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_loss_is_eight_times_the_error_of_the_trapezoid(share: float) -> None:
+    """W = 8 c_t f^2 {V(P) - V(L) - (P - L) (D0(P) + D0(L)) / 2}, L = P - Q / f, V' = D0."""
+    load, radii, nu = 4e-6, (1.0, 3.0), 0.2
+    hertz = smooth(radii, load, nu)
+
+    def approach(P: float) -> float:
+        return smooth(radii, P).approach
+
+    left = (1 - share) * load
+    area = quad(approach, left, load, epsabs=0, epsrel=1e-12)[0]
+    trapezoid = (load - left) * (approach(load) + approach(left)) / 2
+    loss = 8 * (2 - nu) / (2 * (1 - nu)) * 0.4**2 * (area - trapezoid)
+    assert hertz.energy(share * hertz.largest_force) == pytest.approx(loss, rel=1e-6)
+    stick = hertz.stick_radius(share * hertz.largest_force) / hertz.contact_radius
+    assert stick == pytest.approx(np.cbrt(1 - share), rel=1e-14)
+
+
+def test_a_fine_bed_of_asperities_is_smooth() -> None:
+    """Twice as fine, half the excess approach: extrapolated to none it is Hertz's ellipse."""
+    radii, load = (1.0, 2.5), 1e-6
+    hertz = cr.smooth(cr.Scene(radii, ALONE, MATERIAL, geometry="summit"), load=load)
+    assert isinstance(hertz, SmoothEllipsoid)
+    axes, approaches = np.array(hertz.semi_axes), []
+    for finer in (2, 4):
+        spacing = 0.0025 / finer
+        bed = cr.Asperities.hexagonal(
+            spacing=spacing, tip_radius=0.02 / finer, within=1.3 * axes.max()
+        )
+        contact = cr.press(cr.Scene(radii, bed, MATERIAL, geometry="summit"), load=load)
+        assert contact.certificate.scope == "global"
+        approaches.append(contact.approach)
+        s = np.hypot(*(bed.positions / axes).T)
+        inside = s < 0.9
+        pressures = contact.loads / (spacing**2 * np.sqrt(0.75))
+        expected = hertz.pressure(s * hertz.contact_radius)
+        off = np.abs(pressures - expected)[inside] / hertz.peak_pressure
+        assert off.max() < 0.11 / finer
+    assert 2 * approaches[1] - approaches[0] == pytest.approx(hertz.approach, rel=1e-3)
+
+
+@pytest.mark.parametrize(("base", "name"), [(np.inf, "a flat base"), ((np.inf, 1.0), "a cylinder")])
+def test_bases_without_a_smooth_reference_say_so(base: Any, name: str) -> None:
+    scene = cr.Scene(base, ALONE, MATERIAL, friction=0.5, geometry="summit")
+    assert smooth_reference(scene, 1.0) is None
+    with pytest.raises(cr.InputError, match=f"scene: found {name}, expected a sphere or an"):
+        cr.smooth(scene, load=1.0)
+    cycle = cr.cycle(cr.press(scene, load=1e-6), maximum=1e-7)
+    assert cycle.loss > 0
+    assert np.isnan([cycle.loss_normalised, cycle.smooth_normalised]).all()
+
+
+def test_normalised_losses_of_one_asperity_under_an_ellipsoid() -> None:
+    """A blunt asperity, much blunter than the base: W / W0 differs by the ellipticity alone."""
+    scene = cr.Scene(
+        (1.0, 1.1), cr.Asperities([(0.0, 0.0)], 1e9), MATERIAL, friction=0.5, geometry="summit"
+    )
+    contact = cr.press(scene, load=1e-6)
+    cycle = cr.cycle(contact, maximum=2e-7)
+    assert cycle.loss_normalised == pytest.approx(cycle.smooth_normalised, rel=1e-3)
+    gradient = cycle.gradient().normalised
+    assert gradient.sphere_radius is None
+    assert gradient.load == pytest.approx(
+        -cycle.loss_normalised * 5 / 3 / 1e-6
+        + cycle.gradient().load / (cycle.loss / gradient.value)
+    )
+
+
+def test_the_displacement_outside_is_of_spheres_alone() -> None:
+    with pytest.raises(cr.InputError, match="normal_displacement: found an ellipsoid"):
+        smooth((1.0, 2.0), 1e-6).normal_displacement(0.0)
