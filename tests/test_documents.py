@@ -75,7 +75,6 @@ def test_links_lead_somewhere() -> None:
                 assert (page.parent / target).exists(), (page, target)
 
 
-
 def test_every_public_name_is_in_the_reference() -> None:
     pages = "\n".join(page.read_text("utf-8") for page in (ROOT / "docs/reference").glob("*.md"))
     for name in convexrough.__all__:
