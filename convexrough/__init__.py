@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from convexrough.gradients.states import onset_gradient
     from convexrough.melan.shakedown import Shakedown, shakedown
     from convexrough.normal.certificate import Certificate, certify
+    from convexrough.programs.program import Program, program
     from convexrough.run.scene_file import SceneFile, read_scene
     from convexrough.scene.asperities import Asperities
     from convexrough.scene.material import Material
@@ -82,6 +83,7 @@ _HOMES = {
     "gradients.states": ("onset_gradient",),
     "melan.shakedown": ("Shakedown", "shakedown"),
     "normal.certificate": ("Certificate", "certify"),
+    "programs.program": ("Program", "program"),
     "run.scene_file": ("SceneFile", "read_scene"),
     "scene.asperities": ("Asperities",),
     "scene.material": ("Material",),
@@ -122,6 +124,7 @@ __all__ = [
     "PathComparison",
     "PathEntry",
     "PhaseLosses",
+    "Program",
     "ProofError",
     "Scene",
     "SceneFile",
@@ -151,6 +154,7 @@ __all__ = [
     "open_sweep",
     "phase_losses",
     "press",
+    "program",
     "read_scene",
     "shakedown",
     "shear",
