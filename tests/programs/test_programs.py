@@ -118,7 +118,7 @@ def test_files_are_solved_by_others(form: Any, ending: str, control: str, tmp_pa
 
 @each_control
 def test_any_point_of_the_dual_bounds_the_energy(control: str) -> None:
-    """Weak duality, at points made feasible by hand: docs/theory/exact-cones-dual.md."""
+    """Weak duality, at points made feasible by hand: docs/theory/exact-cones.md."""
     made = program(SCENE, "dual", **CONTROLS[control])
     data, random = made.data, np.random.default_rng(5)
     cones = program(SCENE, "cones", **CONTROLS[control]).data
