@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient
     from convexrough.gradients.objective import Objective
     from convexrough.gradients.states import onset_gradient
+    from convexrough.many import Contacts, Cycles, press_many
     from convexrough.melan.shakedown import Shakedown, shakedown
     from convexrough.normal.certificate import Certificate, certify
     from convexrough.run.scene_file import SceneFile, read_scene
@@ -80,6 +81,7 @@ _HOMES = {
     "gradients.gradient": ("Gradient",),
     "gradients.objective": ("Objective",),
     "gradients.states": ("onset_gradient",),
+    "many": ("Contacts", "Cycles", "press_many"),
     "melan.shakedown": ("Shakedown", "shakedown"),
     "normal.certificate": ("Certificate", "certify"),
     "run.scene_file": ("SceneFile", "read_scene"),
@@ -105,8 +107,10 @@ __all__ = [
     "Certificate",
     "Contact",
     "ContactChange",
+    "Contacts",
     "ConvexroughError",
     "Cycle",
+    "Cycles",
     "Direction",
     "FileError",
     "FrictionConic",
@@ -151,6 +155,7 @@ __all__ = [
     "open_sweep",
     "phase_losses",
     "press",
+    "press_many",
     "read_scene",
     "shakedown",
     "shear",
