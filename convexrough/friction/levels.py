@@ -23,6 +23,7 @@ from convexrough.contact import Contact, levels_of
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level
+from convexrough.normal.stack import Rows
 from convexrough.numbers.balls import TINY, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -214,21 +215,6 @@ class FrictionLevels:
         if self.by_load:
             return exactly(loads).scaled(1.0 / self.units.force)
         return self.top.load - exactly([self.load - x for x in loads]).scaled(1 / self.units.force)
-
-
-class Rows(NamedTuple):
-    """Levels of one scene, or of several: (k,) and, in own units, (k, n), as of `Level`."""
-
-    load: Ball
-    approach: Ball
-    loads: Ball
-    indentation: Ball
-    touching: NDArray[np.bool_]
-    open: NDArray[np.bool_]
-
-    def at(self, which: Indices) -> Rows:
-        """Some of them."""
-        return Rows._make(each[which] for each in self)
 
 
 class Snapshot(NamedTuple):

@@ -20,9 +20,9 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.friction.curve import Piece
-from convexrough.friction.levels import FrictionLevels, Rows, exactly
+from convexrough.friction.levels import FrictionLevels, exactly
 from convexrough.normal.level import Level, energies
-from convexrough.normal.stack import NUMBERS, joined, of_rows
+from convexrough.normal.stack import NUMBERS, Rows, joined, of_rows
 from convexrough.numbers.balls import Ball, where
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import annulus

@@ -352,7 +352,7 @@ def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | Non
 
     def level(k: int) -> Level:
         it = found.row(k, problem.at_load(loads[k]), box)
-        known = it.approach, it.loads, it.indentation, found.touching[k], found.open[k]
+        known = it.approach, it.loads, it.indentation, found.rows.touching[k], found.rows.open[k]
         return Level(it.problem, loads[k], *known, it, it.trial)
 
     return [level(k) if found.good[k] else None for k in range(m)]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.convex.theorem import excess
 from convexrough.normal.boxes import Box
 from convexrough.normal.problem import NormalProblem
@@ -82,6 +82,20 @@ class Stack:
             values[rows] = getattr(problem, name)
         return values
 
+    def only(self, rows: Indices) -> Stack:
+        """Some of the rows (sorted)."""
+        ends = np.searchsorted(rows, [0, *(some.stop for some, _ in self.coupled)]).tolist()
+        slices = zip(map(slice, ends[:-1], ends[1:]), self.coupled, strict=True)
+        pick = partial(of_rows, lambda part: part[rows])
+        return Stack(
+            [(some, problem) for some, (_, problem) in slices if some.stop > some.start],
+            pick(self.coefficients) if len(self.coefficients) == len(self) else self.coefficients,
+            pick(self.offsets),
+            self.shells[rows] if self.shells.ndim == 2 else self.shells,
+            None if self.total is None else pick(self.total),
+            None if self.depth is None else pick(self.depth),
+        )
+
     def apply(self, loads: Array) -> Array:
         """(m, n) A P to float64."""
         found = np.empty(loads.shape)
@@ -141,6 +155,26 @@ class Boxes(NamedTuple):
     number: Array
     shells: Array
 
+    @property
+    def closed(self) -> Boxes:
+        """The same for other loads, of which they may not hold every solution."""
+        return self._replace(faces=np.where(self.loads > 0, self.loads, np.inf))
+
+
+class Rows(NamedTuple):
+    """Levels of one scene, or of several: (k,) and, in own units, (k, n), as of `level.Level`."""
+
+    load: Ball
+    approach: Ball
+    loads: Ball
+    indentation: Ball
+    touching: NDArray[np.bool_]
+    open: NDArray[np.bool_]
+
+    def at(self, which: Indices) -> Rows:
+        """Some of them."""
+        return Rows._make(each[which] for each in self)
+
 
 @dataclass(frozen=True, eq=False)
 class Solved:
@@ -155,14 +189,18 @@ class Solved:
     approach: Ball
 
     @cached_property
-    def touching(self) -> NDArray[np.bool_]:
-        """(m, n) proved to carry a load."""
-        return self.indentation.positive | self.loads.positive
+    def rows(self) -> Rows:
+        """With the words that are proved."""
+        touching = self.indentation.positive | self.loads.positive
+        known = self.approach[:, 0], self.loads, self.indentation
+        return Rows(self.total, *known, touching, self.indentation.negative)
 
     @cached_property
-    def open(self) -> NDArray[np.bool_]:
-        """(m, n) proved to have a gap."""
-        return self.indentation.negative
+    def total(self) -> Ball:
+        """(m,) the sums of the loads: as of `Proved`."""
+        trial = Ball.exact(self.trial.loads).sum()
+        spread = self.distance * np.sqrt((1.0 / self.stiffness).sum(axis=1)) * (1 + SAFETY)
+        return Ball.around(trial.mid, trial.radius + spread + self.trial.missing.size[:, 0])
 
     def row(self, k: int, problem: NormalProblem, box: Box) -> Proved:
         """One of them, of a problem, in its box."""
@@ -336,7 +374,10 @@ def _completed(stack: Stack, loads: Pair) -> Pair:
 
 @quietly
 def proved(stack: Stack, state: Trial, boxes: Boxes) -> Solved:
-    """The solutions in these boxes: as `proved.proved`, of the rows where one box is enough."""
+    """The solutions in these boxes: as `proved.proved`, of the rows where one box is enough.
+
+    Rows with a residual above rounding, or a word that is not decided, are not `good`, either.
+    """
     loads, missing = state.loads.high, state.missing.size
     rows, j = np.arange(len(loads)), np.argmax(loads, axis=1)
     largest = loads[rows, j][:, None]
@@ -357,6 +398,7 @@ def proved(stack: Stack, state: Trial, boxes: Boxes) -> Solved:
 
     _, errors = errors_on(boxes.stiffness, 1.0 - boxes.number)
     good = np.isfinite(errors).all(axis=1) & (loads + errors < boxes.faces).all(axis=1)
+    good &= (boxes.number < 1).ravel()
     near = np.minimum(boxes.loads, (loads + errors) * (1 + SAFETY))
     h = stack.stiffness(near)
     number = (boxes.shells / h).max(axis=1, keepdims=True) * (1 + SAFETY)
@@ -369,6 +411,8 @@ def proved(stack: Stack, state: Trial, boxes: Boxes) -> Solved:
     found = Ball.around(state.loads, np.where(indentation.negative, 0.0, errors))
     found = _sharpened(stack, found, indentation)
     good &= np.isfinite(errors).all(axis=1)
+    good &= _size(state) <= 4.0 * np.linalg.norm(state.gap.radius, axis=1)
+    good &= (found.positive | indentation.positive | indentation.negative).all(axis=1)
     approach = Ball.around(state.approach.mid, shift)
     return Solved(state, good, within[:, 0], h, found, indentation, approach)
 
@@ -437,3 +481,37 @@ def _shifted(stack: Stack, indentation: Array) -> Array:
         excess = total - np.cbrt(load) ** 2 * np.cbrt(total)
         shift = shift - np.maximum(excess / (root / k).sum(axis=1, keepdims=True), 0.0)
     return np.asarray(indentation + shift)
+
+
+@quietly
+def ceilings(stack: Stack, state: Trial) -> Array:
+    """(m, 1) no D0 is higher at any solution: prescribed, or as `load_control.approach_bound`."""
+    if stack.depth is not None:
+        return stack.depth.upper
+    assert stack.total is not None
+    loads, load, d = state.loads.high, stack.total.upper, stack.offsets
+    total = loads.sum(axis=1, keepdims=True)
+    q, c = loads / total, state.product.upper / total
+    cubes = (q * stack.k) ** 3
+    height = (c + np.cbrt(8.0 * cubes / (27.0 * load))).max(axis=1, keepdims=True) * (1 + SAFETY)
+    for _ in range(SHIFTS):  # any height gives a bound
+        excess = np.where(cubes > 0, cubes / (height - c) ** 3, 0.0)
+        slope = 3.0 * np.where(cubes > 0, excess / (height - c), 0.0).sum(axis=1, keepdims=True)
+        step = (excess.sum(axis=1, keepdims=True) - 27.0 * load / 8.0) / slope
+        height = height + np.fmax(step, 0.0)
+    height = np.maximum(height, c.max(axis=1, keepdims=True))
+    rest = np.where(cubes > 0, cubes / (height - c) ** 2, 0.0).sum(axis=1, keepdims=True)
+    terms = height * load, 4.0 / 27.0 * rest, -(d.lower * q).sum(axis=1, keepdims=True)
+    size = terms[0] + terms[1] + (np.abs(d.lower) * q).sum(axis=1, keepdims=True)
+    return np.asarray(sum(terms) + (SAFETY + loads.shape[1] * ROUNDOFF) * size)
+
+
+@quietly
+def widest(stack: Stack, state: Trial) -> Boxes:
+    """Boxes that hold every solution and these loads, by shells: as `boxes.tried` begins."""
+    depth = np.maximum(ceilings(stack, state) + stack.offsets.upper, 0.0)
+    alone = (depth / stack.coefficients.lower) ** 1.5 * (1 + SAFETY)
+    corner = np.maximum(alone, state.loads.high)
+    h = stack.stiffness(corner)
+    number = (stack.shells / h).max(axis=1, keepdims=True) * (1 + SAFETY)
+    return Boxes(corner, h, np.full(h.shape, np.inf), number, stack.shells)
