@@ -47,6 +47,8 @@ from .melan.shakedown import Shakedown as Shakedown
 from .melan.shakedown import shakedown as shakedown
 from .normal.certificate import Certificate as Certificate
 from .normal.certificate import certify as certify
+from .programs.program import Program as Program
+from .programs.program import program as program
 from .run.scene_file import SceneFile as SceneFile
 from .run.scene_file import read_scene as read_scene
 from .scene.asperities import Asperities as Asperities

@@ -24,6 +24,9 @@ from convexrough.influence.coupling import (
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
+#: Numbers of a coupling elsewhere that are kept: few, as it is made anew as fast as many are read.
+KEPT = 2**16
+
 
 def fits_densely(count: int) -> None:
     """Refuse what the matrix of all pairs, and the copies that a solution needs, cannot hold."""
@@ -206,8 +209,15 @@ class DenseCoupling:
         loss = (len(self.points) + 3) * ROUNDOFF + power * self._entry_error
         return total * (1.0 + 1.01 * loss)
 
+    @cached_property
+    def _whole(self) -> Array:
+        return inverse_distances(self.targets, self.points)
+
     def _rows(self) -> Iterator[tuple[slice, Array]]:
-        """1 / r in blocks of rows."""
+        """1 / r in blocks of rows; kept where it is all one small block."""
+        if len(self.points) * len(self.targets) <= KEPT:
+            yield slice(None), self._whole
+            return
         rows = max(1, 2**22 // max(1, len(self.points)))
         for start in range(0, len(self.targets), rows):
             block = slice(start, min(start + rows, len(self.targets)))
