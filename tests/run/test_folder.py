@@ -54,7 +54,7 @@ def test_names_columns_and_keys(command: Any, tmp_path: Path) -> None:
     for name in ("summary.json", "files.json"):
         found[name] = keys(json.loads((tmp_path / "out" / name).read_text()))
     loads = "out/asperities.csv"
-    claim = ("--shear", "forces.csv", "--force", "0", "--out", "verdict", "--json")
+    claim = ("--shear", "forces.csv", "--shear-force", "0", "--out", "verdict", "--json")
     (tmp_path / "forces.csv").write_text("force\n" + "0\n" * 61)
     found["verify"] = keys(json.loads(command("verify", "a.toml", loads, *claim).out))
     found["compare"] = keys(json.loads(command("compare", "a.toml", "--json").out))
