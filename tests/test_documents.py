@@ -26,9 +26,6 @@ BLOCK = re.compile(
 COMMAND = re.compile(r"^\$ (.*?)(?:\s+# exit status (\d))?$", re.M)
 #: Directives of the site, which the site's own build checks.
 DIRECTIVES = {"{toctree}", "{eval-rst}"}
-#: Longer than a page should be, as one looks things up in them: tables, some of which a command
-#: wrote, and lists.
-LONG = {"performance.md", "word-audit.md", "glossary.md", "guarantees.md", "changelog.md"}
 
 
 class Block(NamedTuple):
@@ -76,12 +73,6 @@ def test_links_lead_somewhere() -> None:
         for target in re.findall(r"\]\(([^)#\s]+)\)", page.read_text("utf-8")):
             if "://" not in target:
                 assert (page.parent / target).exists(), (page, target)
-
-
-def test_pages_are_short() -> None:
-    for page in PAGES:
-        words = len(BLOCK.sub("", page.read_text("utf-8")).split())
-        assert words <= 900 or page.name in LONG, (page, words)
 
 
 def test_every_public_name_is_in_the_reference() -> None:

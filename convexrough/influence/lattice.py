@@ -3,7 +3,7 @@
 Free space: the smallest box of sites that holds the asperities is padded with zeros to twice its
 size, so that no asperity feels a periodic image of another. Heights and radii of the asperities
 play no part in it. The rounding of the transforms is bounded in
-docs/theory/operators-lattice.md, "On a lattice: Fourier transforms".
+docs/theory/operators-lattice.md, "Rounding".
 """
 
 from __future__ import annotations
@@ -270,7 +270,10 @@ class LatticeInfluence(LatticeCoupling):
         return -least * radius * (1.0 + SAFETY) <= self.spacing
 
     def sums(self, loads: Pair, slices: int = SLICES) -> Ball:
-        """slices : of loads and of the kernel, of 10 to 18 bits each: docs/theory/sliced.md."""
+        """By docs/theory/operators-lattice.md, "Slices".
+
+        slices : of loads and of the kernel, of 10 to 18 bits each
+        """
         off_sites = self._off_sites(np.asarray(loads.high))
         sliced = self._kept(slices, lambda: self._slice(slices))
         return sliced.sums(loads, self._padded[0], *off_sites)
@@ -299,7 +302,7 @@ class LatticeInfluence(LatticeCoupling):
         With eps_i how far a point is off, and eta no less than any |eps_i - eps_j|,
 
             1 / |d + eps_i - eps_j|  =  1 / |d| - (eps_i - eps_j) d / |d|^3,  but for
-            eta^2 / (|d| - eta)^3:  docs/theory/sliced-points.md, "Points off their sites".
+            eta^2 / (|d| - eta)^3:  docs/theory/operators-lattice.md, "Points off their sites".
         """
         x, y, unknown = self.layout.keep(off_sites)
         shrunk = float(self.lattice.shrink)

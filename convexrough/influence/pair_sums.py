@@ -107,7 +107,7 @@ class Product:
     def _rounding(self) -> tuple[float, float]:
         """Of everything but transforms and interpolation nearby, relative and in the 2-norm.
 
-        docs/theory/operators-mesh.md, "Anywhere: a mesh and near pairs", "Rounding".
+        docs/theory/operators-mesh.md, "Errors", "Rounding".
         """
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF

@@ -1,7 +1,7 @@
 """The coupling among asperities anywhere: by a mesh and a sparse matrix, with proved errors.
 
 What happens on the mesh, and the bounds, are in `pair_sums`, `mesh`, `near_pairs`, `splitting` and
-`softened`; docs/theory/operators-mesh.md, "Anywhere: a mesh and near pairs", derives them.
+`softened`; docs/theory/operators-mesh.md, "A mesh and near pairs", derives them.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """An approximate inverse of I + W A W for asperities anywhere, for conjugate gradients.
 
-Derived in docs/theory/operators-mesh-errors.md, "Approximate inverse".
+Derived in docs/theory/operators-mesh.md, "Approximate inverse".
 """
 
 from __future__ import annotations

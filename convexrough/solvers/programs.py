@@ -2,7 +2,7 @@
 
 Clarabel, OSQP and what CVXPY knows know no contact. They are reached by a `Reduction`, as those of
 cvxpy (Agrawal, Verschueren, Diamond and Boyd, J. Control Decis. 5 (2018) 42), and run by a few
-lines each: data in, raw answer out. docs/how-to/add-a-solver.md adds another.
+lines each: data in, raw answer out. docs/how-to/solvers.md adds another.
 """
 
 from __future__ import annotations

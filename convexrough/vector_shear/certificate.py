@@ -21,7 +21,7 @@ gradient of a convex function of eta. All other asperities together bear at most
 6. Words. i slides where |eta*_i| > k_i for sure, and does not where |eta*_i| < k_i or |q*_i| < P_i.
 
 The energy E is convex: E(q) - E(q*) <= sum e_i |q_i - q*_i| + X.(sum q - T) of any forces q.
-docs/theory/friction-proofs.md has the slopes of step 2, and what is left close to gross sliding.
+docs/theory/vector-friction.md has the slopes of step 2, and what is left close to gross sliding.
 """
 
 from __future__ import annotations
@@ -241,7 +241,7 @@ def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
 def _by_exhaustion(
     problem: VectorProblem, known: Loaded, state: VectorState, total: Ball
 ) -> VectorBounds:
-    """docs/theory/friction-proofs.md, "Close to gross sliding".
+    """docs/theory/vector-friction.md, "Close to gross sliding".
 
     The sum of P_i - q_i.t is at most `unused`. So each q is within (2 P unused)^(1/2) of P t, all
     together in the same sense; then X.t is no less than what it is at any asperity, and a sliding

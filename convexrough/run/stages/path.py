@@ -211,7 +211,7 @@ class Settled(Single):
         for losses in self.found[1:]:
             columns = _by_phase(losses)
             printed = {name: name.replace("_", " ") for name in ("phase", "factor", "loss")}
-            printed |= {"smooth_loss": "smooth sphere"}
+            printed |= {"smooth": "smooth sphere"}
             rows = list(zip(*(columns[name].tolist() for name in printed), strict=True))
             said += ["", titled("loss against phase", printed, units)]
             if len(rows) > 20:
@@ -229,8 +229,8 @@ class Settled(Single):
 
 
 def _by_phase(losses: PhaseLosses) -> Columns:
-    names = ("phases", "factors", "losses", "loss_errors", "levels", "sliding")
-    return {**losses.columns(*names), "smooth_loss": losses.smooth}
+    names = ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
+    return losses.columns(*names)
 
 
 def unproved_order(result: Result, order: str | None) -> Iterator[str]:
