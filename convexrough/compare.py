@@ -1,7 +1,7 @@
 """Every formulation and solver on one scene: do they agree, what is proved, what does it cost?
 
-Answers found in different ways are certified by the same code, which knows no solver. A proof of
-global scope speaks of the only solution that there is, so an answer with any proof that is further
+Answers found in different ways are certified by the same code, which does not depend on a solver.
+A proof of global scope speaks of the only solution that there is, so an answer with any proof that is further
 from it than their bounds allow would be a contradiction in the mathematics of this package, or a
 mistake in its code. Two local proofs need not contradict each other: their boxes, fitted to
 different loads, need not hold each other, and each may hold a solution of its own.
@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from importlib.util import find_spec
 from itertools import combinations
 from typing import Literal, NamedTuple
@@ -171,6 +172,22 @@ def every_solver() -> tuple[solvers.Solver, ...]:
         solvers.BristleQP(),
         solvers.BristleQP(newton_step=False),
     )
+
+
+def solver_named(name: str) -> solvers.Solver:
+    """A solver by its name in a scene file, or made by `package.Class` without arguments.
+
+    Raises InputError where there is none, it cannot be made, or it is no solver.
+    """
+    module, _, attribute = name.rpartition(".")
+    if not module:
+        return solvers.named(name)
+    expected = "package.Class, importable from here, of a solver that needs no arguments"
+    try:
+        made = getattr(import_module(module), attribute)()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise InputError("solver", found=f"{name} ({error})", expected=expected) from error
+    return solvers.named(made)
 
 
 _REFERENCE = solvers.Newton()

@@ -12,7 +12,7 @@ from convexrough.contact import Contact
 #: Fewer asperities in contact than this are no rough surface.
 FEW = 5
 
-#: Contact radius over radius from which the parabola that stands for a sphere is off by 1 %.
+#: Contact radius over radius from which the parabola differs from the sphere by 1 %.
 STEEP = 0.2
 
 

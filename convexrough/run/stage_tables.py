@@ -1,4 +1,4 @@
-"""The table of each stage, as columns: what the CSV files of a run hold (docs/results.md)."""
+"""The columns of the result tables (docs/reference/output-files.md)."""
 
 from __future__ import annotations
 

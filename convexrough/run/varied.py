@@ -1,4 +1,4 @@
-"""Tables and summaries of the stages in which the normal load varies (docs/results.md)."""
+"""Tables and summaries of the load-path stages (docs/reference/output-files.md)."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class Material:
 
         Normal and tangential compliances, of asperities and between them, are those of two like
         bodies with 2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, but for the
-        coupling of the two by Dundurs' beta (docs/theory/two-bodies.md).
+        coupling of the two by Dundurs' beta (docs/theory/bodies.md).
 
         >>> steel = cr.Material.from_youngs(210e9, 0.3)
         >>> both = cr.Material.pair(steel, base=cr.Material.from_youngs(70e9, 0.33))

@@ -50,7 +50,7 @@ def reading(path: Path) -> Iterator[None]:
 
 @contextmanager
 def foreign() -> Iterator[None]:
-    """Whatever another package raises on a spoiled file, as a ValueError."""
+    """Any error that another package raises on a corrupted file, as a ValueError."""
     try:
         yield
     except OSError:

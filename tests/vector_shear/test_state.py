@@ -59,7 +59,7 @@ def test_without_poissons_ratio_it_is_ciavarella_and_jaeger(name: str, fraction:
 def test_the_error_of_the_papers_assumption(
     nu: float, fraction: float, forces: float, transverse: float, travel: float, sliding: int
 ) -> None:
-    """The numbers of docs/theory/friction.md, for the paper's scene."""
+    """The numbers of docs/theory/vector-friction.md, for the paper's scene."""
     contact, state = pressed("paper", nu=nu), found("paper", nu, fraction)
     assert state.disagreement == pytest.approx(forces, abs=6e-5)
     largest = FRICTION * contact.loads.max()
