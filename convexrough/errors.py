@@ -14,7 +14,7 @@ class ConvexroughError(Exception):
     """Base of every error this package raises on purpose."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickled as it is: its words are not composed anew, and it passes between processes."""
+        """Pickled with its message, so that it passes between processes unchanged."""
         return _again, (type(self), self.args), self.__dict__
 
 

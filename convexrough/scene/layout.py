@@ -18,7 +18,7 @@ from convexrough.scene.patterns import Pattern
 MANY = 5000
 
 
-#: Coordinates of points made on a lattice may be off their sites by this part of the largest: three
+#: Coordinates of points made on a lattice may differ from sites by this part of the largest: three
 #: roundoffs in making them, and what `Lattice.sites` loses and allows for when it looks.
 MADE_BLUR = 16 * 2.0**-53
 

@@ -1,8 +1,8 @@
-"""Programs in standard form: how a problem becomes one, who solves it, and the way back.
+"""Programs in standard form: how a problem becomes one, is solved, and is converted back.
 
-Clarabel, OSQP and what CVXPY knows know no contact. They are reached by a `Reduction`, as those of
-cvxpy (Agrawal, Verschueren, Diamond and Boyd, J. Control Decis. 5 (2018) 42), and run by a few
-lines each: data in, raw answer out. docs/how-to/solvers.md adds another.
+A `Reduction` converts the contact problem to a program, as in cvxpy (Agrawal, Verschueren, Diamond
+and Boyd, J. Control Decis. 5 (2018) 42). A few lines per library run Clarabel, OSQP and the solvers
+of CVXPY: data in, raw answer out. docs/how-to/solvers.md adds another.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ class Provability(Table, Drawn):
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """(m,) every word is proved, no contact discs overlap, and the model error is below 5 %."""
+        """(m,) all statuses are proved, no discs overlap, and the model error is below 5 %."""
         proved = np.isin(self.scope, ("global", "local")) & (self.undecided == 0)
         return frozen(proved & (self.crowding <= OVERLAP) & (self.model_error <= TOO_FAR))
 

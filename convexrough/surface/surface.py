@@ -36,7 +36,7 @@ class Surface(Record, Drawn):
 
     heights : (ny, nx) [length] x grows with the column, y with the row; taller is positive
     pixel   : (dx, dy) [length]; one number for squares
-    unit    : of all lengths, "" where nobody said
+    unit    : of all lengths, "" if unknown
     removed : what was taken from the heights, in this order
     filled  : how many pixels were holes
     source  : the file, or what made it
@@ -135,9 +135,9 @@ class Surface(Record, Drawn):
         yield from (("warning", each) for each in self.warnings)
 
     def detrend(self, kind: Trend = "plane") -> Surface:
-        """Without the best plane, or the best sphere: the sphere of a scene is no roughness.
+        """The surface without the plane or the sphere that fits it best.
 
-        What is taken away is the last of `removed`. Raises InputError where nothing is left.
+        The last entry of `removed` is that form. Raises InputError where nothing is left.
 
         >>> ball = cr.surface.Surface(-np.hypot(*np.mgrid[-8:9, -8:9]) ** 2 / 200, pixel=1.0)
         >>> print(ball.detrend("plane").detrend("sphere").removed[1].kind)

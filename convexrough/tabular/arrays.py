@@ -44,11 +44,11 @@ def reading(path: Path) -> Iterator[None]:
 
 @contextmanager
 def foreign() -> Iterator[None]:
-    """What a reader of others raises on a spoiled file, as a ValueError; nothing of ours inside.
+    """Any error that another package raises on a corrupted file, as a ValueError.
 
     None of them says what it may raise: numpy, scipy, pyarrow and openpyxl have been seen to raise
     SyntaxError, KeyError, TypeError, AttributeError, MemoryError, struct.error, TokenError and
-    BadZipFile on files cut short or with one byte changed.
+    BadZipFile on files cut short or with one byte changed. Nothing else may be done inside.
     """
     try:
         yield
