@@ -2,9 +2,9 @@
 
 Answers found in different ways are certified by the same code, which does not depend on a solver.
 A proof of global scope speaks of the only solution that there is, so an answer with any proof that
-is further from it than their bounds allow would be a contradiction in the mathematics of this package, or a
-mistake in its code. Two local proofs need not contradict each other: their boxes, fitted to
-different loads, need not hold each other, and each may hold a solution of its own.
+is further from it than their bounds allow would be a contradiction in the mathematics of this
+package, or a mistake in its code. Two local proofs need not contradict each other: their boxes,
+fitted to different loads, need not hold each other, and each may hold a solution of its own.
 """
 
 from __future__ import annotations
