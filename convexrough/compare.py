@@ -1,10 +1,9 @@
-"""Every formulation and solver on one scene: do they agree, what is proved, what does it cost?
+"""Comparison of all formulations and solvers on one scene: agreement, certificate and time.
 
-Answers found in different ways are certified by the same code, which does not depend on a solver. A proof of
-global scope speaks of the only solution that there is, so an answer with any proof that is further
-from it than their bounds allow would be a contradiction in the mathematics of this package, or a
-mistake in its code. Two local proofs need not contradict each other: their boxes, fitted to
-different loads, need not hold each other, and each may hold a solution of its own.
+The same code certifies all results; it does not depend on the solver. A certificate of global scope
+is about the only solution. If another certified result differs from it by more than the bounds, the
+mathematics or the code of the package has a mistake. Two certificates of local scope need not
+contradict each other: each box may contain a solution of its own.
 """
 
 from __future__ import annotations

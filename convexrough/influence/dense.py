@@ -41,7 +41,8 @@ def dense_matrix(points: Array, scale: float) -> Array:
 def entry_error(point_error: float, nearest: float) -> float:
     """Relative error of a computed scale / r, for r at least `nearest`.
 
-    Each end has an error of at most sqrt(2) point_error, the distance of x r: 1/r by up to x / (1 - x).
+    Each end has an error of at most sqrt(2) point_error, the distance of x r, and 1/r of
+    x / (1 - x), relatively.
     """
     x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
     moved = x / (1.0 - x) if x < 1 else np.inf

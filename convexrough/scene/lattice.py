@@ -15,8 +15,8 @@ from convexrough.kept import Keeper
 
 Sites = NDArray[Any]  # of whole numbers
 
-#: Points may differ from a lattice by this many roundoffs of the largest coordinate: a few more than
-#: computing them in float64 loses.
+#: Points may differ from a lattice by this many roundoffs of the largest coordinate: a few more
+#: than computing them in float64 loses.
 BLUR = 32 * 2.0**-53
 
 #: ... and of the shortest distance between sites by this part: the bounds on products count it.
