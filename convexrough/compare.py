@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from importlib.util import find_spec
 from itertools import combinations
 from typing import Literal, NamedTuple
@@ -170,6 +171,22 @@ def every_solver() -> tuple[solvers.Solver, ...]:
         solvers.BristleQP(),
         solvers.BristleQP(newton_step=False),
     )
+
+
+def solver_named(name: str) -> solvers.Solver:
+    """A solver by its name in a scene file, or made by `package.Class` without arguments.
+
+    Raises InputError where there is none, it cannot be made, or it is no solver.
+    """
+    module, _, attribute = name.rpartition(".")
+    if not module:
+        return solvers.named(name)
+    expected = "package.Class, importable from here, of a solver that needs no arguments"
+    try:
+        made = getattr(import_module(module), attribute)()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise InputError("solver", found=f"{name} ({error})", expected=expected) from error
+    return solvers.named(made)
 
 
 _REFERENCE = solvers.Newton()

@@ -246,7 +246,8 @@ def levels_of(contact: Contact) -> Levels:
         top = Level.unproved(problem, state, total)
     else:
         top = Level.of(found, found.total if problem.load is None else problem.total)
-    solver = solvers.named(contact.solver)
+    named = {each().name: each for each in solvers.SOLVERS.values()}
+    solver: Solver = vars(contact).get("_by") or named.get(contact.solver, solvers.Newton)()
 
     def pressed(at_load: NormalProblem) -> Array:
         try:
@@ -254,7 +255,7 @@ def levels_of(contact: Contact) -> Levels:
         except SolverError:  # crowded contacts: begin at the loads that are known
             return solver.solve(at_load, state.loads.high).loads
 
-    return Levels(top, pressed)
+    return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 
 
 def _contact(
@@ -289,7 +290,7 @@ def _contact(
             certificate = certify_on(problem, loads)
         radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
         model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
-    return Contact(
+    contact = Contact(
         scene=scene,
         loads=loads,
         contact_radii=frozen(radii),
@@ -306,6 +307,8 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
+    contact.__dict__["_by"] = solver  # with its settings, which a copy knows by name alone
+    return contact
 
 
 def _solved(

@@ -159,9 +159,9 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     if problem.load is not None and not given.any():
         expected = "a load on some asperity that could touch, as the total is prescribed"
         raise InputError("loads", found="none", expected=expected)
-    pair = completed(problem, Pair.exact(given))
+    pair, missing = completed(problem, Pair.exact(given))
     product = problem.product(pair) if refines(problem) else problem.plain_product(pair)
-    start = trial(problem, pair, product)
+    start = trial(problem, pair, missing, product)
     found = proved(problem, start)
     if refines(problem) and len(problem):
         better = proved(problem, refined(problem, start))
@@ -178,31 +178,32 @@ def certificate_of(
     """
     length, force = problem.units.length, problem.units.force
     screened = _screened(problem, start)
-    indentation = problem.to_scene(start.indentation.value)
+    here = isinstance(found, Proved) and start is found.trial
+    known = found.indentation if isinstance(found, Proved) and here else start.indentation
+    indentation = problem.to_scene(known.value)
     indentation[screened.which] = screened.indentation
     if isinstance(found, Obstacle):
         return _unproved(problem, start, indentation, found)
     given = loads[problem.candidates]
-    same = start is found.trial and np.array_equal(given / force, found.loads.value)
-    if same:  # the solution was proved from these loads
+    if here and np.array_equal(given / force, found.loads.value):  # proved from these loads
         off = found.loads.error
         moved = off + np.abs(start.loads.low)
-        known, shift = found.indentation.error, float(found.approach.error)
+        errors, shift = found.indentation.error, float(found.approach.error)
     else:
         off = (Ball.exact(given / force) - found.loads).size
         moved = (Ball.exact(start.loads) - found.loads).size
-        known = (found.indentation - start.indentation.value).size
+        errors = (found.indentation - known.value).size
         shift = float((found.approach - start.approach.value).size)
     # Asperities that cannot touch carry nothing; loads too small for own units are lost there.
     load_errors = loads.copy()
     load_errors[problem.candidates] = off * force + np.abs(given - given / force * force)
-    errors = problem.to_scene(known)
+    errors = problem.to_scene(errors)
     errors[screened.which] = screened.rounding + shift
     if screened.coupling is not None:
         felt = screened.coupling.apply(moved)
         errors[screened.which] += felt + screened.coupling.rounding(moved).of(felt)
     errors *= 1 + SAFETY
-    words = np.where(indentation < -errors, np.int8(2), np.int8(0))
+    words = 2 * (indentation < -errors)
     words[problem.candidates[found.touching]] = 1
     words[problem.candidates[found.open]] = 2
     rivals = NO_RIVALS

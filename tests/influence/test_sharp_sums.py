@@ -406,7 +406,7 @@ def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
     assert problem.influence.name == "scattered"
     loads = Newton().solve(problem).loads
     pair = Pair.exact(loads)
-    found = trial(problem, pair, problem.product(pair))
+    found = trial(problem, pair, Ball.exact(0.0), problem.product(pair))
     force, length = arb(problem.units.force), arb(problem.units.length)
     touching = np.flatnonzero(loads)
     tip = float(given.asperities.tip_radii[0])

@@ -297,7 +297,7 @@ def test_the_sharp_residual(geometry: Any, shift: float | None) -> None:
         problem = NormalProblem.assemble(scene, influence="lattice", **control)
         loads = contact.loads[problem.candidates] / problem.units.force
         pair = Pair.exact(loads)
-        found = trial(problem, pair, problem.product(pair))
+        found = trial(problem, pair, Ball.exact(0.0), problem.product(pair))
         force, length = arb(problem.units.force), arb(problem.units.length)
         with ctx.workprec(200):
             R, rho, modulus = arb(1.0), arb(0.02), arb(0.7)
