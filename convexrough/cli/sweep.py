@@ -19,7 +19,7 @@ from convexrough.cli.speech import (
 )
 
 if TYPE_CHECKING:
-    from convexrough.run.summary import Summary
+    from convexrough.run.stage import Summary
     from convexrough.sweeps.engines import Engine
     from convexrough.sweeps.table import SweepTable
 

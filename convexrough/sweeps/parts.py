@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from convexrough.errors import ExtraError, FileError
-from convexrough.run.results import beside
 from convexrough.run.summary import to_json
 from convexrough.sweeps.batch import Columns, Rows, different
+from convexrough.whole import replacing as beside
 
 MANIFEST, PARTS = "manifest.json", "parts"
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from convexrough.run.columns import aligned
-from convexrough.run.results import claim_folder, write_figures, write_tables
-from convexrough.run.summary import Summary
+from convexrough.run.results import results_folder, write_figures, write_tables
+from convexrough.run.stage import Summary
 from convexrough.sweeps.batch import Columns
 from convexrough.sweeps.running import Done, duration
 from convexrough.sweeps.table import SweepTable
@@ -97,15 +97,14 @@ def write_summary(folder: Path, table: SweepTable, found: Columns) -> list[Path]
     from convexrough.plots.notebook import Figure  # it loads matplotlib
     from convexrough.plots.style import DOUBLE
 
-    claim_folder(folder, force=False)
-    files = write_tables(folder, {"quantiles": found})
     pairs = [(name, key) for key in table.swept for name in table.measured]
     figures = {}
     for name, key in pairs[:MOST_FIGURES]:
         figure = Figure(figsize=(0.65 * DOUBLE, 3.0), layout="constrained")
         table.plot(name, key, figure.subplots())
         figures[f"{name}-over-{key}"] = figure
-    return files + write_figures(folder, figures)
+    with results_folder(folder, force=False) as new:
+        return write_tables(new, {"quantiles": found}) + write_figures(new, figures)
 
 
 def _cell(value: Any) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press, solve
 from convexrough.errors import SceneFileError
-from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
 from convexrough.run.scene_file import READ, Layouts, build_scene
 from convexrough.scene.scene import Scene
@@ -22,7 +21,7 @@ from convexrough.solvers import named
 from convexrough.sweeps.grid import Grid
 
 if TYPE_CHECKING:
-    from convexrough.run.schema import Document
+    from convexrough.run.study import Study
 
 #: Layouts of asperities that are kept for the scenes to come.
 KEPT = 8
@@ -94,7 +93,7 @@ class Tables:
                 scene,
                 approach=tables.normal.approach,
                 load=tables.normal.load,
-                influence=cast("Kind | None", tables.solver.influence),
+                influence=tables.solver.influence,
                 highest=highest,
             )
             return solve(problem, named(tables.solver.name))
@@ -107,11 +106,11 @@ class _Documents:
 
     def __init__(self, source: Tables) -> None:
         self._source = source
-        self._last: tuple[dict[str, Any], Document] | None = None
+        self._last: tuple[dict[str, Any], Study] | None = None
 
-    def at(self, number: int) -> Document:
+    def at(self, number: int) -> Study:
         """Raises SceneFileError."""
-        from convexrough.run.schema import Lattice, validate
+        from convexrough.run.study import Lattice, validate
 
         point = self._source.grid.point(number)
         if self._last is not None and self._last[0] == point.values:
@@ -119,7 +118,7 @@ class _Documents:
             layout = known.asperities
             if isinstance(layout, Lattice):
                 layout = layout.model_copy(update={"seed": point.seed})
-            return replace(known, asperities=layout)
+            return known.model_copy(update={"asperities": layout})
         tables, mistakes = validate(self._source.grid.with_values(*point))
         if tables is None:
             raise SceneFileError(str(self._source.path), mistakes)

@@ -112,7 +112,7 @@ def _mistakes_of_tables(tables: Mapping[str, Any]) -> Iterator[str]:
 
 def _mistakes_of_values(grid: Grid) -> Iterator[str]:
     """Every value is checked among the first ones of all other keys, so once."""
-    from convexrough.run.schema import validate
+    from convexrough.run.study import validate
 
     first = grid.point(0)
     _, mistakes = validate(grid.with_values(*first))

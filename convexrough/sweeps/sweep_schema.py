@@ -9,7 +9,7 @@ from typing import Any, get_args
 from pydantic import Field
 
 from convexrough.checks import nearest
-from convexrough.run.schema import validate_table
+from convexrough.run.study import validate_table
 from convexrough.run.values import Table
 from convexrough.sweeps.grid import Law
 from convexrough.sweeps.measures import MEASURES
@@ -41,7 +41,11 @@ class SweepKeys(Table):
             for law, (first, second) in table.items():
                 yield key, (law, float(first), float(second))
 
-    def mistakes_within(self) -> Iterator[str]:
+    def mistakes_within(self) -> Iterator[tuple[str, str]]:
+        yield from (("", each) for each in self.wrong())
+
+    def wrong(self) -> Iterator[str]:
+        """Every mistake, with its key."""
         yield from of_measures(self.measure)
         yield from _of_seeds(self.seeds)
         named: dict[str, str] = {}
@@ -75,10 +79,7 @@ def checked(table: Any, measure: Sequence[str] | None) -> tuple[SweepKeys | None
         return None, [f"[sweep]: {found}; its keys are: {', '.join(SweepKeys.model_fields)}"]
     if measure is not None:
         table = {**table, "measure": list(measure)}
-    keys, mistakes = validate_table("sweep", table, (SweepKeys,))
-    mistakes = [f"[sweep] {mistake}" for mistake in mistakes]
-    assert keys is None or isinstance(keys, SweepKeys)
-    return (None, mistakes) if mistakes else (keys, [])
+    return validate_table("sweep", table, SweepKeys)
 
 
 def of_measures(names: Any) -> Iterator[str]:
