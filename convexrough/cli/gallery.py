@@ -15,7 +15,7 @@ from convexrough.cli.speech import DONE, echo, progress
     "--list", "listed", is_flag=True, help="List the cases: what is done without options."
 )
 @click.option("--export", metavar="DIR", type=PATH, help="Folder for programs and answers.")
-@click.option("--force", is_flag=True, help="Replace results in a folder in use.")
+@click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
 @click.argument("names", nargs=-1)
 @json_option
 def gallery(
