@@ -40,7 +40,6 @@ def run(
     computed as `convexrough sweep` does.
     """
     from convexrough import checks
-    from convexrough.proof import refuse_many
     from convexrough.run.results import origin, results_folder, write_results
     from convexrough.run.scene_file import has_sweep, read_scene
 
@@ -51,6 +50,8 @@ def run(
         if html:
             checks.friction(file.scene.friction)
         if proof:
+            from convexrough.proof import refuse_many
+
             refuse_many(file.scene)
     folder = out or Path(f"{scene.stem}-results")
     with results_folder(folder, force=force, **origin(file)) as new:
