@@ -235,7 +235,7 @@ def test_bad_input() -> None:
     contact = pressed("paper")
     limit = FRICTION * contact.load
     for force in (1.01 * limit, -1.01 * limit, (limit, 0.2 * limit)):
-        with pytest.raises(cr.InputError, match=r"force: found .*gross sliding, 0\.0.* beyond it"):
+        with pytest.raises(cr.InputError, match=r"force: found .*\(1\.0\d+ f P: gross sliding\)"):
             shear_vector(contact, force=force)
     for force in (float("nan"), (0.0, float("inf")), "much", None):
         with pytest.raises(cr.InputError, match="force"):
