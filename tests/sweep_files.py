@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 import convexrough as cr
-from convexrough.sweeps.sources import Press, Tables
+from convexrough.run.stages import Stages
+from convexrough.sweeps.scenes import Press, Tables
 
 SMALL: dict[str, Any] = {
     "sphere": {"radius": 1.0},
@@ -26,7 +27,7 @@ SMALL: dict[str, Any] = {
     "cycle": {"maximum": [0.37]},
     "sweep": {
         "seeds": 4,
-        "measure": ["contacts", "load", "loss"],
+        "measure": ["contact", "load", "loss"],
         "over": {"asperities.height_std": [0.0, 1e-6], "normal.load": [1e-7, 3e-7]},
     },
 }  # fmt: skip
@@ -45,7 +46,7 @@ def tables(**changed: Any) -> dict[str, Any]:
 
 def sweeping(**keys: Any) -> dict[str, Any]:
     """SMALL with this table [sweep] alone."""
-    return {**tables(), "sweep": {"measure": ["contacts"], **keys}}
+    return {**tables(), "sweep": {"measure": ["contact"], **keys}}
 
 
 def toml(contents: dict[str, Any]) -> str:
@@ -103,7 +104,7 @@ class Deadly(Tables):
     def opened(self) -> Press:
         press = super().opened()
 
-        def press_one(number: int) -> cr.Contact:
+        def press_one(number: int) -> tuple[cr.Contact, Stages]:
             if number == self.worst:
                 os.kill(os.getpid(), signal.SIGKILL)
             return press(number)

@@ -1,182 +1,167 @@
-"""What a sweep can measure of a contact: the columns of its table, and their values."""
+"""What a sweep can measure: every number of the summary of a run, by its name or the end of it.
+
+`cycle.loss` is the loss of each cycle; so is `loss`, as no stage before has one. Columns are named
+by the measure and the row of the summary: `loss_0.37` is that of the cycle between +-0.37 f P,
+`history.loss_2` that of the third force of a history.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from convexrough import checks
-from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.friction.cycle import Cycle, cycles
+from convexrough.errors import InputError
+from convexrough.friction.cycle import Loop, cycles
 from convexrough.friction.onset import onset_of_sliding
-from convexrough.friction.shear import ShearState, shear
+from convexrough.run.stages import Cycled, Stages, compute
+from convexrough.run.summary import Summary, proved, summarise
+
+#: What the summary of a run holds, and the onset of sliding.
+STAGES = (
+    *("normal", "shear", "cycle", "history", "path", "steady", "phase_losses", "shakedown"),
+    *("gradient", "onset"),
+)
 
 #: Quantiles of the onset of sliding over the loaded asperities.
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
-@dataclass(frozen=True)
-class Stages:
-    """The shear stages of every scene, as fractions of f P.
+class Column(NamedTuple):
+    """A column of a table, the number of a summary in it, and the row of that."""
 
-    cycle : minimum and maximum of each steady cycle;  shear : on first loading
-    """
-
-    cycle: tuple[tuple[float, float], ...] = ()
-    shear: tuple[float, ...] = ()
-
-    def named(self, stage: str) -> list[str]:
-        """What each column of a stage ends in: the amplitude of a cycle, the fraction of a force.
-
-        A cycle that is not symmetric is named by its minimum and its maximum.
-        """
-        if stage == "shear":
-            return [f"{fraction!r}" for fraction in self.shear]
-        return [f"{high!r}" if low == -high else f"{low!r}_{high!r}" for low, high in self.cycle]
-
-
-class Sheared:
-    """A contact, and its shear stages as far as they are asked for."""
-
-    def __init__(self, contact: Contact, stages: Stages) -> None:
-        self.contact, self.stages = contact, stages
+    name: str
+    number: str
+    row: str
 
     @property
-    def limit(self) -> float:
-        """f P [force]."""
-        return checks.friction(self.contact.scene.friction) * self.contact.load
-
-    @cached_property
-    def cycles(self) -> list[Cycle]:
-        low, high = self.limit * np.array(self.stages.cycle).T
-        return cycles(self.contact, high, low)
-
-    @cached_property
-    def states(self) -> list[ShearState]:
-        return [shear(self.contact, force=part * self.limit) for part in self.stages.shear]
-
-    @property
-    def onsets(self) -> Array:
-        """(n,) of the loaded asperities, as fractions of f P."""
-        loaded = np.flatnonzero(self.contact.loads)
-        return onset_of_sliding(self.contact, which=loaded) / (self.limit or 1.0)
-
-    def undecided(self) -> int:
-        """How many words are not proved, in all that was asked for."""
-        made = [self.contact, *vars(self).get("cycles", ()), *vars(self).get("states", ())]
-        return sum(int((each.status == "undecided").sum()) for each in made)
+    def stage(self) -> str:
+        return self.number.partition(".")[0]
 
 
-def _counts(it: Sheared) -> Iterator[float]:
-    for word in ("contact", "open", "undecided"):
-        yield float((it.contact.status == word).sum())
+def numbers(summary: Summary) -> dict[tuple[str, str], float]:
+    """Every number of a summary, by its name and row."""
+    stages = {name: stage for name, stage in summary.items() if isinstance(stage, (dict, list))}
+    return {(".".join(path), row): value for path, row, value in _numbers(stages)}
 
 
-def _certificate(it: Sheared) -> Iterator[float]:
-    judged = it.contact.certificate
-    yield from (judged.load_error, judged.convexity_number)
-    yield from (it.contact.model_error, it.contact.crowding)
+def _numbers(
+    value: Any, path: tuple[str, ...] = (), row: str = ""
+) -> Iterator[tuple[tuple[str, ...], str, float]]:
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from _numbers(each, (*path, key), row)
+    elif isinstance(value, list):
+        for i, each in enumerate(value):
+            yield from _numbers(each, path, _row(each, f"{row}_{i}" if row else f"{i}"))
+    elif isinstance(value, (int, float)):
+        yield path, row, float(value)
 
 
-def _onset_quantiles(it: Sheared) -> list[float]:
-    onsets = it.onsets
-    if len(onsets) == 0:
-        return [np.nan] * len(QUANTILES)
-    return [float(each) for each in np.quantile(onsets, QUANTILES)]
+def _row(value: Any, place: str) -> str:
+    """What is said of a row: the force of a shear, the amplitude of a cycle; or its place."""
+    known = value if isinstance(value, dict) else {}
+    if "maximum" in known:
+        low, high = known["minimum"], known["maximum"]
+        return f"{high!r}" if low == -high else f"{low!r}_{high!r}"
+    for key in ("fraction", "quantile"):
+        if key in known:
+            return f"{known[key]!r}"
+    return place
 
 
-@dataclass(frozen=True)
-class Measure:
-    """What is measured under one name.
+def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
+    """The columns of each measure: the first number of that name. Raises InputError.
 
-    values : one for each column; suffixes name them;  stage : the table that it needs, or ""
-    units  : "force", "length", "work" or "stiffness" of all columns, or of each; "" of a number
+    No stage is computed beyond the one in which the last of them is found.
     """
+    rows: dict[str, list[str]] = {}
+    for stage in STAGES:
+        if all(any(_ends(number, name) for number in rows) for name in measures):
+            break
+        if stage != "onset" or any(_ends("onset.onset", name) for name in measures):
+            for number, row in numbers(measured(contact, stages, {stage})):
+                if row not in rows.setdefault(number, []):
+                    rows[number].append(row)
+    columns = []
+    for name in measures:
+        number = next((each for each in rows if _ends(each, name)), "")
+        if not number:
+            names = sorted({each.rpartition(".")[2] for each in rows} | {"onset"})
+            expected = f"a number of the stages of this file: {checks.nearest(name, names)}"
+            raise InputError("[sweep] measure", found=f'"{name}"', expected=expected)
+        columns += [Column(f"{name}_{row}" if row else name, number, row) for row in rows[number]]
+    return tuple(columns)
 
-    values: Callable[[Sheared], Iterator[float] | Sequence[float]]
-    stage: str = ""
-    suffixes: tuple[str, ...] = ()
-    units: str | tuple[str, ...] = ""
 
-    def columns(self, name: str, stages: Stages) -> list[str]:
-        if self.stage in ("cycle", "shear"):
-            return [f"{name}_{each}" for each in stages.named(self.stage)]
-        return [f"{name}_{each}" for each in self.suffixes] or [name]
+def _ends(number: str, name: str) -> bool:
+    return f".{number}".endswith(f".{name}")
 
 
-def _of_cycles(value: Callable[[Cycle], float], units: str = "") -> Measure:
-    return Measure(lambda it: [value(each) for each in it.cycles], "cycle", units=units)
+def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Summary:
+    """The summary of some stages, and of the contact itself."""
+    stages = _only(stages, wanted)
+    found = compute(contact, replace(stages, cycle=None))
+    if stages.cycle:
+        limit = checks.friction(contact.scene.friction) * contact.load
+        steady = cycles(contact, *(limit * np.array(each) for each in stages.cycle))
+        pairs = zip(*stages.cycle, steady, strict=True)  # no loop is measured
+        found = replace(found, cycles=tuple(Cycled(*each, cast(Loop, None)) for each in pairs))
+    summary = summarise(found)
+    for row in summary.get("cycle", ()):
+        row["loss_over_smooth"] = row["loss_normalised"] / (row["smooth_normalised"] or np.nan)
+    return summary | ({"onset": _onsets(contact)} if "onset" in wanted else {})
 
 
-#: By name. Energies, forces and lengths are in the scene's units.
-MEASURES = {
-    "contacts": Measure(lambda it: [float((it.contact.status == "contact").sum())]),
-    "words": Measure(_counts, suffixes=("contact", "open", "undecided")),
-    "load": Measure(lambda it: [it.contact.load], units="force"),
-    "approach": Measure(lambda it: [it.contact.approach], units="length"),
-    "certificate": Measure(
-        _certificate,
-        suffixes=("load_error", "convexity_number", "model_error", "crowding"),
-        units=("force", "", "", ""),
+def _only(stages: Stages, wanted: Container[str]) -> Stages:
+    alone = {name: None for name in ("shear", "cycle", "history", "gradient") if name not in wanted}
+    kept = {
+        name: value
+        for name, value in stages.varying._asdict().items()
+        if {"phases": "phase_losses"}.get(name, name) in wanted
+    }
+    return replace(stages, **cast(Any, alone), varying=type(stages.varying)(**kept))
+
+
+def _onsets(contact: Contact) -> list[Summary]:
+    """Quantiles over the loaded asperities of the force, over f P, at which they start to slide."""
+    which = np.flatnonzero(contact.loads)
+    limit = checks.friction(contact.scene.friction) * contact.load
+    onsets = onset_of_sliding(contact, which=which) / (limit or 1.0)
+    found = np.quantile(onsets, QUANTILES) if len(onsets) else np.full(len(QUANTILES), np.nan)
+    return [{"quantile": q, "onset": float(it)} for q, it in zip(QUANTILES, found, strict=True)]
+
+
+def unproved(summary: Summary) -> str:
+    """What is not proved of a summary, "" if all is."""
+    if proved(summary):
+        return ""
+    if summary["normal"]["certificate"]["scope"] == "none":
+        return "no certificate"
+    words = [n for (name, _), n in numbers(summary).items() if name.endswith(".undecided")]
+    return f"{sum(words):.0f} undecided" if sum(words) else "not proved"
+
+
+#: What numbers are, by the end of their name, and a file's keys.
+KINDS = {
+    "force": ("load", "largest_load", "load_error", "force", "force_amplitude", "loads"),
+    "length": (
+        *("approach", "approach_error", "gap_error", "displacement", "displacement_error"),
+        *("displacement_amplitude", "radius", "spacing", "tip_radius", "within", "height_std"),
     ),
-    "displacement": Measure(
-        lambda it: [state.displacement for state in it.states], "shear", units="length"
-    ),
-    "onset": Measure(_onset_quantiles, "friction", tuple(f"{part:g}" for part in QUANTILES)),
-    "loss": _of_cycles(lambda cycle: cycle.loss, "work"),
-    "loss_normalised": _of_cycles(lambda cycle: cycle.loss_normalised),
-    "loss_over_smooth": _of_cycles(
-        lambda cycle: cycle.loss_normalised / (cycle.smooth_normalised or np.nan)
-    ),
-    "loss_factor": _of_cycles(lambda cycle: cycle.loss_factor),
-    "stiffness": _of_cycles(lambda cycle: cycle.secant_stiffness, "stiffness"),
+    "work": ("loss", "loss_error", "loss_first", "duality_gap"),
+    "stiffness": ("secant_stiffness",),
 }
 
 
-def columns(measures: Sequence[str], stages: Stages) -> list[str]:
-    """The names of the measured columns, in the order of the measures."""
-    return [each for name in measures for each in MEASURES[name].columns(name, stages)]
-
-
-def said(column: str) -> str:
-    """What a measured column is, as a figure says it: "loss at Q/(fP) = 0.37"."""
-    own = [name for name in MEASURES if column == name or column.startswith(f"{name}_")]
-    name = max(own, key=len, default=column)
-    words, suffix = name.replace("_", " "), column.removeprefix(name).strip("_")
-    if not own or not suffix:
-        return words
-    if name == "onset":
-        return f"onset of sliding, Q/(fP), quantile {suffix}"
-    if MEASURES[name].stage not in ("cycle", "shear"):
-        return suffix.replace("_", " ")
-    low, _, high = suffix.rpartition("_")
-    return f"{words} at Q/(fP) = {high}" if not low else f"{words}, Q/(fP) from {low} to {high}"
-
-
-def units(measures: Sequence[str], stages: Stages, length: str, force: str) -> dict[str, str]:
-    """What each measured column is in, where the names of both units are known."""
-    if not (length and force):
-        return {}
-    names = {"": "", "length": length, "force": force}
-    names |= {"work": f"{force} {length}", "stiffness": f"{force}/{length}"}
-    found: dict[str, str] = {}
-    for name in measures:
-        own = MEASURES[name].columns(name, stages)
-        kinds = MEASURES[name].units
-        each = [kinds] * len(own) if isinstance(kinds, str) else kinds
-        found |= {column: names[kind] for column, kind in zip(own, each, strict=True) if kind}
-    return found
-
-
-def measure(contact: Contact, measures: Sequence[str], stages: Stages) -> tuple[list[float], str]:
-    """A value for each of `columns`, and what is not proved, "" if all is."""
-    it = Sheared(contact, stages)
-    values = [float(each) for name in measures for each in MEASURES[name].values(it)]
-    if contact.certificate.scope == "none":
-        return values, "no certificate"
-    unsure = it.undecided()
-    return values, f"{unsure} undecided" if unsure else ""
+def unit(number: str, length: str, force: str) -> str:
+    """What a number of a summary, or a key of a file, is in; "" where that has no name."""
+    names = {"length": length, "force": force, "work": f"{force} {length}"}
+    names["stiffness"] = f"{force}/{length}"
+    kinds = [kind for kind, ends in KINDS.items() if number.rpartition(".")[2] in ends]
+    known = length and force and not number.startswith("gradient.")
+    return names[kinds[0]] if kinds and known else ""

@@ -16,7 +16,8 @@ from convexrough.contact import Contact, press, solve
 from convexrough.errors import SceneFileError
 from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
-from convexrough.run.scene_file import READ, Layouts, build_scene
+from convexrough.run.scene_file import READ, Layouts, _sensitivity, _varying, build_scene
+from convexrough.run.stages import Stages
 from convexrough.scene.scene import Scene
 from convexrough.solvers import named
 from convexrough.sweeps.grid import Grid
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 #: Layouts of asperities that are kept for the scenes to come.
 KEPT = 8
 
-#: From the number of a scene to its contact.
-Press = Callable[[int], Contact]
+#: From the number of a scene to its contact, and what is asked of it.
+Press = Callable[[int], tuple[Contact, Stages]]
 
 #: What stands in the column of seeds where nothing is random.
 NO_SEED = -1
@@ -85,10 +86,10 @@ class Tables:
 
     def opened(self) -> Press:
         layouts = Layouts(*map(lru_cache(KEPT), READ))
-        document = _Documents(self)
+        checked: dict[str, Any] = {}
 
-        def press_one(number: int) -> Contact:
-            tables = document.at(number)
+        def press_one(number: int) -> tuple[Contact, Stages]:
+            tables = self._checked(number, checked)
             scene, highest = build_scene(self.path, tables, layouts)
             problem = NormalProblem.assemble(
                 scene,
@@ -97,34 +98,37 @@ class Tables:
                 influence=cast("Kind | None", tables.solver.influence),
                 highest=highest,
             )
-            return solve(problem, named(tables.solver.name))
+            return solve(problem, named(tables.solver.name)), _stages(tables)
 
         return press_one
 
-
-class _Documents:
-    """The checked tables of one scene after the other: those that differ by a seed, once."""
-
-    def __init__(self, source: Tables) -> None:
-        self._source = source
-        self._last: tuple[dict[str, Any], Document] | None = None
-
-    def at(self, number: int) -> Document:
-        """Raises SceneFileError."""
+    def _checked(self, number: int, last: dict[str, Any]) -> Document:
+        """The tables of a scene; of those that differ by a seed alone, checked once."""
         from convexrough.run.schema import Lattice, validate
 
-        point = self._source.grid.point(number)
-        if self._last is not None and self._last[0] == point.values:
-            known = self._last[1]
-            layout = known.asperities
-            if isinstance(layout, Lattice):
-                layout = layout.model_copy(update={"seed": point.seed})
-            return replace(known, asperities=layout)
-        tables, mistakes = validate(self._source.grid.with_values(*point))
-        if tables is None:
-            raise SceneFileError(str(self._source.path), mistakes)
-        self._last = (point.values, tables)
-        return tables
+        point = self.grid.point(number)
+        if last.get("values") != point.values:
+            tables, mistakes = validate(self.grid.with_values(*point))
+            if tables is None:
+                raise SceneFileError(str(self.path), mistakes)
+            last.update(values=point.values, tables=tables)
+        known: Document = last["tables"]
+        layout = known.asperities
+        if isinstance(layout, Lattice) and point.seed is not None:
+            layout = layout.model_copy(update={"seed": point.seed})
+        return replace(known, asperities=layout)
+
+
+def _stages(tables: Document) -> Stages:
+    """What a file asks of its contact; nothing is drawn in a sweep, and so there are no loops."""
+    shear, cycle, history = tables.shear, tables.cycle, tables.history
+    return Stages(
+        shear=tuple(shear.fractions) if shear else None,
+        cycle=(tuple(cycle.maximum), tuple(cycle.lowest)) if cycle else None,
+        history=tuple(history.fractions) if history else None,
+        varying=_varying(tables),
+        gradient=_sensitivity(tables),
+    )
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,7 @@ class Objects:
     scenes: Sequence[Scene]
     controls: Array
     by_load: bool
+    stages: Stages
     first: int = 0
 
     @property
@@ -151,12 +156,14 @@ class Objects:
 
     def part(self, numbers: range) -> Objects:
         places = slice(numbers.start - self.first, numbers.stop - self.first)
-        return Objects(self.scenes[places], self.controls[places], self.by_load, numbers.start)
+        scenes, controls = self.scenes[places], self.controls[places]
+        return replace(self, scenes=scenes, controls=controls, first=numbers.start)
 
     def opened(self) -> Press:
-        def press_one(number: int) -> Contact:
+        def press_one(number: int) -> tuple[Contact, Stages]:
             place = number - self.first
             scene, control = self.scenes[place], float(self.controls[place])
-            return press(scene, load=control) if self.by_load else press(scene, approach=control)
+            pressed = press(scene, load=control) if self.by_load else press(scene, approach=control)
+            return pressed, self.stages
 
         return press_one
