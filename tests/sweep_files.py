@@ -1,10 +1,13 @@
 """Sweeps that several tests compute, and what it means that two tables are the same."""
 
 import json
+import logging
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +15,8 @@ from typing import Any
 import numpy as np
 
 import convexrough as cr
-from convexrough.run.stages import Stages
+from convexrough.progress import LOGGER
+from convexrough.sweeps.measures import Stages
 from convexrough.sweeps.scenes import Press, Tables
 
 SMALL: dict[str, Any] = {
@@ -79,6 +83,24 @@ def _equal(one: Any, other: Any) -> bool:
     if one.dtype.kind == "U":  # as wide as its longest
         return one.tolist() == other.tolist()
     return one.dtype == other.dtype and one.tobytes() == other.tobytes()
+
+
+@contextmanager
+def told(call: Callable[[str], None]) -> Iterator[None]:
+    """Call with all that is said while work goes on, as it is said."""
+
+    class Handler(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            call(record.getMessage())
+
+    handler, level = Handler(), LOGGER.level
+    LOGGER.addHandler(handler)
+    LOGGER.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        LOGGER.removeHandler(handler)
+        LOGGER.setLevel(level)
 
 
 def started(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from convexrough.cli.options import PATH, json_option
-from convexrough.cli.speech import DONE, progress
+from convexrough.cli.speech import DONE, echo, progress
 
 
 @click.command()
@@ -27,10 +27,10 @@ def gallery(
     program (.npz of qpsolvers) and as a cone program (JSON of Clarabel, and CBF), with an index.
     """
     from convexrough import gallery as wing
-    from convexrough.run.columns import aligned
-    from convexrough.run.gallery_files import write_gallery
-    from convexrough.run.results import claim_folder
-    from convexrough.run.summary import to_json
+    from convexrough.gallery.export import exported
+    from convexrough.run.results import results_folder
+    from convexrough.tabular.columns import aligned
+    from convexrough.whole import write_text
 
     wanted = wing.names(*names)
     cases = [wing.case(name) for name in wanted]
@@ -44,9 +44,8 @@ def gallery(
         lines = aligned([heading, *rows], left=3)
     summary = {case.name: {"family": case.family, "why": case.why} for case in cases}
     if export is not None:
-        claim_folder(export, force=force)
-        with progress("writing") as show:
-            files = write_gallery(export, wanted, lambda name: show(f"writing: {name}"))
+        with results_folder(export, force=force) as new, progress("writing"):
+            files = [write_text(new / name, text) for name, text in exported(wanted)]
         lines += [f"{len(wanted)} cases, {len(files)} files, written to {export}"]
-    click.echo(to_json({"cases": summary}) if as_json else "\n".join(lines))
+    echo({"cases": summary}, lines, as_json)
     return DONE

@@ -14,6 +14,7 @@ from convexrough.cli.speech import (
     INTERRUPTED,
     NOT_CERTIFIED,
     SOLVER_FAILED,
+    echo,
     progress,
     say_aside,
     written,
@@ -22,7 +23,7 @@ from convexrough.cli.speech import (
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from convexrough.run.summary import Summary
+    from convexrough.run.stage import Summary
 
 
 def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | None:
@@ -83,9 +84,8 @@ def sweep(
     with progress("reading the first scene"):
         plan = read_sweep(sweep)
     try:
-        with progress("starting") as show, _executor(workers, scheduler) as executor:
-            asked: Any = dict(out=folder, resume=resume, overwrite=force, part=part)
-            done = run(plan, executor, **asked, announce=show)
+        with progress(str(sweep)), _executor(workers, scheduler) as executor:
+            done = run(plan, executor, out=folder, resume=resume, overwrite=force, part=part)
     except KeyboardInterrupt:
         say_aside("interrupted", kept(folder, plan))
         return INTERRUPTED
@@ -93,7 +93,7 @@ def sweep(
         say_aside("error", str(error), kept(folder, plan))
         return SOLVER_FAILED
     said = summarise(done.table, done)
-    _say(said, describe(said), as_json)
+    echo(said, describe(said), as_json)
     for failed in failures(done.table):
         say_aside("warning", failed)
     return _status(said)
@@ -119,14 +119,8 @@ def _say_summary(folder: Path, out: Path | None, as_json: bool, *, overwrite: bo
             lines += written(out, report.write_summary(out, table, found, overwrite=overwrite))
     rows = zip(*(values.tolist() for values in found.values()), strict=True)
     quantiles = [dict(zip(found, row, strict=True)) for row in rows]
-    _say({**said, "quantiles": quantiles}, lines, as_json)
+    echo({**said, "quantiles": quantiles}, lines, as_json)
     return _status(said)
-
-
-def _say(summary: Summary, lines: list[str], as_json: bool) -> None:
-    from convexrough.run.summary import to_json
-
-    click.echo(to_json(summary) if as_json else "\n".join(lines))
 
 
 def _status(summary: Summary) -> int:

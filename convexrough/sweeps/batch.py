@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from convexrough.errors import ConvexroughError
-from convexrough.sweeps.measures import Column, measured, numbers, unproved
+from convexrough.sweeps.measures import Column, measured
 from convexrough.sweeps.scenes import Press, Source
 from convexrough.threads import one_thread
 from convexrough.version import __version__
@@ -20,11 +20,7 @@ from convexrough.version import __version__
 FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 
 #: Rows are the same, bit for bit, where these are.
-VERSIONS = {
-    "convexrough": __version__,
-    "numpy": np.__version__,
-    "scipy": scipy.__version__,
-}
+VERSIONS = {"convexrough": __version__, "numpy": np.__version__, "scipy": scipy.__version__}
 
 Columns = dict[str, NDArray[Any]]
 
@@ -53,11 +49,8 @@ class Rows(NamedTuple):
 
 def different(versions: Mapping[str, str]) -> str:
     """Other versions than those here, in words; "" if they are the same."""
-    said = (
-        f"{name} {versions.get(name)} instead of {here}"
-        for name, here in VERSIONS.items()
-        if versions.get(name) != here
-    )
+    said = (f"{name} {versions.get(name)} instead of {here}" for name, here in VERSIONS.items()
+            if versions.get(name) != here)  # fmt: skip
     return ", ".join(said)
 
 
@@ -71,25 +64,22 @@ def compute(batch: Batch) -> Rows:
 
 def _row(press: Press, number: int, columns: tuple[Column, ...]) -> Row:
     try:
-        contact, stages = press(number)
-        summary = measured(contact, stages, {column.stage for column in columns})
-        found = numbers(summary)
+        found, unsure = measured(*press(number), {column.stage for column in columns})
         values = [found[column.number, column.row] for column in columns]
     except FAILURES as error:
         said = "; ".join(str(error).splitlines()) or type(error).__name__
         return "failed", said, [np.nan] * len(columns)
-    except KeyError as error:
+    except KeyError as error:  # a swept list may be shorter than the first
         return "failed", f"has no number {error}", [np.nan] * len(columns)
-    unsure = unproved(summary)
     return ("undecided" if unsure else "certified"), unsure, values
 
 
 def table(batch: Batch, rows: list[Row]) -> Columns:
     """The columns of the rows of a batch."""
-    measured = np.array([values for _, _, values in rows], dtype=np.float64)
-    measured = measured.reshape(len(rows), len(batch.columns))
+    values = np.array([values for _, _, values in rows], dtype=np.float64)
+    values = values.reshape(len(rows), len(batch.columns))
     found: Columns = {"scene": np.array(batch.numbers, dtype=np.int64)}
     found |= batch.source.labels(batch.numbers)
     found["status"] = np.array([status for status, _, _ in rows], dtype=np.str_)
     found["message"] = np.array([message for _, message, _ in rows], dtype=np.str_)
-    return found | {column.name: measured[:, i] for i, column in enumerate(batch.columns)}
+    return found | {column.name: values[:, i] for i, column in enumerate(batch.columns)}

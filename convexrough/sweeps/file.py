@@ -7,17 +7,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import Field
 
-from convexrough.checks import nearest
 from convexrough.errors import SceneFileError
 from convexrough.run.scene_file import MOST_BYTES, digest, parsed
-from convexrough.run.schema import validate
+from convexrough.run.study import Study, validate, validate_table
 from convexrough.run.tables import read_text
-from convexrough.run.values import Table, expected
+from convexrough.run.values import Mistake, Table, expected
 from convexrough.sweeps.grid import Axis, Draw, Grid, Law
-from convexrough.sweeps.plan import Plan, identified, planned
+from convexrough.sweeps.plan import Plan, planned
 from convexrough.sweeps.scenes import Tables
 
 #: Tables whose fractions name columns of the result: they are the same for every scene.
@@ -44,7 +42,12 @@ def _is_law(table: dict[Law, list[float]]) -> bool:
     return first < second if law == "uniform" else second > 0 and (law == "normal" or first > 0)
 
 
-_Keys = expected('a table of keys of the scene file, such as "asperities.height_std"')
+_NAMES = 'a list of numbers of summary.json, such as ["load"]'
+_Names = Annotated[list[str], expected(_NAMES, _different)]
+_Seeds = Annotated[
+    int | list[int],
+    expected("how many (1 or more), or a list of whole numbers, none of them twice", _are_seeds),
+]
 _Values = Annotated[list[Any], expected("a list of values, none of them twice", _different)]
 _Laws = Annotated[
     dict[Law, list[float]],
@@ -54,23 +57,41 @@ _Laws = Annotated[
         _is_law,
     ),
 ]
-_Seeds = Annotated[
-    int | list[int],
-    expected("how many (1 or more), or a list of whole numbers, none of them twice", _are_seeds),
-]
-_Names = Annotated[
-    list[str], expected('a list of numbers of summary.json, such as ["load"]', _different)
-]
+_KEYS = expected('a table of keys of the scene file, such as "asperities.height_std"')
 
 
 class Keys(Table):
     """The table [sweep]: what varies, and what is measured."""
 
-    measure: _Names
+    measure: _Names = Field(default_factory=list)
     seeds: _Seeds | None = None
-    together: Annotated[dict[str, _Values], _Keys] = Field(default_factory=dict)
-    over: Annotated[dict[str, _Values], _Keys] = Field(default_factory=dict)
-    draw: Annotated[dict[str, _Laws], _Keys] = Field(default_factory=dict)
+    together: Annotated[dict[str, _Values], _KEYS] = Field(default_factory=dict)
+    over: Annotated[dict[str, _Values], _KEYS] = Field(default_factory=dict)
+    draw: Annotated[dict[str, _Laws], _KEYS] = Field(default_factory=dict)
+
+    @classmethod
+    def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
+        """Keys that are not to be swept, or twice; of lists taken together, the lengths."""
+        yield from super().mistakes_between(keys)
+        if "measure" not in keys:
+            yield "measure", f"missing, expected {_NAMES}"
+        first: dict[str, str] = {}
+        for where, key in _swept(keys):
+            name, _, rest = key.partition(".")
+            if not rest or "." in rest:
+                expects = 'expected a table and a key of it, such as "asperities.height_std"'
+                yield f"{where}.{key}", expects
+            elif name in FIXED:
+                yield f"{where}.{key}", f"values of [{name}] are columns, the same for every scene"
+            elif key in first or (key == "asperities.seed" and "seeds" in keys):
+                also = f"in [sweep.{first[key]}]" if key in first else "by seeds"
+                yield f"{where}.{key}", f"swept twice, {also} too"
+            first[key] = where
+        lists = _dict(keys.get("together")).values()
+        if len(lengths := {len(each) for each in lists if isinstance(each, list)}) > 1:
+            yield "together", f"found {sorted(lengths)} values, expected as many of each key"
+        if keys.get("draw") and "seeds" not in keys:
+            yield "seeds", "missing, needed with [sweep.draw]"
 
     def grid(self, tables: Mapping[str, Any]) -> Grid:
         def axes(table: Mapping[str, list[Any]]) -> tuple[Axis, ...]:
@@ -104,104 +125,61 @@ def plan_of(
     Raises SceneFileError.
     """
     tables = {name: table for name, table in contents.items() if name != "sweep"}
-    keys, mistakes = _checked(contents.get("sweep"), measure, tables)
-    if keys is None:
-        raise SceneFileError(str(path), mistakes)
+    table = contents.get("sweep")
+    if measure is not None and isinstance(table, dict):
+        table = {**table, "measure": list(measure)}
+    if table is None:
+        known = ", ".join(Keys.model_fields)
+        raise SceneFileError(str(path), [f"[sweep]: missing table; its keys are: {known}"])
+    keys, mistakes = validate_table("sweep", table, Keys)
+    mistakes += _nothing_random(_dict(table), tables)
+    if keys is None or mistakes:
+        varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # not as they will be
+        others = validate({name: it for name, it in tables.items() if name not in varied})[1]
+        told = [each for each in others if "missing table" not in each]
+        raise SceneFileError(str(path), [*mistakes, *told])
     grid = keys.grid(tables)
-    if mistakes := list(_of_values(grid)):
+    study, mistakes = _of_values(grid)
+    if study is None or mistakes:
         raise SceneFileError(str(path), mistakes)
     inputs = {each: digest(path.parent / each) for each in sorted(_summit_files(grid))}
-    swept = [list(getattr(keys, where).items()) for where in WHERE]  # in order
-    identity = identified(
-        tables=tables, swept=swept, seeds=keys.seeds, measure=keys.measure, inputs=inputs
-    )
     said = {"source": str(path), "text": text, "inputs": inputs}
-    return planned(Tables(grid, path), keys.measure, tables, identity, said)
-
-
-def _checked(
-    table: Any, measure: Sequence[str] | None, tables: Mapping[str, Any]
-) -> tuple[Keys | None, list[str]]:
-    """The table [sweep]; or None and everything that is wrong, in it and in the other tables."""
-    if not isinstance(table, dict):
-        found = "missing table" if table is None else f"found {table!r}, expected a table"
-        return None, [f"[sweep]: {found}; its keys are: {', '.join(Keys.model_fields)}"]
-    if measure is not None:
-        table = {**table, "measure": list(measure)}
-    swept = [(where, key) for where in WHERE for key in _dict(table.get(where))]
-    mistakes = [*_between(table, swept, tables)]
-    keys = None
-    try:
-        keys = Keys.model_validate(table)
-    except ValidationError as error:
-        mistakes = [*map(_phrase, error.errors()), *mistakes]
-    if not mistakes:
-        return keys, []
-    known = {key.partition(".")[0] for _, key in swept}  # their values are not checked yet
-    others = {name: it for name, it in tables.items() if name not in known}
-    mistakes += [each for each in validate(others)[1] if "missing table" not in each]
-    return None, mistakes
+    swept = [list(getattr(keys, where).items()) for where in WHERE]  # in order
+    given = {"tables": tables, "swept": swept, "seeds": keys.seeds, "inputs": inputs}
+    return planned(Tables(grid, path), keys.measure, said, study.units.names, **given)
 
 
 def _dict(value: Any) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _phrase(error: ErrorDetails) -> str:
-    """One mistake: the key, what was found, what is expected."""
-    name, *inner = error["loc"]
-    place = f'[sweep.{name}] "{inner[0]}"' if inner and name in WHERE else f"[sweep] {name}"
-    if error["type"] == "extra_forbidden":
-        return f"{place}: unknown key, {nearest(str(name), Keys.model_fields)}"
-    if error["type"] == "missing":
-        return f'{place}: missing, expected a list of numbers of summary.json, such as ["load"]'
-    return f"{place}: found {error['input']!r}, expected {error['msg']}"
+def _swept(table: Mapping[str, Any]) -> list[tuple[str, str]]:
+    return [(where, key) for where in WHERE for key in _dict(table.get(where))]
 
 
-def _between(
-    table: dict[str, Any], swept: Iterable[tuple[str, str]], tables: Mapping[str, Any]
-) -> Iterator[str]:
-    """Mistakes in which keys are given together, whatever their values."""
-    first: dict[str, str] = {}
-    for where, key in swept:
-        place, (name, _, rest) = f'[sweep.{where}] "{key}"', key.partition(".")
-        if not rest or "." in rest:
-            yield f'{place}: expected a table and a key of it, such as "asperities.height_std"'
-        elif name in FIXED:
-            yield f"{place}: the values of [{name}] are columns, the same for every scene"
-        elif key in first or (key == "asperities.seed" and "seeds" in table):
-            also = f"in [sweep.{first[key]}]" if key in first else "by seeds"
-            yield f"{place}: swept twice, {also} too"
-        first[key] = where
-    lists = _dict(table.get("together")).values()
-    lengths = {len(each) for each in lists if isinstance(each, list)}
-    if len(lengths) > 1:
-        yield f"[sweep] together: found {sorted(lengths)} values, expected as many of each key"
-    drawn = bool(table.get("draw"))
-    if drawn and "seeds" not in table:
-        yield "[sweep] seeds: missing, needed with [sweep.draw]"
+def _nothing_random(table: Mapping[str, Any], tables: Mapping[str, Any]) -> Iterable[str]:
+    """Seeds of nothing random would compute one scene many times."""
     given = {*_dict(tables.get("asperities"))}
-    given |= {key.removeprefix("asperities.") for key in first}
-    if "seeds" in table and not drawn and given.isdisjoint({"height_std", "tip_radius_cv"}):
+    given |= {key.removeprefix("asperities.") for _, key in _swept(table)}
+    rough = not given.isdisjoint({"height_std", "tip_radius_cv"})
+    if "seeds" in table and not table.get("draw") and not rough:
         yield (
             "[sweep] seeds: nothing is random: expected height_std or tip_radius_cv in "
             "[asperities], or a table [sweep.draw]"
         )
 
 
-def _of_values(grid: Grid) -> Iterator[str]:
-    """Every value is checked among the first ones of all other keys, so once."""
+def _of_values(grid: Grid) -> tuple[Study | None, list[str]]:
+    """The first scene; every other value is checked in its place, so once."""
     first = grid.point(0)
-    _, mistakes = validate(grid.with_values(*first))
-    if mistakes:
-        yield from mistakes
-        return
+    study, mistakes = validate(grid.with_values(*first))
     for where, axes in (("together", grid.together), ("over", grid.over)):
-        for key, values in axes:
+        for key, values in axes if study else ():
             for i, value in enumerate(values[1:], 1):
                 point = first._replace(values={**first.values, key: value})
-                _, mistakes = validate(grid.with_values(*point))
-                yield from (f'[sweep.{where}] "{key}"[{i}]: {mistake}' for mistake in mistakes)
+                _, wrong = validate(grid.with_values(*point))
+                mistakes += [f"[sweep] {where}.{key}[{i}]: {mistake}" for mistake in wrong]
+    return study, mistakes
 
 
 def _summit_files(grid: Grid) -> set[str]:

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from convexrough.errors import ExtraError, FileError
-from convexrough.run.summary import to_json
 from convexrough.sweeps.batch import Columns, different
-from convexrough.whole import replacing
+from convexrough.whole import to_json, write_text
 
 MANIFEST, PARTS = "manifest.json", "parts"
 
@@ -50,8 +49,7 @@ class Folder:
         pyarrow, parquet = arrow()
         whole = BytesIO()
         parquet.write_table(pyarrow.table(columns), whole, write_page_checksum=True)
-        with replacing(self.file(self.scenes(int(columns["scene"][0])))) as temporary:
-            temporary.write_bytes(whole.getvalue())
+        write_text(self.file(self.scenes(int(columns["scene"][0]))), whole.getvalue())
 
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
         """Some columns of a part, default all; FileError where it is damaged."""
@@ -130,8 +128,7 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
         if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
             raise FileError(f"{path}: holds {strangers[0]}, and no sweep; --out takes another")
         if not (path / MANIFEST).exists():
-            with replacing(path / MANIFEST) as temporary:
-                temporary.write_text(to_json(dict(manifest)) + "\n", encoding="utf-8")
+            write_text(path / MANIFEST, to_json(manifest) + "\n")
     folder = open_folder(path)
     there = folder.manifest
     if there["sweep"] != manifest["sweep"]:

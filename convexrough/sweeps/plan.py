@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from convexrough.errors import InputError
 from convexrough.sweeps.batch import FAILURES, VERSIONS, Batch
-from convexrough.sweeps.measures import STAGES, Column, chosen, unit
+from convexrough.sweeps.measures import Column, chosen, unit
 from convexrough.sweeps.scenes import Source, Tables
+from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
 #: Scenes of a batch, at most; asperities in it, about; and batches of a small sweep.
@@ -27,16 +28,16 @@ class Plan:
 
     size     : scenes of each batch, and part;  left_out : stages of which nothing is measured
     identity : the SHA-256 of all that its numbers depend on
-    said     : what it was read from, for its manifest
+    said     : what it was read from, for its manifest;  units : as its file names them
     """
 
     source: Source
-    measures: tuple[str, ...]
     columns: tuple[Column, ...]
     left_out: tuple[str, ...]
     size: int
     identity: str
     said: Mapping[str, Any]
+    units: UnitNames
 
     @property
     def parts(self) -> int:
@@ -57,10 +58,7 @@ class Plan:
         """
         grid = self.source.grid if isinstance(self.source, Tables) else None
         labels = list(self.source.labels(range(0)))
-        measured = [column.name for column in self.columns]
-        units = {} if grid is None else grid.tables.get("units", {})
-        names = units.get("length", ""), units.get("force", "")
-        ends = {name: name for name in labels} | {it.name: it.number for it in self.columns}
+        numbers = {key: key for key in labels} | {it.name: it.number for it in self.columns}
         return {
             "schema": 2,
             "version": __version__,
@@ -68,11 +66,10 @@ class Plan:
             "scenes": self.source.count,
             "each": 1 if grid is None else grid.each,
             "batch": self.size,
-            "columns": ["scene", *labels, "status", "message", *measured],
+            "columns": ["scene", *labels, "status", "message", *(it.name for it in self.columns)],
             "drawn": [] if grid is None else [draw.key for draw in grid.draws],
-            "measure": list(self.measures),
             "not_measured": list(self.left_out),
-            "units": {name: it for name, end in ends.items() if (it := unit(end, *names))},
+            "units": {name: it for name, end in numbers.items() if (it := unit(end, self.units))},
             **self.said,
             "versions": VERSIONS,
         }
@@ -81,13 +78,13 @@ class Plan:
 def planned(
     source: Source,
     measures: Sequence[str],
-    tables: Iterable[str],
-    identity: str,
     said: Mapping[str, Any],
+    units: UnitNames,
+    **given: Any,
 ) -> Plan:
     """The plan of scenes; the first of them says what can be measured, and how large they are.
 
-    tables : of stages, which may be measured or not
+    given : all that their numbers depend on, but for what is measured and this package
 
     Raises InputError where a measure is not there, and what the first scenes raise if all fail.
     """
@@ -102,14 +99,11 @@ def planned(
                 if isinstance(error, InputError) and not error.where:
                     raise error.within(str(said["source"])) from error
                 raise
-    used = {"steady" if it.stage == "phase_losses" else it.stage for it in columns}
-    left_out = sorted({*tables} & {*STAGES} - {"normal"} - used)
+    used = {"normal", *(column.stage for column in columns)}
+    left_out = tuple(name for name in stages if name not in used)
     few = -(-source.count // LEAST_BATCHES)
     size = max(1, min(MOST_SCENES, MOST_ASPERITIES // len(contact.scene), few))
-    return Plan(source, tuple(measures), columns, tuple(left_out), size, identity, said)
-
-
-def identified(**contents: Any) -> str:
-    """The SHA-256 of all that the numbers of a sweep depend on; this package is part of it."""
-    text = json.dumps({"version": __version__, **contents}, sort_keys=True, default=repr)
-    return hashlib.sha256(text.encode()).hexdigest()
+    contents = {"version": __version__, "measure": list(measures), **given}
+    text = json.dumps(contents, sort_keys=True, default=repr)
+    identity = hashlib.sha256(text.encode()).hexdigest()
+    return Plan(source, columns, left_out, size, identity, said, units)

@@ -23,7 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from convexrough.errors import ExtraError, InputError, WorkerError
-from convexrough.sweeps.batch import VERSIONS, Batch, Rows, compute, different
+from convexrough.sweeps.batch import VERSIONS, Batch, Columns, Rows, compute, different
 from convexrough.threads import cores
 
 #: Batches that an executor is given at once; for each process here: more are lost with one.
@@ -35,7 +35,7 @@ MOST_LOST = 64
 Lost = list[tuple[Batch, BaseException]]
 
 
-def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Rows]:
+def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     """The rows of batches, as they come.
 
     A batch whose worker died is computed again, alone, after the others. Raises WorkerError where
@@ -50,7 +50,7 @@ def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Rows]:
         raise WorkerError(f"the process that computed scenes {which} died, twice") from dead[0][1]
 
 
-def _together(batches: Iterator[Batch], executor: Executor) -> Generator[Rows, None, Lost]:
+def _together(batches: Iterator[Batch], executor: Executor) -> Generator[Columns, None, Lost]:
     """The rows of batches, in any order; and those whose workers died."""
     most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
     pending: dict[Future[Rows], Batch] = {}
@@ -72,7 +72,7 @@ def _together(batches: Iterator[Batch], executor: Executor) -> Generator[Rows, N
                     continue
                 if rows.versions != VERSIONS:
                     raise WorkerError(f"a worker has other versions: {different(rows.versions)}")
-                yield rows
+                yield rows.columns
     except BrokenExecutor as error:  # it takes nothing more, and is not ours to start anew
         raise WorkerError(f"the executor is of no use any more: {error}") from error
     except CancelledError as error:

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.run.columns import aligned
-from convexrough.run.results import claim_folder, write_figures, write_tables
-from convexrough.run.summary import Summary
+from convexrough.run.results import results_folder, write_figures, write_tables
+from convexrough.run.stage import Summary
+from convexrough.run.summary import headed
 from convexrough.sweeps.batch import Columns
 from convexrough.sweeps.folder import MANIFEST
 from convexrough.sweeps.plan import Plan
 from convexrough.sweeps.sweep import Done, duration
 from convexrough.sweeps.table import SweepTable, open_sweep
-from convexrough.version import __version__
+from convexrough.tabular.columns import aligned
 
 #: Quantiles in print, rows of a table in print, failed scenes that are named, and figures drawn.
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
@@ -33,7 +33,7 @@ def summarise(table: SweepTable, done: Done | None = None) -> Summary:
     }
     if done is not None:
         said |= {"found": done.found, "computed": done.computed, "seconds": done.seconds}
-    return {"schema": 2, "version": __version__, "sweep": said}
+    return headed(sweep=said)
 
 
 def describe(summary: Summary) -> list[str]:
@@ -78,11 +78,10 @@ def write_summary(
     folder: Path, table: SweepTable, found: Columns, *, overwrite: bool = False
 ) -> list[Path]:
     """quantiles.csv, and a figure of each measured quantity over each swept one."""
-    claim_folder(folder, force=overwrite)
-    files = write_tables(folder, {"quantiles": found})
     pairs = [(name, key) for key in table.swept for name in table.measured][:MOST_FIGURES]
-    drawn: dict[str, Any] = {f"{name}-over-{key}": table.plot(name, key) for name, key in pairs}
-    return files + write_figures(folder, {stem: axes.figure for stem, axes in drawn.items()})
+    with results_folder(folder, force=overwrite) as new:
+        drawn: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
+        return write_tables(new, {"quantiles": found}) + write_figures(new, drawn)
 
 
 def kept(folder: Path, plan: Plan) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press, solve
 from convexrough.errors import SceneFileError
-from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
-from convexrough.run.scene_file import READ, Layouts, _sensitivity, _varying, build_scene
-from convexrough.run.stages import Stages
+from convexrough.run.scene_file import READ, Layouts, build_scene
 from convexrough.scene.scene import Scene
 from convexrough.solvers import named
 from convexrough.sweeps.grid import Grid
+from convexrough.sweeps.measures import Stages
 
 if TYPE_CHECKING:
-    from convexrough.run.schema import Document
+    from convexrough.run.study import Study
 
 #: Layouts of asperities that are kept for the scenes to come.
 KEPT = 8
@@ -33,25 +32,6 @@ Press = Callable[[int], tuple[Contact, Stages]]
 
 #: What stands in the column of seeds where nothing is random.
 NO_SEED = -1
-
-
-class Source(Protocol):
-    """The scenes of a sweep, by their numbers from 0."""
-
-    @property
-    def count(self) -> int: ...
-
-    def labels(self, numbers: range) -> dict[str, NDArray[Any]]:
-        """The columns that say which scenes these are: what is swept, and the seed."""
-        ...
-
-    def part(self, numbers: range) -> Source:
-        """What a worker needs to know for these numbers, which stay the same."""
-        ...
-
-    def opened(self) -> Press:
-        """How to press them, with what scenes one after the other share."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -69,6 +49,7 @@ class Tables:
         return self.grid.count
 
     def labels(self, numbers: range) -> dict[str, NDArray[Any]]:
+        """The columns that say which scenes these are: what is swept, and the seed."""
         points = [self.grid.point(number) for number in numbers]
         known = self.grid.tables.get("asperities", {}).get("seed", NO_SEED)
         seeds = [known if each.seed is None else each.seed for each in points]
@@ -82,53 +63,43 @@ class Tables:
         return swept | {"seed": np.array(seeds, dtype=np.int64)}
 
     def part(self, numbers: range) -> Tables:
+        """What a worker needs to know for these numbers, which stay the same."""
         return self
 
     def opened(self) -> Press:
+        """How to press scenes; those one after the other share what they have in common."""
         layouts = Layouts(*map(lru_cache(KEPT), READ))
-        checked: dict[str, Any] = {}
+        last: dict[str, Any] = {}
 
         def press_one(number: int) -> tuple[Contact, Stages]:
-            tables = self._checked(number, checked)
-            scene, highest = build_scene(self.path, tables, layouts)
+            study = self._study(number, last)
+            scene, highest = build_scene(self.path, study, layouts)
             problem = NormalProblem.assemble(
                 scene,
-                approach=tables.normal.approach,
-                load=tables.normal.load,
-                influence=cast("Kind | None", tables.solver.influence),
+                approach=study.normal.approach,
+                load=study.normal.load,
+                influence=study.solver.influence,
                 highest=highest,
             )
-            return solve(problem, named(tables.solver.name)), _stages(tables)
+            return solve(problem, named(study.solver.name)), study.stages
 
         return press_one
 
-    def _checked(self, number: int, last: dict[str, Any]) -> Document:
+    def _study(self, number: int, last: dict[str, Any]) -> Study:
         """The tables of a scene; of those that differ by a seed alone, checked once."""
-        from convexrough.run.schema import Lattice, validate
+        from convexrough.run.study import Lattice, validate
 
         point = self.grid.point(number)
         if last.get("values") != point.values:
-            tables, mistakes = validate(self.grid.with_values(*point))
-            if tables is None:
+            study, mistakes = validate(self.grid.with_values(*point))
+            if study is None:
                 raise SceneFileError(str(self.path), mistakes)
-            last.update(values=point.values, tables=tables)
-        known: Document = last["tables"]
-        layout = known.asperities
-        if isinstance(layout, Lattice) and point.seed is not None:
-            layout = layout.model_copy(update={"seed": point.seed})
-        return replace(known, asperities=layout)
-
-
-def _stages(tables: Document) -> Stages:
-    """What a file asks of its contact; nothing is drawn in a sweep, and so there are no loops."""
-    shear, cycle, history = tables.shear, tables.cycle, tables.history
-    return Stages(
-        shear=tuple(shear.fractions) if shear else None,
-        cycle=(tuple(cycle.maximum), tuple(cycle.lowest)) if cycle else None,
-        history=tuple(history.fractions) if history else None,
-        varying=_varying(tables),
-        gradient=_sensitivity(tables),
-    )
+            last.update(values=point.values, study=study)
+        known: Study = last["study"]
+        if point.seed is None or not isinstance(known.asperities, Lattice):
+            return known
+        layout = known.asperities.model_copy(update={"seed": point.seed})
+        return known.model_copy(update={"asperities": layout})
 
 
 @dataclass(frozen=True)
@@ -167,3 +138,7 @@ class Objects:
             return pressed, self.stages
 
         return press_one
+
+
+#: The scenes of a sweep, by their numbers from 0.
+Source: TypeAlias = Tables | Objects

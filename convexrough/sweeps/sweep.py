@@ -15,16 +15,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.errors import FileError, InputError
-from convexrough.progress import Announce
-from convexrough.run.stages import Stages
+from convexrough.errors import FileError, InputError, MistakesError
+from convexrough.progress import tell
+from convexrough.run.stage import Stage
 from convexrough.scene.scene import Scene
 from convexrough.sweeps.batch import Columns, table
 from convexrough.sweeps.folder import Folder, make_folder
-from convexrough.sweeps.plan import Plan, identified, planned
+from convexrough.sweeps.measures import Stages
+from convexrough.sweeps.plan import Plan, planned
 from convexrough.sweeps.pool import Processes, computed
 from convexrough.sweeps.scenes import Objects
 from convexrough.sweeps.table import SweepTable
+from convexrough.tabular.units import UnitNames
 
 #: A file, its contents, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
@@ -47,7 +49,6 @@ def sweep(
     load: ArrayLike | None = None,
     cycle: Sequence[float] = (),
     shear: Sequence[float] = (),
-    announce: Announce | None = None,
 ) -> SweepTable:
     """Measure many scenes.
 
@@ -60,7 +61,6 @@ def sweep(
     workers  : how many processes; default: as many as there are processors
     resume   : go on with what is in the folder;  overwrite : or compute it again
     part     : (k, n), the k-th of n parts of the sweep, from 1
-    announce : told in a line how far the work has come
 
     The table is the same, bit for bit, whoever computes it in whatever order and in how many
     sittings. A scene that fails has a row that says why.
@@ -73,15 +73,20 @@ def sweep(
     >>> print(table.read()["contact"])
     [37. 37. 43.]
     """
+    given = {"approach": approach, "load": load, "cycle": cycle or None, "shear": shear or None}
     if isinstance(what, (str, os.PathLike, Mapping)):
-        given = {"approach": approach, "load": load, "cycle": cycle or None, "shear": shear or None}
         for name, value in given.items():
             if value is not None:
                 raise InputError(name, found="given", expected="in the tables of the sweep")
-        plan = _of_tables(what, measure)
+        from convexrough.sweeps.file import plan_of, read_sweep  # it loads pydantic
+
+        if isinstance(what, Mapping):
+            plan = plan_of(what, Path("sweep"), measure)
+        else:
+            plan = read_sweep(what, measure)
     else:
         plan = _of_scenes(what, measure, approach, load, _stages(cycle, shear))
-    asked: Any = dict(out=out, resume=resume, overwrite=overwrite, part=part, announce=announce)
+    asked: Any = dict(out=out, resume=resume, overwrite=overwrite, part=part)
     if executor is not None:
         checks.instance("executor", executor, Executor)
         return run(plan, executor, **asked).table
@@ -109,21 +114,17 @@ def run(
     resume: bool = False,
     overwrite: bool = False,
     part: tuple[int, int] | None = None,
-    announce: Announce | None = None,
 ) -> Done:
     """`sweep` of a plan; its arguments are as there."""
-    began = time.monotonic()
-    tell: Announce = announce or (lambda news: None)
-    wanted: Iterable[range] = _share(plan, part)
-    folder, found = None, ""
+    began, folder, found = time.monotonic(), None, ""
+    todo = _share(plan, part)
     if out is not None:
         folder = make_folder(Path(out), plan.manifest(), overwrite=overwrite)
-        wanted, found = _missing(folder, list(wanted), resume)
+        todo, found = _missing(folder, todo, resume)
         tell(found)
-    todo = list(wanted)
     count = sum(map(len, todo))
     held = [table(plan.batch(range(0)), [])]  # no rows, all columns
-    for columns in _told(_rows(plan, todo, executor), count, tell):
+    for columns in _told(computed(map(plan.batch, todo), executor), count):
         if folder is None:
             held.append(columns)
         else:
@@ -131,12 +132,13 @@ def run(
     seconds = time.monotonic() - began
     if folder is not None:
         return Done(SweepTable(folder.manifest, folder), found, count, seconds)
-    held.sort(key=lambda columns: int(columns["scene"][0]) if len(columns["scene"]) else -1)
     joined = {name: np.concatenate([each[name] for each in held]) for name in held[0]}
-    return Done(SweepTable(plan.manifest(), None, joined), found, count, seconds)
+    order = np.argsort(joined["scene"])
+    rows = {name: values[order] for name, values in joined.items()}
+    return Done(SweepTable(plan.manifest(), None, rows), found, count, seconds)
 
 
-def _share(plan: Plan, part: tuple[int, int] | None) -> Iterator[range]:
+def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
     """The k-th of n shares of the parts, or all."""
     k, n = part or (1, 1)
     if not 1 <= k <= n:
@@ -146,7 +148,7 @@ def _share(plan: Plan, part: tuple[int, int] | None) -> Iterator[range]:
         expected = f"at most {MOST:,} at once; a part of the sweep (K/N) may be that small"
         where = str(plan.said["source"])
         raise InputError("scenes", found=f"about {count:,}", expected=expected, where=where)
-    return map(plan.part, range(first, stop))
+    return [plan.part(number) for number in range(first, stop)]
 
 
 def _missing(folder: Folder, wanted: list[range], resume: bool) -> tuple[list[range], str]:
@@ -161,11 +163,7 @@ def _missing(folder: Folder, wanted: list[range], resume: bool) -> tuple[list[ra
     return folder.missing(wanted)
 
 
-def _rows(plan: Plan, todo: Iterable[range], executor: Executor) -> Iterator[Columns]:
-    return (rows.columns for rows in computed(map(plan.batch, todo), executor))
-
-
-def _told(found: Iterator[Columns], count: int, tell: Announce) -> Iterator[Columns]:
+def _told(found: Iterator[Columns], count: int) -> Iterator[Columns]:
     """The rows themselves; how far they have come is told on the way."""
     began, done, failed = time.monotonic(), 0, 0
     for columns in found:
@@ -186,23 +184,24 @@ def duration(seconds: float) -> str:
     return f"{seconds:.0f} s"
 
 
-def _of_tables(what: str | os.PathLike[str] | Mapping[str, Any], measure: Any) -> Plan:
-    from convexrough.sweeps.file import plan_of, read_sweep  # it loads pydantic
-
-    if isinstance(what, Mapping):
-        return plan_of(what, Path("sweep"), measure)
-    return read_sweep(what, measure)
-
-
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
-    amplitudes = checks.array("cycle", cycle, sign="positive").tolist()
-    forces = checks.array("shear", shear, sign="not negative").tolist()
-    for name, values in (("cycle", amplitudes), ("shear", forces)):
-        for i, value in enumerate(values):
-            checks.between(f"{name}[{i}]", value, 0.0, 1.0)
-    opposite = tuple(-value for value in amplitudes)
-    both = (tuple(amplitudes), opposite) if amplitudes else None
-    return Stages(shear=tuple(forces) or None, cycle=both)
+    """Of tables with these values."""
+    from convexrough.run.stages import Cycle, Normal, Shear
+    from convexrough.run.study import validate_table
+
+    found: dict[str, Stage] = {"normal": Normal(approach=0.0)}
+    mistakes: list[str] = []
+    models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
+    models = ((Shear, "fractions", shear), (Cycle, "maximum", cycle))
+    for model, key, values in models:
+        if len(values):
+            table, wrong = validate_table(model.name, {key: [*map(float, values)]}, model)
+            mistakes += wrong
+            if table is not None:
+                found[model.name] = table
+    if mistakes:
+        raise MistakesError("sweep", mistakes)
+    return found
 
 
 def _of_scenes(
@@ -218,9 +217,9 @@ def _of_scenes(
     if not scenes:
         raise InputError("scenes", found="none", expected="at least one")
     checks.exactly_one("approach", approach, "load", load)
-    name, given = ("approach", approach) if load is None else ("load", load)
-    assert given is not None  # exactly_one
-    controls = checks.array(name, given, length=len(scenes), one="scene")
+    name, control = ("approach", approach) if load is None else ("load", load)
+    assert control is not None  # exactly_one
+    controls = checks.array(name, control, length=len(scenes), one="scene")
     if not measure:
         expected = 'a list of numbers of a summary, such as ["load"]'
         raise InputError("measure", found=measure, expected=expected)
@@ -231,12 +230,6 @@ def _of_scenes(
             content.update(values.tobytes())
         content.update(repr((scene.sphere_radius, material, scene.friction)).encode())
         content.update(f"{scene.geometry} {len(scene)}".encode())
-    identity = identified(
-        scenes=content.hexdigest(),
-        **{name: controls.tolist()},
-        measure=list(measure),
-        stages=[stages.cycle, stages.shear],
-    )
+    given = {"scenes": content.hexdigest(), name: controls.tolist(), "stages": repr(stages)}
     source = Objects(scenes, controls, load is not None, stages)
-    said = {"source": "scenes made in Python"}
-    return planned(source, measure, ("shear", "cycle"), identity, said)
+    return planned(source, measure, {"source": "scenes made in Python"}, UnitNames(), **given)

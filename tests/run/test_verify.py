@@ -161,7 +161,7 @@ def shear_file(contact: cr.Contact, forces: Any, words: Any = None) -> str:
 def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     force = 0.25 * contact.load
     state = cr.shear(contact, force=force)
-    asked = ("verify", "a.toml", claim(contact), "--force", repr(force), "--shear")
+    asked = ("verify", "a.toml", claim(contact), "--shear-force", repr(force), "--shear")
     outcome = command(*asked, shear_file(contact, state.forces))
     assert (outcome.status, outcome.err) == (0, "")
     assert "shear forces      words of all proved; shear forces only to " in outcome.out
@@ -182,13 +182,13 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
 def test_wrong_use(command: Any, contact: cr.Contact) -> None:
     loads = claim(contact)
     for wrong, expected in (
-        (("--shear", loads), "--shear and --force go together"),
-        (("--force", "1"), "--shear and --force go together"),
+        (("--shear", loads), "--shear and --shear-force go together"),
+        (("--shear-force", "1"), "--shear and --shear-force go together"),
         (("--within", "0"), "--within: found 0.0, expected a positive number"),
         (("--tolerance", "-1"), "--tolerance: found -1.0"),
         (("--floor", "-1"), "--floor: found -1.0"),
         (("--floor", "nan"), "--floor: found nan"),
-        (("--shear", loads, "--force", "1", "--column", "force=load"), "gross sliding"),
+        (("--shear", loads, "--shear-force", "1", "--column", "force=load"), "gross sliding"),
     ):
         outcome = command("verify", "a.toml", loads, *wrong)
         assert (outcome.status, outcome.out) == (2, ""), wrong
@@ -209,7 +209,7 @@ def test_files(command: Any, contact: cr.Contact, tmp_path: Path) -> None:
     assert rows[36]["suspect"] == "1"
     again = command("verify", "a.toml", loads, "--out", "found")
     assert again.status == 2
-    assert "found: not empty; --out takes another" in again.err
+    assert "found: not empty; --force replaces its results, --out takes another" in again.err
 
 
 def test_the_figure(contact: cr.Contact) -> None:

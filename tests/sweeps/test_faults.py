@@ -16,7 +16,7 @@ from typing import Any
 
 import psutil
 import pytest
-from sweep_files import SMALL, same, started, tables, toml
+from sweep_files import SMALL, same, started, tables, told, toml
 
 import convexrough as cr
 from convexrough.sweeps.folder import open_folder
@@ -51,6 +51,7 @@ def scripted(folder: Path, script: str, *arguments: str) -> subprocess.Popen[str
     return subprocess.Popen(
         [sys.executable, "-c", script, *arguments], cwd=folder, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True, start_new_session=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
 
 
@@ -112,8 +113,8 @@ def test_workers_are_killed_at_any_moment(
             left -= 1
 
     while True:
-        with suppress(cr.WorkerError):
-            cr.sweep(file / "a.toml", workers=2, out=file / "a-sweep", resume=True, announce=kill)
+        with suppress(cr.WorkerError), told(kill):
+            cr.sweep(file / "a.toml", workers=2, out=file / "a-sweep", resume=True)
         if rows(file) == SCENES:
             break
     assert left == 0
@@ -155,11 +156,13 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, event: str) -> Non
 FULL = """
 import resource
 import convexrough as cr
+from sweep_files import told
 def fill(news):
     if "of 240 scenes" in news:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
 try:
-    cr.sweep("a.toml", workers=1, out="a-sweep", announce=fill)
+    with told(fill):
+        cr.sweep("a.toml", workers=1, out="a-sweep")
 except cr.FileError as error:
     print(error)
 """

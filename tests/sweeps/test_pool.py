@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweep_files import Deadly, same, sweeping, tables
+from sweep_files import Deadly, same, sweeping, tables, told
 
 import convexrough as cr
 from convexrough.sweeps import plan
@@ -178,9 +178,9 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
             killed.append(random.choice(workers))
             os.kill(killed[0], signal.SIGKILL)
 
-    with dask(cluster.scheduler_address) as engine:
-        workers = [each.pid for each in cluster.workers.values()]
-        table = run(plan, engine, out=tmp_path / "a", announce=kill).table
+    workers = [each.pid for each in cluster.workers.values()]
+    with dask(cluster.scheduler_address) as engine, told(kill):
+        table = run(plan, engine, out=tmp_path / "a").table
     assert killed
     with ThreadPoolExecutor(1) as here:
         assert same(table, cr.sweep(contents, executor=here))

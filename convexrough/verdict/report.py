@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -14,13 +13,11 @@ from convexrough.arrays import Indices
 from convexrough.compare import listed
 from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
-from convexrough.run.columns import aligned
-from convexrough.run.plausibility import described_modulus
-from convexrough.run.results import beside, write_figures, write_tables
-from convexrough.run.summary import Summary, certificate_summary, to_json
-from convexrough.run.verification import Verified
+from convexrough.plausibility import described_modulus
 from convexrough.scene.scene import Scene
+from convexrough.tabular.columns import aligned
 from convexrough.tabular.units import UnitNames
+from convexrough.verdict.files import Verified
 
 #: From this part on errors are said in per cent.
 PERCENT = 1e-4
@@ -29,20 +26,17 @@ PERCENT = 1e-4
 MOST_LISTED = 10
 
 
-def verdict_summary(found: Verified) -> Summary:
-    """What `--json` prints, in the scene's units."""
-    verdict, sheared = found.verdict, found.sheared
-    summary = certificate_summary(verdict.certificate, verdict.loads)
-    summary["verdict"] = _claim_summary(verdict)
-    if sheared is not None:
-        summary["shear_verdict"] = _claim_summary(sheared)
+def verdict_summary(found: Verified) -> dict[str, Any]:
+    """What `--json` prints of the claims, in the scene's units."""
+    summary: dict[str, Any] = {"verdict": _claim_summary(found.verdict)}
+    if found.sheared is not None:
+        summary["shear_verdict"] = _claim_summary(found.sheared)
     columns = asperity_columns(found)
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    summary["asperities"] = [dict(zip(columns, row, strict=True)) for row in rows]
-    return summary
+    return summary | {"asperities": [dict(zip(columns, row, strict=True)) for row in rows]}
 
 
-def _claim_summary(claim: Claim) -> Summary:
+def _claim_summary(claim: Claim) -> dict[str, Any]:
     names = ("wrongly_open", "wrongly_loaded")
     if isinstance(claim, ShearVerdict):
         names = ("wrongly_sliding", "wrongly_sticking")
@@ -147,21 +141,8 @@ def reason(found: Verified) -> str:
     return ", ".join(parts)
 
 
-def write_verdict(folder: Path, summary: Summary, found: Verified, units: UnitNames) -> list[Path]:
-    """Write verdict.csv, a figure, and verdict.json; return the paths."""
-    from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
-
-    written = write_tables(folder, {"verdict": asperity_columns(found)})
-    figures = verdict_figures(found.verdict, found.sheared, length_unit=units.length)
-    written += write_figures(folder, figures)
-    path = folder / "verdict.json"
-    with beside(path) as temporary:
-        temporary.write_text(to_json(summary) + "\n", encoding="utf-8")
-    return [path, *written]
-
-
-def write_junit(path: Path, found: Verified) -> None:
-    """Write the findings as a suite of JUnit's, a case for each question."""
+def junit(found: Verified) -> bytes:
+    """The findings as a suite of JUnit's, a case for each question."""
     suite = ElementTree.Element("testsuite", name="convexrough verify")
     failures = 0
     for _, claim in found.claims:
@@ -186,8 +167,8 @@ def write_junit(path: Path, found: Verified) -> None:
     suite.set("failures", str(failures))
     root = ElementTree.Element("testsuites")
     root.append(suite)
-    with beside(path) as temporary:
-        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+    written: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return written
 
 
 def _named(claim: Claim, scene: Scene, which: Indices) -> str:
