@@ -65,7 +65,7 @@ Order = Literal["proved", "proved for one step", "fails"]
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
 #: Up to so many that touch the inverse costs no more than the levels themselves.
-MOST = 300
+MOST = 800
 
 #: Levels between that are tried: where an inverse is made, and where none is.
 BETWEEN, FEW_BETWEEN = 7, 1
