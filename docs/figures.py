@@ -84,7 +84,7 @@ def stick_zone() -> Figure:
 
 def drawings() -> dict[str, Callable[[Path], object]]:
     """What draws each file, by its name: given the path to write."""
-    paper = cache(lambda: paper_figures(example.findings().contact))
+    paper = cache(lambda: paper_figures(example.results()[0].contact))
     design = cache(lambda: run_path(str(EXAMPLES / "design_a_damper.py"))["draw"])
     return {f"{name}.png": partial(_save, paper, stem) for name, stem in PAPER.items()} | {
         "once-differentiable.png": lambda path: once_differentiable().savefig(path, dpi=150),

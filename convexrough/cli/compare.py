@@ -12,6 +12,7 @@ from convexrough.cli.speech import (
     NOT_CERTIFIED,
     SOLVER_FAILED,
     blamed_on,
+    echo,
     progress,
     say_aside,
 )
@@ -32,28 +33,24 @@ def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named
-    from convexrough.run.report import comparison_warnings, describe_comparison
+    from convexrough.progress import tell
+    from convexrough.run import comparison as report
     from convexrough.run.scene_file import read_scene
-    from convexrough.run.summary import comparison_summary, to_json
 
     rivals = [solver_named(name) for name in solvers] or None
     file = read_scene(scene)
-    with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities") as show:
+    with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities"):
         comparison = compare_solvers(
             file.scene,
             approach=file.approach,
             load=file.load,
             influence=file.influence,
             solvers=rivals,
-            announce=lambda name: show(f"pressing on {len(file.scene)} asperities: {name}"),
+            announce=tell,
         )
-    summary = comparison_summary(comparison)
-    if as_json:
-        click.echo(to_json(summary))
-    else:
-        length, force = file.units
-        click.echo("\n".join(describe_comparison(summary, length_unit=length, force_unit=force)))
-    for warning in comparison_warnings(summary):
+    summary = report.comparison_summary(comparison)
+    echo(summary, report.describe_comparison(summary, file.units), as_json)
+    for warning in report.comparison_warnings(summary):
         say_aside("warning", warning)
     outcomes = {entry.outcome for entry in comparison.entries}
     if "failed" in outcomes and not comparison.contradictions:

@@ -1,4 +1,4 @@
-"""What `summits` says of a surface: for people, and for programs."""
+"""What `summits` says of a surface: for people, for programs, and in tables."""
 
 from __future__ import annotations
 
@@ -9,11 +9,18 @@ from typing import Any
 import numpy as np
 
 from convexrough.contact import Contact
-from convexrough.run.columns import aligned
-from convexrough.run.summary import Summary
 from convexrough.surface import Provability, Summits, Surface, Whole, crowded, model_errors
 from convexrough.surface.provability import TOO_FAR
+from convexrough.tabular.columns import aligned
 from convexrough.version import __version__
+
+#: Columns of summits.csv beside x, y, height and tip_radius, which a scene file reads.
+COLUMNS = ("x", "y", "heights", "tip_radii", "prominences", "largest_curvatures",
+           "smallest_curvatures", "eccentricities", "elliptic_loads", "deviations")  # fmt: skip
+
+#: How the units of columns follow from that of length.
+LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
+LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature"), "1/{}")
 
 #: Crowded pairs that the terminal names before it says how many more there are.
 MOST_LISTED = 10
@@ -46,11 +53,11 @@ class Scanned:
         return self.curve is None or (self.contact is not None and self.contact.certificate.holds)
 
 
-def surface_summary(scanned: Scanned) -> Summary:
+def surface_summary(scanned: Scanned) -> dict[str, Any]:
     """What `--json` prints, in the unit of the map."""
     surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
     moments = surface.moments
-    summary: Summary = {
+    summary: dict[str, Any] = {
         "schema": 1,
         "version": __version__,
         "surface": {
@@ -101,6 +108,16 @@ def surface_summary(scanned: Scanned) -> Summary:
             for name, model, whole in scanned.whole.compared()
         } | {"resolution": scanned.whole.resolution}
     return summary
+
+
+def summit_columns(summits: Summits) -> dict[str, Any]:
+    """The table that a scene file reads, with units in its header."""
+    unit, columns = summits.origin.unit, summits.columns(*COLUMNS)
+    named = {
+        f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name: values
+        for name, values in columns.items()
+    }
+    return named | {"row": summits.pixels[:, 0], "column": summits.pixels[:, 1]}
 
 
 def curve_rows(curve: Provability) -> list[dict[str, Any]]:

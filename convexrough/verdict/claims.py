@@ -17,7 +17,7 @@ from convexrough.scene.scene import Scene
 from convexrough.surface.grid import steps
 from convexrough.tabular.table import Reading, Table, few, read_table
 from convexrough.tabular.text import bare
-from convexrough.verdict import NOISE, rounded_up
+from convexrough.verdict.verdict import NOISE, rounded_up
 
 #: Positions in a file may be off by this part of the least spacing, unless a tolerance is given:
 #: five digits are enough, and every asperity still has one nearest row.

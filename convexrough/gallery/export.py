@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from convexrough import gallery
 from convexrough.gallery.pack import packed
-from convexrough.progress import Announce
-from convexrough.run.columns import markdown
-from convexrough.run.results import beside, write_tables
-from convexrough.run.summary import to_json
+from convexrough.progress import tell
+from convexrough.tabular.columns import markdown
 from convexrough.version import __version__
+from convexrough.whole import to_json
 
 HEADING = ["case", "what is hard", "files", "asperities", "touching", "variables", "condition"]
 HEADING += ["spread", "proved"]
@@ -32,30 +30,18 @@ load. proved: how far the proof reaches that the answer is the only one.
 """
 
 
-def write_gallery(folder: Path, names: Iterable[str], announce: Announce) -> list[Path]:
-    """Write the programs of these cases, and last index.json and index.md; return the paths.
-
-    Raises FileError; files already written stay.
-    """
-    write_tables(folder, {})  # begins the list of what was written
+def exported(names: Iterable[str]) -> Iterator[tuple[str, bytes]]:
+    """The files of these cases by their names, and last index.md and index.json."""
     index: dict[str, Any] = {}
-    written = []
     for name in names:
-        announce(name)
+        tell(name)
         about, files = packed(gallery.case(name))
-        for file, content in files.items():
-            with beside(path := folder / file) as temporary:
-                temporary.write_bytes(content)
-            written.append(path)
+        yield from files.items()
         index[name] = about
     document = {"schema": 1, "version": __version__, "cases": index}
     table = [HEADING, *(_row(name, about) for name, about in index.items())]
-    page = "\n".join([INTRODUCTION, *markdown(table, left=3), ""])
-    for file, text in (("index.md", page), ("index.json", to_json(document) + "\n")):
-        with beside(path := folder / file) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-        written.append(path)
-    return written
+    yield "index.md", "\n".join([INTRODUCTION, *markdown(table, left=3), ""]).encode()
+    yield "index.json", f"{to_json(document)}\n".encode()
 
 
 def _row(name: str, about: dict[str, Any]) -> list[str]:

@@ -1,8 +1,8 @@
-"""`verify` on files: read what is claimed, and judge it."""
+"""`verify` on files: read what is claimed, and hold it against what is proved."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,9 +15,9 @@ from convexrough.errors import InputError, TableError
 from convexrough.friction.verdict import ShearVerdict, claims_sliding, verify_shear
 from convexrough.normal.claims import Claim
 from convexrough.normal.problem import NormalProblem
-from convexrough.run.claims import PLAIN, Claimed, Manner, read_loads, read_shear_forces
-from convexrough.run.scene_file import SceneFile
-from convexrough.verdict import Verdict, verify_on
+from convexrough.scene.scene import Scene
+from convexrough.verdict.claims import PLAIN, Claimed, Manner, read_loads, read_shear_forces
+from convexrough.verdict.verdict import Verdict, verify_on
 
 #: What a file may call an asperity under shear. "undecided" claims nothing: then the force does.
 WORDS = ("sliding", "partial", "sticking", "open", "undecided")
@@ -65,22 +65,17 @@ class Verified(NamedTuple):
         return all(claim.holds for _, claim in self.claims)
 
 
-def read_files(file: SceneFile, loads: Path, question: Question) -> tuple[Claimed, Claimed | None]:
+def read_files(scene: Scene, loads: Path, question: Question) -> tuple[Claimed, Claimed | None]:
     """What files claim, loads and shear forces, in the scene's units."""
-    how = replace(question.how, units=file.units, convert=file.convert)
-    given = read_loads(loads, file.scene, how, question.floor)
+    given = read_loads(loads, scene, question.how, question.floor)
     if question.shear is None:
         return given, None
-    return given, read_shear_forces(question.shear, file.scene, how)
+    return given, read_shear_forces(question.shear, scene, question.how)
 
 
-def verify_files(file: SceneFile, loads: Path, question: Question) -> Verified:
+def verify_files(problem: NormalProblem, loads: Path, question: Question) -> Verified:
     """Judge the claims of files. Errors of reading and judging them name the file."""
-    given, forces = read_files(file, loads, question)
-    try:
-        problem = file.problem()
-    except InputError as error:
-        raise error.within(str(file.path)) from error
+    given, forces = read_files(problem.scene, loads, question)
     try:
         verdict = verify_on(problem, given.values, within=question.within, floor=question.floor)
     except InputError as error:
