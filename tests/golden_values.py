@@ -39,7 +39,7 @@ def _many(within: float, scattered: bool) -> cr.Scene:
 
 
 def _everywhere(name: str) -> tuple[cr.Scene, float]:
-    """A scene of which no number depends on how a machine rounds logarithms: of drawn radii."""
+    """The scene with rounded radii and heights: a logarithm's last bit depends on the machine."""
     scene, approach = SCENES[name]
     made = scene.asperities
     asperities = cr.Asperities(made.positions, made.tip_radii.round(9), made.heights.round(15))

@@ -44,7 +44,8 @@ def dense_matrix(points: Array, scale: float) -> Array:
 def entry_error(point_error: float, nearest: float) -> float:
     """Relative error of a computed scale / r, for r at least `nearest`.
 
-    Each end may be off by sqrt(2) point_error, the distance by x r: 1/r by up to x / (1 - x).
+    Each end has an error of at most sqrt(2) point_error, so the distance has an error of at most
+    x r and 1/r a relative one of at most x / (1 - x).
     """
     x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
     moved = x / (1.0 - x) if x < 1 else np.inf
@@ -121,7 +122,7 @@ class DenseInfluence:
         return total
 
     def rounding(self, loads: Array) -> Rounding:
-        """A sum of m terms in any order is off by at most m roundoffs of the sum of magnitudes.
+        """The error of a sum of m terms in any order is at most m roundoffs of their magnitudes.
 
         (Higham, Accuracy and Stability of Numerical Algorithms, section 4.2.)
         """

@@ -347,7 +347,7 @@ class NormalProblem:
     def overhang(self, weights: Array, displacement: Array) -> float:
         """Upper bound on D0 at every solution of load control, from any trial loads.
 
-        (1) of docs/theory/prescribed-load.md.
+        (2) of docs/theory/certificate.md.
 
         weights      : (n,) trial loads, not negative, not all zero
         displacement : A times weights

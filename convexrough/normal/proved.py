@@ -123,7 +123,7 @@ def proved(
 
 
 def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
-    """The solution, or how far the loads may be off where that is not proved to stay in the box."""
+    """The solution, or a bound on the error of the loads where it may leave the box."""
     loads = state.loads.high
     missing = float(state.missing.size)
     felt, own = _of_missing(problem, state, missing)

@@ -29,7 +29,7 @@ CORRECTIONS = 12
 #: Up to so many candidates coupled by a matrix, refinement costs no more than the press.
 FEW = 700
 
-#: Loads whose sum is off by less than this are not scaled: only the largest changes. Heuristic.
+#: Loads whose sum is wrong by less than this are not scaled: only the largest changes. Heuristic.
 FITS = 1e-6
 
 #: A correction by conjugate gradients reduces the residual by this; a factor leaves rounding.
@@ -66,7 +66,7 @@ class Trial:
         return excess(self.gap, self.inside)
 
     def frozen(self) -> Trial:
-        """The same, which nobody can change any more: proofs rest on it."""
+        """The same with read-only arrays, because proofs rest on it."""
         for ball in (self.product, self.gap):
             for part in (*ball.mid, ball.radius):
                 part.flags.writeable = False

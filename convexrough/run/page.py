@@ -18,12 +18,11 @@ from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.friction.cycle import Cycle, cycles
 from convexrough.friction.path import History, history
-from convexrough.progress import Announce
-from convexrough.run.report import bound, describe
-from convexrough.run.summary import SHEAR, Summary, counts
+from convexrough.progress import tell
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
+from convexrough.tabular.columns import bound
 from convexrough.tabular.units import UnitNames
 
 #: Forces of the slider for up to so many touching asperities; fewer for still more.
@@ -35,18 +34,17 @@ FEWEST_FORCES = 21
 MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 
 
-def slider_page(
-    contact: Contact, summary: Summary, units: UnitNames, announce: Announce | None = None
-) -> str:
-    """The page as HTML. Raises InputError if the scene has no friction, or another base."""
-    found = json.dumps(page_data(contact, summary, units, announce), separators=(",", ":"))
+def slider_page(contact: Contact, said: list[str], units: UnitNames) -> str:
+    """The page as HTML, with what is said of the contact.
+
+    Raises InputError if the scene has no friction, or another base.
+    """
+    found = json.dumps(page_data(contact, said, units), separators=(",", ":"))
     template = files("convexrough.run").joinpath("page.html").read_text(encoding="utf-8")
     return template.replace("{{data}}", found.replace("<", "\\u003c"))
 
 
-def page_data(
-    contact: Contact, summary: Summary, units: UnitNames, announce: Announce | None = None
-) -> dict[str, Any]:
+def page_data(contact: Contact, said: list[str], units: UnitNames) -> dict[str, Any]:
     """What the page shows: lengths of the map in a_H, forces in f P, displacements in X0.
 
     Numbers have the five digits that are shown. `stick` has a row per force and a column per disc:
@@ -56,8 +54,8 @@ def page_data(
     limit = checks.friction(contact.scene.friction) * contact.load
     touching = np.flatnonzero(contact.loads)
     fractions = np.linspace(0.0, 1.0, _forces(len(touching)))
-    steady = cycles(contact, fractions * limit, announce=announce)
-    loading = history(contact, forces=fractions * limit, announce=announce)
+    steady = cycles(contact, fractions * limit, announce=tell)
+    loading = history(contact, forces=fractions * limit, announce=tell)
     # Nothing is divided by nothing where no asperity touches.
     sphere = smooth(contact.scene, load=contact.load) if contact.load else None
     a_H = sphere.contact_radius if sphere else 1.0
@@ -76,9 +74,7 @@ def page_data(
         "units": units._asdict(),
         "touching": len(touching),
         "edge": _digits(edge),
-        "certificate": describe(
-            {"normal": summary["normal"]}, length_unit=units.length, force_unit=units.force
-        ),
+        "certificate": said,
         "letters": _letters(limit, a_H, X0, units),
         "left_out": _left_out(len(touching), len(drawn), len(followed), len(fractions)),
         "states": _states(fractions, steady, X0, limit),
@@ -104,7 +100,6 @@ def _some(which: Indices, most: int) -> Indices:
 def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> dict[str, Any]:
     """Of the whole contact, and of the smooth sphere under the same load, at each force."""
     moved = np.array([each.displacement_amplitude for each in steady])
-    words = [counts(each.status, SHEAR) for each in steady]
     stuck = np.cbrt(1.0 - fractions)
     return {
         "fraction": _digits(fractions),
@@ -116,9 +111,10 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
         "smooth_loss": _digits([each.smooth_normalised for each in steady]),
         "smooth_displacement": _digits(1.0 - stuck**2),
         "smooth_stick": _digits(stuck),
-        "sliding": [each["sliding"] for each in words],
-        "partial": [each["partial_slip"] for each in words],
-        "undecided": [each["undecided"] for each in words],
+        **{
+            word: [int((each.status == word).sum()) for each in steady]
+            for word in ("sliding", "partial", "undecided")
+        },
     }
 
 

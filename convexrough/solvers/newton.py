@@ -37,7 +37,7 @@ ALL_ITERATED = 1000
 ACCURATE = 1e-12
 
 #: Near the contact: with a gap of at most this part of the largest prescribed approach. Heuristic,
-#: as who is left out is looked at in the end.
+#: as the asperities left out are checked in the end.
 MARGIN = 0.03
 
 

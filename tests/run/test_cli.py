@@ -51,7 +51,7 @@ def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("precious")
     outcome = command("new", "mine.toml")
     assert outcome.status == 2
-    assert "mine.toml: is there already; nothing is overwritten" in outcome.err
+    assert "mine.toml: is there already, and stays as it is; name another" in outcome.err
     assert (tmp_path / "mine.toml").read_text() == "precious"
     assert command("new", "no/such/folder.toml").status == 2
 
@@ -74,7 +74,7 @@ def test_json_is_one_object_and_the_summary(command: Any, tmp_path: Path) -> Non
     assert (ran.status, ran.err) == (0, "")
     summary = json.loads(ran.out)
     assert summary == json.loads((tmp_path / "deep/er/summary.json").read_text())
-    assert (summary["schema"], summary["version"]) == (1, cr.__version__)
+    assert (summary["schema"], summary["version"]) == (2, cr.__version__)
     normal, proof = summary["normal"], summary["normal"]["certificate"]
     counts = {"asperities": 61, "candidates": 61, "contact": 37, "open": 24, "undecided": 0}
     assert {key: normal[key] for key in counts} == counts
@@ -143,7 +143,7 @@ def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
     assert "a-results: not empty" in refused.err
     assert (folder / "summary.json").read_text() == "old"
     assert command("run", "a.toml", "--no-figures", "--force").status == 0
-    assert json.loads((folder / "summary.json").read_text())["schema"] == 1
+    assert json.loads((folder / "summary.json").read_text())["schema"] == 2
     assert (folder / "mine.txt").read_text() == "precious"
 
 
@@ -222,7 +222,7 @@ def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
     contact = cr.press(file.scene, approach=file.approach)
     limit = 0.5 * contact.load
     assert [row["sliding"] for row in summary["shear"]] == [0, 6, 6]
-    assert [row["partial_slip"] for row in summary["shear"]] == [37, 31, 31]
+    assert [row["partial"] for row in summary["shear"]] == [37, 31, 31]
     assert [row["undecided"] for row in summary["shear"]] == [0, 0, 0]
 
     shear = rows(tmp_path / "a-results" / "shear.csv")
@@ -251,8 +251,8 @@ def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
     )
     assert area == pytest.approx(partial.loss, rel=1e-3)
 
-    past = cr.history(contact, forces=np.array(file.history) * limit)
-    assert summary["history"]["fraction"] == list(file.history)
+    past = cr.history(contact, forces=np.array(file.stages["history"].fractions) * limit)
+    assert summary["history"]["fraction"] == file.stages["history"].fractions
     assert summary["history"]["loss"] == past.losses.tolist()
     assert len(rows(tmp_path / "a-results" / "history.csv")) == 5
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from scene_files import scene_text, write_loads
 
 import convexrough as cr
-from convexrough.run.claims import Claimed, Manner, read_shear_forces
-from convexrough.run.claims import read_loads as read_with
 from convexrough.run.scene_file import read_scene
 from convexrough.run.tables import read_summits
 from convexrough.tabular.table import read_table
+from convexrough.verdict.claims import Claimed, Manner, read_shear_forces
+from convexrough.verdict.claims import read_loads as read_with
 
 PLACES = [[0.0, 0.0], [1.0, 0.0], [0.5, 2.5]]
 LOADS = [1.5, 0.0, 2.5e-5]

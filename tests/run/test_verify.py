@@ -47,15 +47,17 @@ def test_what_is_right(command: Any, contact: cr.Contact) -> None:
             *(
                 "geometry",
                 "contact modulus",
-                "loads",
-                "wrong set",
+                "result",
+                "wrong statuses",
                 "undecided",
-                "loads off",
-                "total off",
+                "load error",
+                "total load",
             )
         ]
-        assert re.search(r" active set proved; loads to \S+e-1\d of the largest$", lines[3])
-        assert [line[18:22] for line in lines[4:8]] == ["none"] * 4
+        assert re.search(r" contact set proved; loads known to \S+e-1\d of the largest$", lines[3])
+        assert [line[18:] for line in lines[4:6]] == ["none"] * 2
+        assert re.match(r"at most \S+e-1\d of the largest load \(1e-10 allowed\)", lines[6][18:])
+        assert lines[7].endswith("(as prescribed)" if scene == "b.toml" else "(none prescribed)")
 
 
 def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
@@ -67,9 +69,10 @@ def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
     heads = [" ".join(line) for line in lines]
     places = [
         next(i for i, line in enumerate(heads) if line.startswith(each))
-        for each in ("loads active set wrong", "wrong set 2", "claimed open, proved to touch: 1",
-                     "claimed to touch, proved open: 1", "undecided none", "loads off",
-                     "total off none prescribed", "suspects", "the loads as given, by themselves")
+        for each in ("result contact set wrong", "wrong statuses 2",
+                     "claimed open, proved to touch: 1",
+                     "claimed to touch, proved open: 1", "undecided none", "load error",
+                     "total load", "suspects", "certificate of the given loads")
     ]  # fmt: skip
     assert places == sorted(places)
     x, y = contact.scene.asperities.positions[36]
@@ -111,7 +114,7 @@ def test_loads_in_another_unit(command: Any, contact: cr.Contact, scene: str) ->
         outcome.err
     )
     if scene == "b.toml":
-        assert "ratio 1000\n" in outcome.out
+        assert ": ratio 1000\n" in outcome.out
         assert "total of the loads off" in outcome.err
 
 
@@ -161,10 +164,10 @@ def shear_file(contact: cr.Contact, forces: Any, words: Any = None) -> str:
 def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     force = 0.25 * contact.load
     state = cr.shear(contact, force=force)
-    asked = ("verify", "a.toml", claim(contact), "--force", repr(force), "--shear")
+    asked = ("verify", "a.toml", claim(contact), "--shear-force", repr(force), "--shear")
     outcome = command(*asked, shear_file(contact, state.forces))
     assert (outcome.status, outcome.err) == (0, "")
-    assert "shear forces      words of all proved; shear forces only to " in outcome.out
+    assert "shear forces      statuses proved; shear forces known to " in outcome.out
     spoiled = state.forces.copy()
     spoiled[4] = 0.5 * contact.loads[4]
     outcome = command(*asked, shear_file(contact, spoiled), "--json")
@@ -182,13 +185,13 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
 def test_wrong_use(command: Any, contact: cr.Contact) -> None:
     loads = claim(contact)
     for wrong, expected in (
-        (("--shear", loads), "--shear and --force go together"),
-        (("--force", "1"), "--shear and --force go together"),
+        (("--shear", loads), "--shear and --shear-force go together"),
+        (("--shear-force", "1"), "--shear and --shear-force go together"),
         (("--within", "0"), "--within: found 0.0, expected a positive number"),
         (("--tolerance", "-1"), "--tolerance: found -1.0"),
         (("--floor", "-1"), "--floor: found -1.0"),
         (("--floor", "nan"), "--floor: found nan"),
-        (("--shear", loads, "--force", "1", "--column", "force=load"), "gross sliding"),
+        (("--shear", loads, "--shear-force", "1", "--column", "force=load"), "gross sliding"),
     ):
         outcome = command("verify", "a.toml", loads, *wrong)
         assert (outcome.status, outcome.out) == (2, ""), wrong
@@ -209,7 +212,7 @@ def test_files(command: Any, contact: cr.Contact, tmp_path: Path) -> None:
     assert rows[36]["suspect"] == "1"
     again = command("verify", "a.toml", loads, "--out", "found")
     assert again.status == 2
-    assert "found: not empty; --out takes another" in again.err
+    assert "found: not empty; --force replaces its results, --out takes another" in again.err
 
 
 def test_the_figure(contact: cr.Contact) -> None:

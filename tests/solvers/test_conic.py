@@ -1,5 +1,6 @@
 """The cone programs against 50 digits, Newton's method, the certificate and each other."""
 
+import re
 import sys
 from dataclasses import dataclass, replace
 from typing import Any
@@ -302,14 +303,24 @@ def test_tolerance_and_most_steps_reach_the_solver(
 def test_solvers_that_cvxpy_has_not(monkeypatch: pytest.MonkeyPatch) -> None:
     """Unknown, not installed, or not one for cones: an error that says which there are."""
     problem = problem_of(paper(), PAPER_APPROACH)
-    has = r"is not installed; CVXPY finds (?=.*CLARABEL).*; pip install"
-    with pytest.raises(cr.SolverError, match=rf"^conic in CVXPY \(NONE\).*NONE {has} none"):
-        ConicCVXPY(solver="none").solve(problem)
-    with pytest.raises(cr.SolverError, match=r"^conic in CVXPY \(OSQP\)"):
-        ConicCVXPY(solver="OSQP").solve(problem)
+    for name, said in (
+        ("none", r"^conic in CVXPY \(NONE\).*: CVXPY knows no solver NONE; valid: .*CLARABEL"),
+        ("scss", r'knows no solver SCSS; did you mean "SCS"'),
+        ("OSQP", r"OSQP has no second-order cones; choose one of .*, or solvers.BristleQP"),
+        ("highs", "HIGHS has no second-order cones"),
+        ("gurobi", "GUROBI is not installed; .*; pip install gurobipy, or"),
+    ):
+        with pytest.raises(cr.SolverError, match=said):
+            ConicCVXPY(solver=name).solve(problem)
     monkeypatch.setitem(sys.modules, "scs", None)
-    with pytest.raises(cr.SolverError, match=rf"SCS {has} scs"):
+    has = r"is not installed; CVXPY finds (?=.*CLARABEL).*; pip install"
+    with pytest.raises(cr.SolverError, match=rf"SCS {has} scs, or"):
         ConicCVXPY(solver="SCS").solve(problem)
+
+
+def test_a_model_says_itself_in_one_line() -> None:
+    model = ConicCVXPY().model(problem_of(paper(), PAPER_APPROACH))
+    assert re.fullmatch(r"LiftedModel: 55 asperities, 330 variables, 55 equations;.*", repr(model))
 
 
 @dataclass(frozen=True)
