@@ -48,6 +48,7 @@ def sweep_tables(surfaces: int) -> dict[str, Any]:
             "spacing": 0.0025,
             "tip_radius": 0.02,
             "within": 0.0152,
+            "geometry": "summit",
         },
         "normal": {"load": LOAD},
         "friction": {"coefficient": FRICTION},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -40,15 +40,18 @@ def run(
     computed as `convexrough sweep` does.
     """
     from convexrough import checks
-    from convexrough.proof import refuse_many
     from convexrough.run.results import origin, results_folder, write_results
-    from convexrough.run.scene_file import read_scene
+    from convexrough.run.scene_file import has_sweep, read_scene
 
+    if has_sweep(scene):
+        return _swept(scene, out, force, as_json, given=html or proof)
     file = read_scene(scene)
     with blamed_on(scene):
         if html:
             checks.friction(file.scene.friction)
         if proof:
+            from convexrough.proof import refuse_many
+
             refuse_many(file.scene)
     folder = out or Path(f"{scene.stem}-results")
     with results_folder(folder, force=force, **origin(file)) as new:
@@ -73,6 +76,19 @@ def run(
     return NOT_CERTIFIED if proof and evidence is None else status
 
 
+def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: bool) -> int:
+    """What `convexrough sweep` does with this file."""
+    from convexrough.cli.sweep import sweep as command
+
+    if given:
+        raise click.UsageError("--proof and --html are of one scene, not of a sweep.")
+    options: dict[str, Any] = dict(sweep=sweep, out=out, as_json=as_json)
+    if any(each.name == "force" for each in command.params):
+        options["force"] = force
+    status: int = click.get_current_context().invoke(command, **options)
+    return status
+
+
 def _page(pressed: Result, units: UnitNames) -> str:
     from convexrough.run.page import slider_page
 
@@ -93,7 +109,7 @@ def new(scene: Path) -> int:
 
     template = files("convexrough.run").joinpath("new_scene.toml").read_text(encoding="utf-8")
     if scene.exists() or scene.is_symlink():
-        raise FileError(f"{scene}: is there already; nothing is overwritten")
+        raise FileError(f"{scene}: is there already, and stays as it is; name another file")
     with replacing(scene) as temporary:
         temporary.write_text(template, encoding="utf-8")
     click.echo(f"written  {scene}")

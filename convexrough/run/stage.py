@@ -41,7 +41,7 @@ KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
                "displacement_error", "gap_error"),
-    "work": ("loss", "loss_error", "loss_first", "loss_first_error", "duality_gap", "smooth_loss",
+    "work": ("loss", "loss_error", "loss_first", "loss_first_error", "duality_gap", "smooth",
              "partial_slip_loss", "sliding_loss"),
     "stiffness": ("secant_stiffness",),
 }  # fmt: skip

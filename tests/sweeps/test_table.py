@@ -116,7 +116,7 @@ def test_scenes_made_in_python(here: Executor) -> None:
      ({"load": 1e-7, "measure": ["loss"], "cycle": [1.2]}, "[cycle] maximum[0]: found 1.2"),
      ({"load": 1e-7, "measure": ["load"], "workers": 0}, "workers: found 0"),
      ({"load": 1e-7, "measure": ["load"], "part": (3, 2)}, "part: found 3/2"),
-     ({"load": 1e-7, "measure": ["load"], "executor": 3}, "executor: found something of int")],
+     ({"load": 1e-7, "measure": ["load"], "executor": 3}, "executor: found type int")],
 )  # fmt: skip
 def test_wrong_arguments(arguments: dict[str, Any], said: str) -> None:
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
