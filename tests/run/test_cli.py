@@ -123,15 +123,6 @@ def test_paper(command: Any, tmp_path: Path) -> None:
     assert all((difference > 0) == (fraction > crossing) for fraction, difference in loss)
 
 
-def test_paper_overwrites_nothing_unasked(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "paper-results").mkdir()
-    (tmp_path / "paper-results" / "summary.json").write_text("old")
-    assert command("paper").status == 2
-    again = command("paper", "--force", "--no-figures")
-    assert again.status == 0
-    assert re.search(r"^asperities in contact +37 +37$", again.out, re.M)
-
-
 def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
     command("new", "a.toml")
     folder = tmp_path / "a-results"
@@ -270,31 +261,13 @@ LATTICE = 'pattern = "hexagonal"\nspacing = {}\ntip_radius = {}'
     ("scene", "expected"),
     [
         (scene_text(LATTICE.format("nan", 1)), "[asperities] spacing: found nan"),
-        (scene_text(normal="approach = inf"), "[normal] approach: found inf"),
-        (scene_text().replace("radius = 1.0", "radius = -1.0", 1), "[sphere] radius: found -1.0"),
         (scene_text().replace("radius = 1.0", "radius = 0", 1), "[sphere] radius: found 0"),
-        (scene_text(LATTICE.format(1, 0)), "[asperities] tip_radius: found 0"),
-        (
-            scene_text().replace("contact_modulus = 1.0", "contact_modulus = 0.0"),
-            "[material] contact_modulus: found 0.0",
-        ),
         (
             scene_text().replace("contact_modulus = 1.0", "youngs_modulus = -1"),
             "[material] youngs_modulus: found -1",
         ),
-        (
-            scene_text().replace("contact_modulus = 1.0", ""),
-            "[material] contact_modulus, youngs_modulus: found neither",
-        ),
-        (scene_text(LATTICE.format(-1, 1)), "[asperities] spacing: found -1"),
-        (scene_text(LATTICE.format(0.0, 1)), "[asperities] spacing: found 0.0"),
-        (scene_text().replace("= 0.3", "= 0.51"), "[material] poisson_ratio: found 0.51"),
-        (scene_text().replace("= 0.3", "= -0.1"), "[material] poisson_ratio: found -0.1"),
-        (scene_text(normal="approach = 1\nload = 1"), "[normal] approach, load: found both"),
-        (scene_text(normal=""), "[normal] approach, load: found neither"),
         (scene_text(more="[sheer]\nx = 1"), '[sheer]: unknown table, did you mean "shear"?'),
         (scene_text()[:-30], "a.toml: "),
-        ("[sphere]\nradius = 1.", "line 2: found radius = 1., expected radius = 1.0"),
         (scene_text(LATTICE.format(1e-9, 1)), "spacing: found 7.26e+14 asperities"),
         (
             scene_text(
@@ -321,10 +294,6 @@ def test_bad_scenes(command: Any, tmp_path: Path, scene: str, expected: str) -> 
         (None, "summits.csv: cannot be read: No such file or directory"),
         (b"", "summits.csv: empty"),
         (b"x,y\n", "summits.csv: rows: found none"),
-        (b"x,y\n0,0\n0.1", "summits.csv: row 3: found 1 cells"),
-        (b"a,b\n0,0\n", "summits.csv: columns: found a, b, expected a column 'x'"),
-        (b"x,y\n0,0\n1,one\n", "summits.csv: row 3, column y: found 'one'"),
-        (b"x,y\n0,nan\n", "summits.csv: row 2, column y: found nan"),
         (b"x,y\n1,1\n0,0\n1,1\n", "asperities 0 and 2 (from 0) at a distance of 0"),
         (b"x,y,height\n0,0,inf\n", "summits.csv: row 2, column height: found inf"),
         (b"x,y\n0,\xff\n", "summits.csv: row 2, column y: found '\xff'"),
@@ -345,9 +314,6 @@ def test_bad_summits(command: Any, tmp_path: Path, summits: bytes | None, expect
     ("loads", "expected"),
     [
         ("load\n" + "1e-9\n" * 36, "loads.csv: rows: found 36, expected 61"),
-        ("load\n" + "1e-9\n" * 60 + "-1e-9\n", "loads.csv: row 62, column load: found -1e-09"),
-        ("load\n" + "1e-9\n" * 60 + "1e-9x\n", "loads.csv: row 62, column load: found '1e-9x'"),
-        ("force\n" + "1e-9\n" * 61, "loads.csv: columns: found force, expected a column 'load'"),
         ("", "loads.csv: empty"),
     ],
 )
