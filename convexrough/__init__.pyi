@@ -43,10 +43,15 @@ from .gradients.change import ShearChange as ShearChange
 from .gradients.gradient import Gradient as Gradient
 from .gradients.objective import Objective as Objective
 from .gradients.states import onset_gradient as onset_gradient
+from .many import Contacts as Contacts
+from .many import Cycles as Cycles
+from .many import press_many as press_many
 from .melan.shakedown import Shakedown as Shakedown
 from .melan.shakedown import shakedown as shakedown
 from .normal.certificate import Certificate as Certificate
 from .normal.certificate import certify as certify
+from .programs.program import Program as Program
+from .programs.program import program as program
 from .run.scene_file import SceneFile as SceneFile
 from .run.scene_file import read_scene as read_scene
 from .scene.asperities import Asperities as Asperities

@@ -13,7 +13,7 @@ from convexrough.tabular.units import UnitNames
 #: Fewer asperities in contact than this are no rough surface.
 FEW = 5
 
-#: Contact radius over radius from which the parabola that stands for a sphere is off by 1 %.
+#: Contact radius over radius from which the parabola differs from the sphere by 1 %.
 STEEP = 0.2
 
 

@@ -75,11 +75,18 @@ def test_links_lead_somewhere() -> None:
                 assert (page.parent / target).exists(), (page, target)
 
 
+def test_every_concept_says_first_what_it_is_for() -> None:
+    """The first sentence of a page says what its reader will be able to do, or know."""
+    for page in (ROOT / "docs/theory").glob("*.md"):
+        _, opening = page.read_text("utf-8").split("\n\n")[:2]
+        assert page.name == "index.md" or opening.startswith("After this page you "), page
+
+
 def test_every_public_name_is_in_the_reference() -> None:
     pages = "\n".join(page.read_text("utf-8") for page in (ROOT / "docs/reference").glob("*.md"))
-    for name in convexrough.__all__:
-        if name not in ("__version__", "solvers"):
-            assert f":: convexrough.{name}\n" in pages, name
+    for name in convexrough.__all__:  # of a module: it, or names in it
+        if name != "__version__":
+            assert re.search(rf":: convexrough\.{name}[.\n]", pages), name
     for name in convexrough.solvers.__all__:
         assert f":: convexrough.solvers.{name}\n" in pages, name
 

@@ -38,6 +38,7 @@ def results() -> dict[str, Any]:
     wrong[3] = 0.0
     state, cycle = cr.shear(contact, force=Q), cr.cycle(contact, maximum=Q)
     few = (solvers.Conic(), solvers.BristleQP())
+    contacts = cr.press_many([scene, scene], approach=PAPER_APPROACH)
     surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).detrend("sphere")
     summits = surface.summits()
     found = (
@@ -50,6 +51,8 @@ def results() -> dict[str, Any]:
         scene.asperities,
         contact,
         contact.certificate,
+        contacts,
+        contacts.cycles(Q),
         state,
         state.certificate,
         cr.shear_vector(contact, force=Q),
@@ -230,7 +233,7 @@ def test_a_data_frame_has_the_arrays(name: str) -> None:
     frame = result.to_dataframe()
     rows = {"History": "point", "Loop": "point", "Comparison": "entry", "LoadPath": "point"}
     rows |= {"MemoryCurve": "vertex", "PhaseLosses": "ellipse", "PathComparison": "entry"}
-    rows |= {"Provability": "level"}
+    rows |= {"Provability": "level", "Contacts": "scene", "Cycles": "scene"}
     assert frame.index.name == rows.get(name, "asperity")
     for column, values in columns(result).items():
         if values.ndim == 1 and column in frame.columns:
@@ -307,7 +310,7 @@ def test_axes_in_axes_out(name: str) -> None:
 
 
 def test_what_has_no_picture_says_so() -> None:
-    with pytest.raises(cr.InputError, match="found something of Scene, expected a result that has"):
+    with pytest.raises(cr.InputError, match="found type Scene, expected a result that has"):
         plots.plot(results()["Scene"])
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.options import PATH, json_option
+from convexrough.cli.options import PATH, json_option, solver_option
 from convexrough.cli.speech import (
     DONE,
     NOT_CERTIFIED,
@@ -20,20 +20,24 @@ from convexrough.cli.speech import (
 
 @click.command()
 @click.argument("scene", type=PATH)
+@solver_option
 @json_option
-def compare(scene: Path, as_json: bool) -> int:
+def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
     """Run every formulation and solver on one scene: agreement, certificate, time.
 
-    The cone program also goes through SCS and QOCO, where they are installed.
+    The cone program also goes through SCS and QOCO, where they are installed. With --solver, those
+    named run beside Newton's method.
 
     Exit status 3 also where a solver refuses the scene, or where two certified answers exclude each
     other: that would be a mistake in the mathematics.
     """
     from convexrough.compare import compare as compare_solvers
+    from convexrough.compare import solver_named
     from convexrough.progress import tell
     from convexrough.run import comparison as report
     from convexrough.run.scene_file import read_scene
 
+    rivals = [solver_named(name) for name in solvers] or None
     file = read_scene(scene)
     with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities"):
         comparison = compare_solvers(
@@ -41,6 +45,7 @@ def compare(scene: Path, as_json: bool) -> int:
             approach=file.approach,
             load=file.load,
             influence=file.influence,
+            solvers=rivals,
             announce=tell,
         )
     summary = report.comparison_summary(comparison)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,10 +14,21 @@ PATH = click.Path(path_type=Path)
 proof_option = click.option(
     "--proof", is_flag=True, help="Write proof.json, which `convexrough check` verifies."
 )
+solver_option = click.option(
+    "--solver", "solvers", metavar="NAME", multiple=True, callback=lambda *given: _from_here(given),
+    help="A solver of the package, or your package.Class; may be repeated.",
+)  # fmt: skip
 html_option = click.option("--html", is_flag=True, help="Write slider.html, an interactive page.")
 json_option = click.option(
     "--json", "as_json", is_flag=True, help="Print one JSON object instead of text."
 )
+
+
+def _from_here(given: tuple[Any, ...]) -> Any:
+    """What was given for --solver; modules of this folder can then be imported."""
+    if given[-1] and "" not in sys.path:
+        sys.path.insert(0, "")
+    return given[-1]
 
 
 def output_options(command: Command) -> Command:

@@ -64,6 +64,8 @@ def press_options(command: Command) -> Command:
               help="Pixels across a paraboloid.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
               help="Least prominence of a hill, in parts of Sz.")  # fmt: skip
+@click.option("--whole", is_flag=True,
+              help="Press the map itself, too, by boundary elements.")  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,
               help="Table for a scene file; figures go beside it.")  # fmt: skip
 @click.option("--no-figures", is_flag=True, help="Do not write figures.")
@@ -74,6 +76,7 @@ def summits(
     out: Path,
     prune: float,
     fit: int,
+    whole: bool,
     no_figures: bool,
     force: bool,
     as_json: bool,
@@ -83,7 +86,8 @@ def summits(
 
     SURFACE is .npy, .npz, .mat, a matrix or x, y, height in text, or an instrument's file. Pressed
     by a sphere about the middle of the map (--scene, or --radius with --approach or --load),
-    contacts, proof, crowding and model error are held against the pruning.
+    contacts, proof, crowding and model error are held against the pruning. With --whole every pixel
+    is pressed, at the same approach, and the asperities are held against that.
 
     Exit status: 3 where the contact at the chosen pruning is not certified.
     """
@@ -91,12 +95,19 @@ def summits(
 
     how = {name: options.pop(name) for name in ("scene", "radius", "approach", "load", "modulus")}
     _check_pressing(**how)
+    if whole and how["scene"] is None and how["radius"] is None:
+        raise click.UsageError("--whole needs --scene or --radius: how to press.")
     _claim(out, force)
     with progress(f"reading {surface}") as show:
         scan = _read(surface, **options)
         show("finding summits")
         with blamed_on(surface):
             scanned = _scan(scan, prune, fit, how)
+            if whole and scanned.contact is not None:
+                from convexrough.surface import press_whole
+
+                show("pressing the map whole")
+                scanned = replace(scanned, whole=press_whole(scanned.surface, scanned.contact))
     with progress("writing"):
         files = _written(out, scanned, figures=not no_figures)
     lines = [*report.describe_surface(scanned), *written(out.parent, files)]

@@ -29,7 +29,7 @@ from convexrough.roundoff import ROUNDOFF
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """P -> sum_j P_j / r_ij^q, and how far it is off."""
+    """P -> sum_j P_j / r_ij^q, and a bound on its error."""
 
     splitting: Splitting
     order: Order

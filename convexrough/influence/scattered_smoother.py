@@ -14,7 +14,7 @@ from convexrough.influence.coupling import Smoother
 from convexrough.influence.dense import dense_matrix
 
 #: Nodes of the coarse mesh that a smoother solves on, about; and too few touching points for one.
-#: Heuristics: conjugate gradients take more steps where they are off, to the same answer.
+#: Heuristics: conjugate gradients take more steps where they are wrong, to the same answer.
 COARSE, FEW_TOUCHING = 1000, 200
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from convexrough.contact import Contact
-from convexrough.surface import Provability, Summits, Surface, crowded, model_errors
+from convexrough.surface import Provability, Summits, Surface, Whole, crowded, model_errors
 from convexrough.surface.provability import TOO_FAR
 from convexrough.tabular.columns import aligned
 from convexrough.version import __version__
@@ -37,6 +37,7 @@ class Scanned:
     """A surface, all its summits, those that pruning leaves, and what comes of pressing on them.
 
     curve, contact : None where nobody said how they are pressed; contact also where none was found
+    whole : the map by boundary elements, where asked
     """
 
     surface: Surface
@@ -44,6 +45,7 @@ class Scanned:
     summits: Summits
     curve: Provability | None = None
     contact: Contact | None = None
+    whole: Whole | None = None
 
     @property
     def certified(self) -> bool:
@@ -100,6 +102,11 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
             for pair, value in zip(pairs.tolist(), values.tolist(), strict=True)
         ]
         summary["strained"] = np.flatnonzero(model_errors(scanned.contact) > TOO_FAR).tolist()
+    if scanned.whole is not None:
+        summary["whole"] = {
+            name: {"asperities": model, "whole": whole}
+            for name, model, whole in scanned.whole.compared()
+        } | {"resolution": scanned.whole.resolution}
     return summary
 
 
@@ -166,6 +173,13 @@ def describe_surface(scanned: Scanned) -> list[str]:
         described += ["", *_describe_curve(scanned.curve, surface.unit)]
     if scanned.contact is not None:
         described += _describe_crowded(scanned.contact)
+    if scanned.whole is not None:
+        table = [["the same approach", "asperities", "whole map", "difference"]]
+        for name, model, whole in scanned.whole.compared():
+            table.append([name, f"{model:.6g}", f"{whole:.6g}", f"{model / whole - 1:+.1%}"])
+        described += ["", *aligned(table, left=1)]
+        change = f"{100 * scanned.whole.resolution:.2g} %"
+        described.append(f"{'resolution':<18}pixels twice as wide change the load by {change}")
     return described
 
 
@@ -224,6 +238,7 @@ def _describe_crowded(contact: Contact) -> list[str]:
 def doubts_of_surface(scanned: Scanned) -> Iterator[str]:
     """What a user should know, in words with numbers."""
     surface, summits, contact = scanned.surface, scanned.summits, scanned.contact
+    yield from surface.warnings
     said, found = surface.moments, scanned.maxima.statistics
     if (ratio := max(said.slope_ratio, 1 / (said.slope_ratio or 1e-300))) > 2:
         yield (

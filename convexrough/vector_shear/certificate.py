@@ -171,7 +171,7 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
 
     In a direction z the slope of q_i is at least radial + (across - radial) sin^2 of the angle
     between z and eta_i, at the longest eta_i. All together, by Minkowski's inequality, with sines
-    that are off by theta_i:  lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
+    with errors theta_i:  lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
     """
     known, size = problem.scalar, np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:

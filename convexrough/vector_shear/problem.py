@@ -124,7 +124,7 @@ class VectorProblem:
 
     @property
     def product_error(self) -> float:
-        """(B q)_i as computed is off by at most this times sum_j A_ij |q_j|."""
+        """The error of (B q)_i as computed is at most this times sum_j A_ij |q_j|."""
         entries = self.scalar.influence.entry_error
         return 2.0 * (entries + (2 * len(self) + SUM_ROUNDOFFS) * ROUNDOFF)
 

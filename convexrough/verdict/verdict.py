@@ -1,11 +1,10 @@
-"""`verify`: hold what somebody claims of a contact against what is proved.
+"""`verify`: compare claimed loads with what is proved about the solution.
 
-Loads from anywhere make three claims: these asperities touch (load > floor), the others do not, and
-these are the loads. `certify` judges how near the loads are to the solution and what that proves of
-the solution; here the claimed set itself is held against the proved words. Where the loads are too
-far off for every word to follow from them alone, Newton's method goes on from them to a solution
-nearby, and what is proved of that one names the asperities that are wrong. `shearing.verdict` does
-the same for shear forces.
+Loads make three claims: the asperities with a load above the floor touch, the others do not, and
+the loads are correct. `certify` bounds the errors of the loads; this module compares the claimed
+set with the proved statuses. Where the loads are too inaccurate to prove every status, Newton's
+method continues from them to a solution, and the certificate of that solution shows which
+asperities are wrong. `friction.verdict` does the same for shear forces.
 """
 
 from __future__ import annotations
@@ -34,8 +33,8 @@ from convexrough.scene.scene import Scene
 #: A load so small beside the largest is taken for noise, in hints only.
 NOISE = 1e-6
 
-#: Distances in parts of the array that are none; and what is left of errors that are mended.
-SAME_PLACE, MENDED = 1e-9, 1e-3
+#: Distances, over the size of the array, that count as 0; the error that a correction may leave.
+SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
 #: How a force is called that is 10 to this power too large.
 PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
@@ -43,15 +42,15 @@ PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Verdict(Claim, Table, Drawn):
-    """What is proved of a claim. Indices and arrays are those of the scene's asperities.
+    """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
 
     loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"
-    within      : loads must be proved this near, in parts of the largest; None: near enough for
-        every word to follow from the loads alone
+    within      : largest error allowed, as a fraction of the largest load; None: as accurate as
+        needed to prove every status from the loads alone
     total_prescribed : [force] None under a prescribed approach
     certificate : of the loads as given, those up to the floor counted as 0
     solution    : the solution that Newton's method finds from them, with its own certificate; None
-        where the claim holds without, or none is found
+        where it is not needed or not found
 
     >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
     >>> verdict.holds, verdict.decided_alone
@@ -76,7 +75,7 @@ class Verdict(Claim, Table, Drawn):
 
     @cached_property
     def claimed(self) -> NDArray[np.bool_]:
-        """(n,) who is claimed to touch."""
+        """(n,) true where the asperity is claimed to touch."""
         return frozen(self.loads > self.floor)
 
     @cached_property
@@ -91,7 +90,7 @@ class Verdict(Claim, Table, Drawn):
 
     @property
     def wrong(self) -> dict[str, Indices]:
-        """The claimed set where it is wrong."""
+        """Indices of the wrong claims, by kind."""
         return {
             "claimed open, proved to touch": self.wrongly_open,
             "claimed to touch, proved open": self.wrongly_loaded,
@@ -99,7 +98,7 @@ class Verdict(Claim, Table, Drawn):
 
     @property
     def errors_alone(self) -> Array:
-        """(n,) [force] the certificate's, and what counts as 0."""
+        """(n,) [force] bounds from the certificate of the loads, plus the loads counted as 0."""
         ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
         return frozen(self.certificate.load_errors + ignored)
 
@@ -143,7 +142,7 @@ class Verdict(Claim, Table, Drawn):
             off = np.abs(self.loads[partners] - true).max()
             if (
                 distances.max() <= SAME_PLACE * size
-                and off <= MENDED * np.abs(self.loads - true).max()
+                and off <= CORRECTED * np.abs(self.loads - true).max()
             ):
                 return said
         return ""
@@ -216,9 +215,9 @@ def verify_on(
     verdict = Verdict(problem.scene, given, floor, within, total, certificate)
     if verdict.holds:
         return verdict
-    for start in (claimed, None):  # from loads that are far off, it may not arrive
+    for start in (claimed, None):  # from inaccurate loads it may not converge
         try:
             return replace(verdict, solution=solve(problem, start=start))
         except SolverError:
             continue
-    return verdict  # of which only the loads' own certificate speaks
+    return verdict  # with the certificate of the loads alone

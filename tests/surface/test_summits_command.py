@@ -223,3 +223,21 @@ def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any) -> None:
     outcome = command("summits", "scan.npz", "--radius", "1e4", "--approach", "-100")
     assert "warning: at a pruning of 0.05 nothing touches: trust is that of a" in outcome.err
     assert "to be trusted     nothing, as nothing touches" in outcome.out
+
+
+def test_the_whole_map_beside_its_asperities(command: Any, surface: cr.surface.Surface) -> None:
+    y, x = np.mgrid[:256, :256] - 127.5
+    np.savez("ball.npz", heights=surface.heights - (x**2 + y**2) / 4000, pixel=1.0, unit="µm")
+    pressed = ("--radius", "1e4", "--load", "10", "--modulus", "1", "--no-figures")
+    ran = command("summits", "ball.npz", *pressed, "--whole")
+    assert "of the variance of the heights: " in ran.err
+    assert "--detrend sphere, removes it" in ran.err
+    assert "the same approach  asperities  whole map  difference" in ran.out
+    mended = ("--detrend", "sphere", "--force", "--json", "--whole")
+    ran = command("summits", "ball.npz", *pressed, *mended)
+    assert "variance" not in ran.err
+    found = json.loads(ran.out)["whole"]
+    assert found["load"]["asperities"] == pytest.approx(10.0)
+    assert 0.7 < found["load"]["asperities"] / found["load"]["whole"] < 1.0
+    assert found["resolution"] < 0.01
+    assert "--whole needs --scene or --radius" in command("summits", "ball.npz", "--whole").err

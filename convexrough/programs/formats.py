@@ -1,4 +1,4 @@
-"""Programs as files of other libraries: qpsolvers' .npz, Clarabel's JSON, and CBF.
+"""Programs as files of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF, and MPS.
 
 CBF is written here: of the Python packages that write it, MOSEK and COPT are commercial, and that
 of PICOS (2.6) fails on every problem. What is written is read back by each library in the tests.
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
 
@@ -25,6 +26,8 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
 
     Rows with two equal sides are the equations; the others have a lower side alone.
     """
+    width, height = len(program.linear), len(program.lower)
+    checks.fits_in_memory("asperities", 1, 24.0 * width * (width + height))
     upper = program.quadratic.toarray()
     rows = program.constraints.toarray()
     equal = program.lower == program.upper
@@ -68,6 +71,47 @@ def _columns(matrix: csc_matrix) -> dict[str, Any]:
         "rowval": matrix.indices.tolist(),
         "nzval": matrix.data.tolist(),
     }
+
+
+def cone_npz(program: ConeProgram) -> bytes:
+    """The parts of a cone program, each sparse matrix by columns as scipy's `csc_array` takes it.
+
+    P_data, P_indices, P_indptr (upper triangle); likewise A; q, b; and `equalities`.
+    """
+    parts: dict[str, Any] = {}
+    for name, matrix in (("P", program.quadratic), ("A", program.constraints)):
+        for part in ("data", "indices", "indptr"):
+            parts[f"{name}_{part}"] = getattr(matrix, part)
+    file = io.BytesIO()
+    np.savez_compressed(
+        file, **parts, q=program.linear, b=program.constant, equalities=program.equalities
+    )
+    return file.getvalue()
+
+
+def mps(program: QuadraticProgram) -> bytes:
+    """Free MPS with the section QUADOBJ, as HiGHS, Gurobi, CPLEX and others read it.
+
+    Rows with two equal sides are equations; the others have a lower side alone. No variable has
+    bounds of its own.
+    """
+    equal = program.lower == program.upper
+    quadratic, constraints = program.quadratic.tocoo(), program.constraints.tocsc()
+    lines = ["NAME contact", "ROWS", " N energy"]
+    lines += [f" {'E' if each else 'G'} r{i}" for i, each in enumerate(equal)]
+    lines.append("COLUMNS")
+    for j, cost in enumerate(program.linear.tolist()):
+        lines.append(f" x{j} energy {cost!r}")
+        where = slice(*constraints.indptr[j : j + 2])
+        entries = zip(constraints.indices[where], constraints.data[where].tolist(), strict=True)
+        lines += [f" x{j} r{i} {entry!r}" for i, entry in entries]
+    lines.append("RHS")
+    lines += [f" rhs r{i} {side!r}" for i, side in enumerate(program.lower.tolist()) if side]
+    lines.append("BOUNDS")
+    lines += [f" FR bounds x{j}" for j in range(len(program.linear))]
+    lines.append("QUADOBJ")
+    lines += [f" x{i} x{j} {entry!r}" for i, j, entry in _entries(quadratic)]
+    return "\n".join([*lines, "ENDATA", ""]).encode()
 
 
 def cbf(program: ConeProgram) -> bytes:
