@@ -15,6 +15,7 @@ import pytest
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
+from convexrough.run import results
 from convexrough.run.scene_file import read_scene
 
 
@@ -198,6 +199,18 @@ fractions = [0.6, -0.2, 0.3, -0.6, 0.6]
 """
 
 
+PATHS = """
+[path]
+loads = [3e-7, 3e-7]
+forces = [0.0, 1e-7]
+[steady]
+ellipse = { load = 3e-7, load_amplitude = 5e-8, force_amplitude = 5e-8, chords = 6 }
+[shakedown]
+loads = 3e-7
+force_amplitudes = [1e-7, -1e-7]
+"""
+
+
 def rows(path: Path) -> list[dict[str, str]]:
     with path.open(newline="") as file:
         return list(csv.DictReader(file))
@@ -249,6 +262,52 @@ def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
 
     text = command("run", "a.toml", "--no-figures", "--force").out
     assert re.search(r"^ *0\.5 .* 6 +31 +0$", text, re.M)
+
+
+SWEEP = """
+[sweep]
+measure = ["load"]
+[sweep.over]
+"normal.approach" = [3e-5, 5e-5]
+"""
+
+
+def test_a_file_with_a_sweep_is_swept(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(more=SWEEP))
+    ran = command("run", "a.toml", "--json")
+    assert (ran.status, json.loads(ran.out)["sweep"]["certified"]) == (0, 2)
+    found = cr.open_sweep(tmp_path / "a-sweep").read()["load"]
+    contact = cr.press(read_scene_of(tmp_path), approach=5e-5)
+    assert found[1] == contact.load
+    refused = command("run", "a.toml", "--html")
+    assert refused.status == 2
+    assert "of one scene, not of a sweep" in refused.err
+    assert "[sweep]: many scenes, which" in command("compare", "a.toml").err
+
+
+def read_scene_of(folder: Path) -> cr.Scene:
+    (folder / "one.toml").write_text(scene_text())
+    return read_scene(folder / "one.toml").scene
+
+
+def test_nothing_is_solved_while_writing(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Presses and levels are done when the first table is written."""
+    (tmp_path / "a.toml").write_text(scene_text(more=SHEAR + PATHS))
+    write = results.write_results
+
+    def after(*given: Any, **options: Any) -> Any:
+        for solves in ("normal.problem.NormalProblem.assemble", "solvers.newton.Newton.solve"):
+            monkeypatch.setattr(f"convexrough.{solves}", never)
+        return write(*given, **options)
+
+    def never(*_: Any, **__: Any) -> None:
+        raise AssertionError("solved")
+
+    monkeypatch.setattr(results, "write_results", after)
+    ran = command("run", "a.toml", "--no-figures")
+    assert (ran.status, ran.err) == (0, "")
 
 
 # Every line of what counts as bad input, through the command.
