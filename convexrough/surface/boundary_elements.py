@@ -151,6 +151,8 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
     >>> print(f"{on_summits.load / whole.load - 1:+.0%}")
     +6%
     """
+    checks.instance("surface", surface, Surface)
+    checks.instance("contact", contact, Contact)
     pressures, load = _pressed(surface, contact, 1)
     touching = pressures > 0
     edges = (touching[0], touching[-1], touching[:, 0], touching[:, -1])

@@ -179,7 +179,7 @@ def test_small_forces_keep_their_digits() -> None:
         assert_allclose(state.displacement, X, rtol=1e-11)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     random_scenes(crowding=0.9),
     st.one_of(st.floats(1e-6, 0.999), st.floats(-12, -2).map(lambda x: 1 - 10**x)),
