@@ -158,7 +158,8 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
 
     and neither falls with P where order holds. So a piece on which the load varies is cut into
     cells, by its part of what all fronts run through, and of each the losses at the load of either
-    end enclose that between: the middle is off by about cells^-2, and the bound is some 1 / cells.
+    end enclose that between: the middle has an error of about cells^-2, and the bound is about
+    1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Pair, Pair]]()  # weight, loads and fronts at both ends
