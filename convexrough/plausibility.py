@@ -69,8 +69,8 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
         )
     if normal["steepness"] > STEEP:
         yield (
-            f"contact radius {normal['steepness']:.3g} of the tip radius: a tip is taken for a "
-            f"paraboloid, which is off by 1 % at {STEEP:g}"
+            f"contact radius is {normal['steepness']:.3g} of the tip radius: the paraboloid of a "
+            f"tip differs from a sphere by 1 % at {STEEP:g}"
         )
     if normal["crowding"] > 1:
         yield (

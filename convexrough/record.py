@@ -1,4 +1,4 @@
-"""What every result can do: say itself on one screen, become a table, be pickled."""
+"""Base classes of results: printing on one screen, tables, pickles."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Record:
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone: what is kept beside them is made again."""
+        """The fields without the cache, which is made again when needed."""
         return {each.name: getattr(self, each.name) for each in self._fields()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -50,7 +50,7 @@ def wrong(call: str) -> Any:
     [
         (
             "cr.press(scene.asperities, approach=5e-5)",
-            "scene: found something of Asperities, expected a Scene",
+            "scene: found type Asperities, expected a Scene",
         ),
         ("cr.press(cr.Scene, approach=5e-5)", "scene: found the class Scene, expected a Scene"),
         ("cr.press(scene, approach='5e-5')", "approach: found '5e-5', expected a finite number"),
@@ -62,7 +62,7 @@ def wrong(call: str) -> Any:
         ("cr.Scene(1.0, scene.asperities, cr.Material)", "found the class Material, expected a M"),
         ("cr.Scene('1', scene.asperities, scene.material)", "sphere_radius: found '1'"),
         ("cr.Asperities([['0', '0']], 1.0)", "positions: .*expected numbers"),
-        ("cr.shear(scene, force=0.0)", "contact: found something of Scene, expected a Contact"),
+        ("cr.shear(scene, force=0.0)", "contact: found type Scene, expected a Contact"),
         ("cr.cycle(scene, maximum=0.0)", "expected a Contact"),
         ("cr.history(cr.Contact, forces=[0.0])", "found the class Contact"),
         ("cr.onset_of_sliding(scene)", "expected a Contact"),

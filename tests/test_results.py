@@ -310,7 +310,7 @@ def test_axes_in_axes_out(name: str) -> None:
 
 
 def test_what_has_no_picture_says_so() -> None:
-    with pytest.raises(cr.InputError, match="found something of Scene, expected a result that has"):
+    with pytest.raises(cr.InputError, match="found type Scene, expected a result that has"):
         plots.plot(results()["Scene"])
 
 

@@ -185,5 +185,5 @@ def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:
 
 
 def test_swapped_arguments() -> None:
-    with pytest.raises(cr.InputError, match="scene: found something of ndarray, expected a Scene"):
+    with pytest.raises(cr.InputError, match="scene: found type ndarray, expected a Scene"):
         cr.verify(np.zeros(3), paper(), approach=PAPER_APPROACH)  # type: ignore[arg-type]

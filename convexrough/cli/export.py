@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from convexrough.cli.options import PATH, json_option
-from convexrough.cli.speech import DONE, blamed_on, progress, say_aside, written
+from convexrough.cli.speech import DONE, blamed_on, echo, progress, say_aside, written
 
 
 @click.command()
@@ -33,17 +33,16 @@ def export(
     Programs go to the folder SCENE-programs unless --out names another.
     """
     from convexrough.programs.folder import FORMATS, write_programs
-    from convexrough.run.results import claim_folder
+    from convexrough.run.results import results_folder
     from convexrough.run.scene_file import read_scene
-    from convexrough.run.summary import to_json
 
     file = read_scene(scene)
     folder = out or Path(f"{scene.stem}-programs")
-    claim_folder(folder, force=force)
     control: dict[str, Any] = {"approach": file.approach, "load": file.load}
-    with blamed_on(scene), progress(f"stating {len(file.scene):,} asperities"):
+    stating = progress(f"stating {len(file.scene):,} asperities")
+    with results_folder(folder, force=force) as new, blamed_on(scene), stating:
         files, index = write_programs(
-            folder,
+            new,
             scene.stem,
             file.scene,
             formats=formats or tuple(FORMATS),
@@ -55,7 +54,7 @@ def export(
         f"{about['objective']:.12g}"
         for name, about in index["programs"].items()
     ]
-    click.echo(to_json(index) if as_json else "\n".join([*lines, *written(folder, files)]))
+    echo(index, [*lines, *written(folder, files)], as_json)
     for name, reason in index["left_out"].items():
         say_aside("warning", f"{name}: left out: {reason}")
     return DONE

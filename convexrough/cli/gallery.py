@@ -15,8 +15,8 @@ from convexrough.cli.speech import DONE, echo, progress
     "--list", "listed", is_flag=True, help="List the cases: what is done without options."
 )
 @click.option("--export", metavar="DIR", type=PATH, help="Folder for programs and answers.")
-@click.option("--force", is_flag=True, help="Replace results in a folder in use.")
-@click.option("--profile", is_flag=True, help="Time every solver, and judge its answers.")
+@click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
+@click.option("--profile", is_flag=True, help="Time every solver and check its solutions.")
 @solver_option
 @click.argument("names", nargs=-1)
 @json_option

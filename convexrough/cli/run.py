@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -40,15 +40,18 @@ def run(
     computed as `convexrough sweep` does.
     """
     from convexrough import checks
-    from convexrough.proof import refuse_many
     from convexrough.run.results import origin, results_folder, write_results
-    from convexrough.run.scene_file import read_scene
+    from convexrough.run.scene_file import has_sweep, read_scene
 
+    if has_sweep(scene):
+        return _swept(scene, out, force, as_json, given=html or proof)
     file = read_scene(scene)
     with blamed_on(scene):
         if html:
             checks.friction(file.scene.friction)
         if proof:
+            from convexrough.proof import refuse_many
+
             refuse_many(file.scene)
     folder = out or Path(f"{scene.stem}-results")
     with results_folder(folder, force=force, **origin(file)) as new:
@@ -71,6 +74,19 @@ def run(
     if evidence is not None:
         click.echo(f"{evidence.proved}\nwritten  {folder / 'proof.json'}", err=as_json)
     return NOT_CERTIFIED if proof and evidence is None else status
+
+
+def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: bool) -> int:
+    """What `convexrough sweep` does with this file."""
+    from convexrough.cli.sweep import sweep as command
+
+    if given:
+        raise click.UsageError("--proof and --html are of one scene, not of a sweep.")
+    options: dict[str, Any] = dict(sweep=sweep, out=out, as_json=as_json)
+    if any(each.name == "force" for each in command.params):
+        options["force"] = force
+    status: int = click.get_current_context().invoke(command, **options)
+    return status
 
 
 def _page(pressed: Result, units: UnitNames) -> str:

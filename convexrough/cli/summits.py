@@ -68,8 +68,8 @@ def press_options(command: Command) -> Command:
               help="Press the map itself, too, by boundary elements.")  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,
               help="Table for a scene file; figures go beside it.")  # fmt: skip
-@click.option("--no-figures", is_flag=True, help="Write no PNG and SVG.")
-@click.option("--force", is_flag=True, help="Replace a table that is there.")
+@click.option("--no-figures", is_flag=True, help="Do not write figures.")
+@click.option("--force", is_flag=True, help="Overwrite a table of an earlier run.")
 @json_option
 def summits(
     surface: Path,

@@ -1,4 +1,4 @@
-"""`verify`: what a file of loads claims, held against what is proved."""
+"""`verify`: check contact loads from another code."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def claim_options(command: Command) -> Command:
     called = "The column of load, x, y, ...: its header, or its number from 1."
     for option in (
         click.option("--junit", metavar="FILE", type=PATH, help="Write the findings for CI."),
-        click.option("--force", is_flag=True, help="Overwrite files that are there."),
+        click.option("--force", is_flag=True, help="Overwrite the results of an earlier run."),
         click.option("--out", metavar="DIR", type=PATH, help="Folder for table, JSON, figure."),
-        click.option("--explain", is_flag=True, help="Only say how the files are read."),
-        click.option("--shear-force", metavar="Q", type=float, help="The shear force they carry."),
+        click.option("--explain", is_flag=True, help="Report how the files are read, and stop."),
+        click.option("--shear-force", metavar="Q", type=float, help="Total shear force of FORCES."),
         click.option("--shear", metavar="FORCES", type=PATH, help="A file of shear forces, too."),
         click.option("--nodes", is_flag=True, help="Rows are nodes: sum them at asperities."),
         click.option("--missing-open", is_flag=True, help="Asperities without a row are open."),
@@ -51,11 +51,12 @@ def claim_options(command: Command) -> Command:
                      help="Multiply the numbers of a column."),
         click.option("--column", metavar="NAME=COLUMN", multiple=True, help=called),
         click.option("--tolerance", metavar="X", type=float,
-                     help="How far positions may be off; default 1 % of the least spacing."),
+                     help="Largest distance of a position from its asperity; "
+                          "default 1 % of the smallest spacing."),
         click.option("--floor", metavar="X", type=float, default=0.0,
                      help="A load up to X claims that its asperity is open."),
         click.option("--within", metavar="PART", type=float,
-                     help="Loads must be proved to this part of the largest."),
+                     help="Largest error allowed, as a fraction of the largest load."),
     ):  # fmt: skip
         command = option(command)
     return command
@@ -107,7 +108,7 @@ def verify(
     proof: bool,
     **how: Any,
 ) -> int:
-    """Hold loads that came from anywhere against what is proved.
+    """Check contact loads from another code.
 
     LOADS is a file of numbers with a column load, and x and y or an index unless in the scene's
     order: CSV and its kin, .xlsx, .mat, .npy, .npz or Parquet. It claims that asperities with a
@@ -156,7 +157,7 @@ def verify(
     if junit is not None:
         write_text(junit, report.junit(found))
     lines = report.describe_verdict(found, file.units)
-    lines += ["", "the loads as given, by themselves", *describe(normal, file.units)]
+    lines += ["", "certificate of the given loads", *describe(normal, file.units)]
     lines += written(out, files) if out is not None else []
     echo(summary, lines, as_json)
     for hint in found.verdict.hints(file.units.force or "N"):

@@ -365,13 +365,13 @@ def energies(levels: Sequence[Level]) -> Ball:
     if which:
         loaded = [levels[k] for k in which]
         states = [level.trial for level in loaded if level.trial is not None]
-        gap, product, missing, depth = (
+        gap, product, missing = (
             Ball.stacked([getattr(state, name) for state in states])
-            for name in ("gap", "product", "missing", "depth")
+            for name in ("gap", "product", "missing")
         )
         trial = Pair(*(np.stack(part) for part in zip(*(s.loads for s in states), strict=True)))
-        local = gap + (depth - product)  # k P^(2/3)
         data = loaded[0].problem.exact
+        local = data.coefficients * Ball.exact(trial).two_thirds()
         per_load = local * Fraction(3, 5) + product * 0.5 - data.offsets
         found = Ball.exact(trial).dot(per_load)
         # The trial loads cost at most e'|P - P*| more than the least, at their own total.

@@ -176,11 +176,28 @@ class Rows(NamedTuple):
         return Rows._make(each[which] for each in self)
 
 
+class Trials(NamedTuple):
+    """Trial loads, in rows: as of `refine.Trial`. Approach, missing : (m, 1)."""
+
+    loads: Pair
+    product: Ball
+    indentation: Ball
+    local: Array
+    gap: Ball
+    approach: Ball
+    missing: Ball
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """(m, n) where a load is not 0."""
+        return np.asarray(self.loads.high > 0)
+
+
 @dataclass(frozen=True, eq=False)
 class Solved:
     """Solutions, in rows, as of `proved.Proved`; nothing is proved of rows that are not `good`."""
 
-    trial: Trial
+    trial: Trials
     good: NDArray[np.bool_]
     distance: Array
     stiffness: Array
@@ -204,10 +221,11 @@ class Solved:
 
     def row(self, k: int, problem: NormalProblem, box: Box) -> Proved:
         """One of them, of a problem, in its box."""
-        trial = of_rows(lambda part: part[k], self.trial)
+        trial: Trials = of_rows(lambda part: part[k], self.trial)
+        loads, product, _, local, gap, approach, missing = trial
         return Proved(
             problem,
-            trial._replace(approach=trial.approach[0], missing=trial.missing[0]),
+            Trial(problem, loads, product, local, gap, approach[0], missing[0]),
             box,
             float(self.distance[k]),
             self.stiffness[k],
@@ -287,7 +305,7 @@ def _pressed(stack: Stack, indentation: Array) -> _Pressed:
 
 
 @quietly
-def refined(stack: Stack, loads: Array) -> Trial:
+def refined(stack: Stack, loads: Array) -> Trials:
     """Loads to thirty digits: as `refine.refined_loads`."""
     bad = np.asarray(~np.isfinite(loads).all(axis=1))
     pair = _completed(stack, Pair.exact(np.where(bad[:, None], 0.0, loads)))
@@ -307,13 +325,13 @@ def refined(stack: Stack, loads: Array) -> Trial:
     return best
 
 
-def _size(state: Trial) -> Array:
+def _size(state: Trials) -> Array:
     gap = state.gap.value
     defect = np.where(state.inside, gap, np.minimum(gap, 0.0))
     return np.asarray(np.linalg.norm(defect, axis=1))
 
 
-def _trial(stack: Stack, loads: Pair) -> Trial:
+def _trial(stack: Stack, loads: Pair) -> Trials:
     """As `refine.trial`."""
     product, exact, d = stack.product(loads), Ball.exact(loads), stack.offsets
     local = stack.k * np.cbrt(loads.high) ** 2
@@ -322,7 +340,7 @@ def _trial(stack: Stack, loads: Pair) -> Trial:
         depth = d + stack.depth
         gap = residual(stack.coefficients, exact, product, depth)
         missing = Ball.exact(np.zeros((len(local), 1)))
-        return Trial(loads, product, depth, local, gap, stack.depth, missing)
+        return Trials(loads, product, depth - product, local, gap, stack.depth, missing)
     missing = stack.total - _column(exact.sum())
     above = residual(stack.coefficients, exact, product, d)
     weights = np.cbrt(loads.high)
@@ -330,14 +348,15 @@ def _trial(stack: Stack, loads: Pair) -> Trial:
     shift = (weights * above.value).sum(axis=1, keepdims=True)
     rest = (weights * ((above.value - shift) + above.mid.low)).sum(axis=1, keepdims=True)
     approach = Ball.exact(Pair(*two_sum(shift, rest)))
-    return Trial(loads, product, d + approach, local, above - approach, approach, missing)
+    indentation = d + approach - product
+    return Trials(loads, product, indentation, local, above - approach, approach, missing)
 
 
 def _column(ball: Ball) -> Ball:
     return ball[:, None]
 
 
-def _corrected(stack: Stack, state: Trial, todo: NDArray[np.bool_]) -> Trial:
+def _corrected(stack: Stack, state: Trials, todo: NDArray[np.bool_]) -> Trials:
     """As `refine.corrected`."""
     loads, inside, gap, local = state.loads, state.inside, state.gap.value, state.local
     slopes = np.where(inside, 1.5 * loads.high / np.where(inside, local, 1.0), 0.0)
@@ -373,7 +392,7 @@ def _completed(stack: Stack, loads: Pair) -> Pair:
 
 
 @quietly
-def proved(stack: Stack, state: Trial, boxes: Boxes) -> Solved:
+def proved(stack: Stack, state: Trials, boxes: Boxes) -> Solved:
     """The solutions in these boxes: as `proved.proved`, of the rows where one box is enough.
 
     Rows with a residual above rounding, or a word that is not decided, are not `good`, either.
@@ -417,7 +436,7 @@ def proved(stack: Stack, state: Trial, boxes: Boxes) -> Solved:
     return Solved(state, good, within[:, 0], h, found, indentation, approach)
 
 
-def _approach_errors(stack: Stack, state: Trial, errors: Array, moved: Array) -> Array:
+def _approach_errors(stack: Stack, state: Trials, errors: Array, moved: Array) -> Array:
     """(m, 1) as of `proved`."""
     if stack.total is None:
         return state.approach.radius
@@ -484,7 +503,7 @@ def _shifted(stack: Stack, indentation: Array) -> Array:
 
 
 @quietly
-def ceilings(stack: Stack, state: Trial) -> Array:
+def ceilings(stack: Stack, state: Trials) -> Array:
     """(m, 1) no D0 is higher at any solution: prescribed, or as `load_control.approach_bound`."""
     if stack.depth is not None:
         return stack.depth.upper
@@ -507,7 +526,7 @@ def ceilings(stack: Stack, state: Trial) -> Array:
 
 
 @quietly
-def widest(stack: Stack, state: Trial) -> Boxes:
+def widest(stack: Stack, state: Trials) -> Boxes:
     """Boxes that hold every solution and these loads, by shells: as `boxes.tried` begins."""
     depth = np.maximum(ceilings(stack, state) + stack.offsets.upper, 0.0)
     alone = (depth / stack.coefficients.lower) ** 1.5 * (1 + SAFETY)

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 from convexrough.compare import Comparison, Entry
 from convexrough.run.stage import Summary, unit_of
-from convexrough.run.stages.normal import COUNTS, bound
+from convexrough.run.stages.normal import COUNTS
 from convexrough.run.summary import headed
-from convexrough.tabular.columns import aligned
+from convexrough.tabular.columns import aligned, bound
 from convexrough.tabular.units import UnitNames
 
 HEADING = ["solver", "disagreement", "load error", "duality gap", "certificate", "words",

@@ -19,10 +19,10 @@ from convexrough.contact import Contact
 from convexrough.friction.cycle import Cycle, cycles
 from convexrough.friction.path import History, history
 from convexrough.progress import tell
-from convexrough.run.stages.normal import bound
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
+from convexrough.tabular.columns import bound
 from convexrough.tabular.units import UnitNames
 
 #: Forces of the slider for up to so many touching asperities; fewer for still more.

@@ -170,6 +170,12 @@ def parsed(path: Path, text: str) -> dict[str, Any]:
     return contents
 
 
+def has_sweep(path: Path) -> bool:
+    """Whether a file asks for many scenes."""
+    text = read_text(path, MOST_BYTES)
+    return bool(re.search(r"^\s*\[\s*sweep\b", text, re.M)) and "sweep" in parsed(path, text)
+
+
 class Layouts(NamedTuple):
     """Where the asperities of a scene are from.
 

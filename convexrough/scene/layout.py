@@ -1,4 +1,4 @@
-"""Where asperities stand, and what follows from that alone, whoever stands there."""
+"""Positions of asperities, and data that depend only on them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Layout(Keeper):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """What the points lie on, each on a site of its own, if that is a lattice."""
+        """The lattice of the points, each on a different site, or None."""
         return Lattice.through(self.points) if self.made is None else self.made[0]
 
     @cached_property

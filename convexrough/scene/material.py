@@ -1,4 +1,4 @@
-"""What both bodies are made of."""
+"""The material of both bodies."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from convexrough.errors import InputError
 
 @dataclass(frozen=True, init=False)
 class Material:
-    """Both bodies: two like ones, or by `pair` two that differ.
+    """The material of both bodies; `pair` combines two different materials.
 
     contact_modulus : E*, 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2  [force / length^2]
     poisson_ratio   : nu, from 0 to 0.5; of a pair the mean, weighted with 1 / G
-    hardness        : the mean pressure at which asperities yield [force / length^2], if known:
-        nothing is computed from it, a contact beyond it is warned of
-    mismatch        : Dundurs' beta of a pair, 0 of like bodies: the coupling of pressing to shear,
-        which is neglected
+    hardness        : mean pressure at which asperities yield [force / length^2], if known; used
+        for a warning only
+    mismatch        : Dundurs' beta of a pair, 0 for one material: the coupling of normal and
+        tangential displacements, which is neglected
 
     >>> steel = cr.Material.from_youngs(210e9, 0.3)
     >>> print(f"{steel.contact_modulus:.4g}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 #: A table: a heading, and rows of as many cells.
@@ -19,6 +20,11 @@ def markdown(table: Table, *, left: int) -> list[str]:
     rule = ["-" * max(3, len(cell)) for cell in rows[0]]
     rule = [each if column < left else f"{each[:-1]}:" for column, each in enumerate(rule)]
     return [f"| {' | '.join(row)} |" for row in [rows[0], rule, *rows[1:]]]
+
+
+def bound(value: float) -> str:
+    """Two digits, never below the value."""
+    return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
 
 
 def _padded(table: Table, left: int) -> list[list[str]]:

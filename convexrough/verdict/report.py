@@ -15,7 +15,7 @@ from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plausibility import described_modulus
 from convexrough.scene.scene import Scene
-from convexrough.tabular.columns import aligned
+from convexrough.tabular.columns import aligned, bound
 from convexrough.tabular.units import UnitNames
 from convexrough.verdict.files import Verified
 
@@ -96,30 +96,35 @@ def _kind(claim: Claim) -> str:
 
 def _proved(claim: Claim) -> str:
     """What is proved of a claim, in a line."""
-    what = "words of all" if isinstance(claim, ShearVerdict) else "active set"
+    what = "statuses" if isinstance(claim, ShearVerdict) else "contact set"
     if len(claim.wrongly_claimed):
         return f"{what} wrong"
     if len(claim.undecided):
         return f"{what} not proved"
-    size = f"{_bound(100 * claim.error)} %" if claim.error > PERCENT else _bound(claim.error)
-    asked = "" if claim.within is not None else ", no tolerance asked"
-    near = f"{_kind(claim)} {'only ' if asked else ''}to {size} of the largest{asked}"
+    asked = "" if claim.within is not None else " (no tolerance given)"
+    near = f"{_kind(claim)} known to {_size(claim)}{asked}"
     if not claim.near_enough:
         near += ", not near enough"
-    return f"{what} proved; {near}{'' if claim.total_holds else '; total off'}"
+    return f"{what} proved; {near}{'' if claim.total_holds else '; total load differs'}"
+
+
+def _size(claim: Claim) -> str:
+    per_cent = claim.error > PERCENT
+    return f"{f'{bound(100 * claim.error)} %' if per_cent else bound(claim.error)} of the largest"
 
 
 def _describe(claim: Claim, scene: Scene, name: str, units: UnitNames) -> list[str]:
     table = _Listing(claim, scene, name, units)
-    lines = [_line(_kind(claim), _proved(claim))]
-    lines.append(_line("wrong set", str(len(claim.wrongly_claimed) or "none")))
+    what = "result" if name == "load" else _kind(claim)
+    lines = [_line(what, _proved(claim))]
+    lines.append(_line("wrong statuses", str(len(claim.wrongly_claimed) or "none")))
     for what, who in claim.wrong.items():
         if len(who):
             lines += [f"  {what}: {len(who):,}", *table.of(_worst_first(claim, who))]
     lines.append(_line("undecided", str(len(claim.undecided) or "none")))
     lines += table.of(claim.undecided)
-    lines += [_line(f"{name}s off", _off(claim)), *table.of(claim.off)]
-    lines.append(_line("total off", _total(claim, units.force)))
+    lines += [_line(f"{name} error", _off(claim, name)), *table.of(claim.off)]
+    lines.append(_line(f"total {name}", _total(claim, units.force)))
     if len(claim.suspects):
         lines += [_line("suspects", "likeliest first"), *table.of(claim.suspects)]
     return lines
@@ -145,15 +150,15 @@ def junit(found: Verified) -> bytes:
     """The findings as a suite of JUnit's, a case for each question."""
     suite = ElementTree.Element("testsuite", name="convexrough verify")
     failures = 0
-    for _, claim in found.claims:
+    for kind, claim in found.claims:
         set_wrong = {what: who for what, who in claim.wrong.items() if len(who)}
         asked: dict[str, str] = {
-            "active set" if claim is found.verdict else "words": "; ".join(
+            "contact set" if claim is found.verdict else "statuses": "; ".join(
                 f"{what}: {_named(claim, found.verdict.scene, who)}"
                 for what, who in set_wrong.items()
             ),
             "undecided": _named(claim, found.verdict.scene, claim.undecided),
-            "off": "" if claim.near_enough else _off(claim),
+            "off": "" if claim.near_enough else _off(claim, kind),
             "total": "" if claim.total_holds else _total(claim, ""),
         }
         for name, wrong in asked.items():
@@ -185,7 +190,7 @@ class _Listing:
             f"{each} [{unit}]" if unit else each
             for each, unit in (("x", units.length), ("y", units.length), (name, units.force))
         )
-        self.heading = ["index", x, y, force, "solution", "bound", "word"]
+        self.heading = ["index", x, y, force, "solution", "bound", "status"]
 
     def of(self, which: Indices) -> list[str]:
         if len(which) == 0:
@@ -198,7 +203,7 @@ class _Listing:
                 f"{self.points[i, 1]:.6g}",
                 f"{claim.values[i]:.6g}",
                 "-" if nearby is None else f"{nearby[0][i]:.6g}",
-                _bound(float(claim.errors[i])),
+                bound(float(claim.errors[i])),
                 str(claim.status[i]),
             ]
             for i in which[:MOST_LISTED]
@@ -213,27 +218,24 @@ def _worst_first(claim: Claim, who: Indices) -> Indices:
     return who[np.argsort(-claim.errors[who], kind="stable")]
 
 
-def _off(claim: Claim) -> str:
-    largest = f"bound {_bound(claim.error)} of the largest"
+def _off(claim: Claim, name: str) -> str:
     if claim.within is None:
-        return largest if claim.near_enough else f"{largest}: not every word follows from them"
-    return f"{len(claim.off) or 'none'}  ({largest}, {claim.within:g} allowed)"
+        if claim.near_enough:
+            return f"at most {_size(claim)} {name}"
+        return f"up to {_size(claim)} {name}: too large to prove every status"
+    beyond = f"; beyond that: {len(claim.off):,}" if len(claim.off) else ""
+    return f"at most {_size(claim)} {name} ({claim.within:g} allowed{beyond})"
 
 
 def _total(claim: Claim, unit: str) -> str:
     given = f"{claim.total_given:.10g} {unit}".rstrip()
     if claim.total_prescribed is None:
-        return f"none prescribed  ({given})"
+        return f"{given} (none prescribed)"
     if claim.total_holds:
-        return f"none  ({given})"
+        return f"{given} (as prescribed)"
     expected = f"{claim.total_prescribed:.10g} {unit}".rstrip()
     ratio = claim.total_given / claim.total_prescribed if claim.total_prescribed else math.inf
-    return f"given {given}, prescribed {expected}, ratio {ratio:.7g}"
-
-
-def _bound(value: float) -> str:
-    """Two digits, never below the value."""
-    return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
+    return f"{given}, prescribed {expected}: ratio {ratio:.7g}"
 
 
 def _line(name: str, text: str) -> str:

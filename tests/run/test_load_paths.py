@@ -46,7 +46,7 @@ def test_a_run(command: Any) -> None:
     Path("scene.toml").write_text(SCENE + PATHS)
     outcome = command("run", "scene.toml", "--out", "out")
     assert outcome.status == 0, outcome.err
-    assert "order of indentations: proved" in outcome.out
+    assert "indentations increase with the load: proved" in outcome.out
     summary = json.loads(Path("out/summary.json").read_text())
     assert summary["path"]["displacement"][3] == pytest.approx(
         -1.4399972915528e-06, rel=1e-11, abs=0.0

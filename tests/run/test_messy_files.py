@@ -490,9 +490,9 @@ def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
     assert outcome.status == 3
     (suite,) = ElementTree.parse(tmp_path / "found.xml").getroot().iter("testsuite")
     cases = {each.get("name"): each for each in suite}
-    assert list(cases) == ["loads: active set", "loads: undecided", "loads: off", "loads: total"]
+    assert list(cases) == ["loads: contact set", "loads: undecided", "loads: off", "loads: total"]
     assert suite.get("failures") == str(sum(len(each) for each in cases.values()))
-    assert f"{np.argmax(case.loads)} at (" in str(cases["loads: active set"][0].text)
+    assert f"{np.argmax(case.loads)} at (" in str(cases["loads: contact set"][0].text)
     again = command("verify", "scene.toml", name, "--junit", "found.xml")
     assert again.status == 2
     assert "found.xml: is there already" in again.err
@@ -502,9 +502,10 @@ def test_what_is_proved_is_said(tmp_path: Path, command: Any, case: Case) -> Non
     name = text()(tmp_path, {"load": case.loads * (1 + 1e-3)})
     outcome = command("verify", "scene.toml", name)
     assert outcome.status == 0
-    (line,) = (line for line in outcome.out.splitlines() if line.startswith("loads   "))
+    (line,) = (line for line in outcome.out.splitlines() if line.startswith("result  "))
     assert re.fullmatch(
-        r"loads {13}active set proved; loads only to 0\.\d+ % of the largest, no tolerance asked",
+        r"result {12}contact set proved; loads known to 0\.\d+ % of the largest "
+        r"\(no tolerance given\)",
         line,
     )
     assert "geometry          closest" in outcome.out

@@ -114,7 +114,7 @@ def test_contact_beyond_the_sphere(command: Any, tmp_path: Path) -> None:
     blunt = HEXAGONAL.replace("0.0025", "0.4").replace("0.02", "0.01")
     outcome = warned(command, tmp_path, scene_text(blunt, "approach = 0.9"))
     assert "of the base's radius: it is taken for a paraboloid" in outcome.err
-    assert "of the tip radius: a tip is taken for a paraboloid" in outcome.err
+    assert "of the tip radius: the paraboloid of a tip differs" in outcome.err
 
 
 def test_the_estimate_is_what_boundary_elements_measure() -> None:

@@ -124,5 +124,5 @@ def test_bad_bodies() -> None:
     both = cr.Material.pair(STEEL, ALUMINIUM)
     with pytest.raises(cr.InputError, match="base: found a pair, expected one body"):
         cr.Material.pair(STEEL, both)
-    with pytest.raises(cr.InputError, match="sphere: found something of float"):
+    with pytest.raises(cr.InputError, match="sphere: found type float, expected a Material"):
         cr.Material.pair(210e9, STEEL)  # type: ignore[arg-type]

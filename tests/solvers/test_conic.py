@@ -87,36 +87,6 @@ def test_what_the_solver_itself_finds(name: str, control: str) -> None:
     assert disagreement(direct, modelled) < 1e-7
 
 
-@pytest.mark.parametrize(("density", "contacts"), [(1, 37), (2.31, 199)])
-def test_larger_scenes(density: float, contacts: int) -> None:
-    problem = problem_of(hexagonal(density), PAPER_APPROACH)
-    expected = Newton().solve(problem)
-    assert (expected.loads > 0).sum() == contacts
-    solver = Recorded()
-    assert disagreement(solver.solve(problem), expected) < 1e-12
-    raw = expected.loads * 0
-    raw[solver.members[0]] = solver.answers[0].loads
-    assert np.abs(raw - expected.loads).max() < 1e-7 * expected.loads.max()
-
-
-@dataclass(frozen=True)
-class Recorded(Conic):
-    """Keeps what Clarabel answered, so that one solve serves two tests."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "answers", [])
-        object.__setattr__(self, "members", [])
-
-    answers: Any = None
-    members: Any = None
-
-    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
-        self.answers.append(super().answer(problem, boxes))
-        self.members.append(boxes.members)
-        return self.answers[-1]
-
-
 @pytest.mark.parametrize("name", NAMED)
 @pytest.mark.parametrize("control", CONTROLS)
 def test_gaps_and_approach_from_the_multipliers(name: str, control: str) -> None:
@@ -328,15 +298,6 @@ def test_tolerance_and_most_steps_reach_the_solver(
     assert sorted(first.values()) == [*[3e-8] * (len(first) - 1), steps]
     assert 777 in second.values()
     assert bare == {}
-
-
-def test_names_tell_the_solver() -> None:
-    assert ConicCVXPY(solver="clarabel") == ConicCVXPY()
-    assert ConicCVXPY().name == "conic in CVXPY + Newton step"
-    assert ConicCVXPY(solver="scs").name == "conic in CVXPY (SCS) + Newton step"
-    assert ConicCVXPY(solver="QOCO", newton_step=False).name == "conic in CVXPY (QOCO)"
-    with pytest.raises(cr.InputError, match="solver: found 3, expected a name"):
-        ConicCVXPY(solver=3)  # type: ignore[arg-type]
 
 
 def test_solvers_that_cvxpy_has_not(monkeypatch: pytest.MonkeyPatch) -> None:

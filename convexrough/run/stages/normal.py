@@ -17,6 +17,7 @@ from convexrough.errors import SolverError
 from convexrough.normal.certificate import Certificate
 from convexrough.run.stage import Columns, Single, Stage, Summary, unit_of
 from convexrough.run.values import Finite, Positive
+from convexrough.tabular.columns import bound
 from convexrough.tabular.units import UnitNames
 
 #: Loads of this part of the largest, and greater, are looked at for what the geometry does to them.
@@ -30,7 +31,7 @@ COUNTS = ("contact", "open", "undecided")
 FOUND = ("candidates", "influence", "solver", "iterations", "seconds", "model_error")
 SCOPES = {
     "global": "global: the scene has exactly one solution",
-    "local": "local: exactly one solution with contacts of such sizes",
+    "local": "local: exactly one solution with contact radii near these",
     "none": "none: nothing is proved",
 }
 INFLUENCES = {
@@ -164,9 +165,9 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     ]
     if "solver" in normal:
         steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
-        beta = _neglected(normal)
+        beta, model_error = _neglected(normal), normal["model_error"]
         lines += [
-            ("model error", f"{normal['model_error']:.2g}  (point forces for pressures)"),
+            ("model error", f"{model_error:.2g}  (from point forces in place of pressures)"),
             ("crowding", f"{crowding:.3g}  (contact discs overlap above 1)"),
             *([("bodies", beta)] if beta else []),
             ("geometry", _described_geometry(normal)),
@@ -196,11 +197,6 @@ def _described_geometry(normal: Summary) -> str:
         f'{name}: with "closest", nearer to boundary elements, loads change by up to about '
         f"{100 * change:.2g} %"
     )
-
-
-def bound(value: float) -> str:
-    """Two digits, never below the value."""
-    return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
 
 
 def _ratio(error: float, largest: float) -> str:

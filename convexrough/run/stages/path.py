@@ -32,6 +32,8 @@ from convexrough.tabular.units import UnitNames
 
 COUNTS = tuple(word for word in WORDS if word != "contact")
 
+INCREASE = "indentations increase with the load: "
+
 
 class Ellipse(Table):
     """A path of load P + A cos t and shear Q + B sin(t + phase), on chords."""
@@ -127,7 +129,10 @@ class Pathed(Steps):
         yield from unproved_order(self, path.order)
 
     def lines(self, units: UnitNames) -> list[str]:
-        return [*super().lines(units), f"order of indentations: {self.found[0].order}"]
+        return [
+            *super().lines(units),
+            f"indentations increase with the load: {self.found[0].order}",
+        ]
 
     def figures(self, **units: Any) -> Mapping[str, Any]:
         from convexrough.plots import path_figures  # matplotlib: only when it draws
@@ -207,7 +212,10 @@ class Settled(Single):
             yield from unproved_order(self, each.order)
 
     def lines(self, units: UnitNames) -> list[str]:
-        said = [*super().lines(units), f"order of indentations: {self.found[0].order}"]
+        said = [
+            *super().lines(units),
+            f"indentations increase with the load: {self.found[0].order}",
+        ]
         for losses in self.found[1:]:
             columns = _by_phase(losses)
             printed = {name: name.replace("_", " ") for name in ("phase", "factor", "loss")}

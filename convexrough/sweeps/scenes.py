@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from convexrough.run.scene_file import READ, Layouts, build_scene
 from convexrough.scene.scene import Scene
 from convexrough.solvers import named
 from convexrough.sweeps.grid import Grid
+from convexrough.sweeps.measures import Stages
 
 if TYPE_CHECKING:
     from convexrough.run.study import Study
@@ -26,30 +27,11 @@ if TYPE_CHECKING:
 #: Layouts of asperities that are kept for the scenes to come.
 KEPT = 8
 
-#: From the number of a scene to its contact.
-Press = Callable[[int], Contact]
+#: From the number of a scene to its contact, and what is asked of it.
+Press = Callable[[int], tuple[Contact, Stages]]
 
 #: What stands in the column of seeds where nothing is random.
 NO_SEED = -1
-
-
-class Source(Protocol):
-    """The scenes of a sweep, by their numbers from 0."""
-
-    @property
-    def count(self) -> int: ...
-
-    def labels(self, numbers: range) -> dict[str, NDArray[Any]]:
-        """The columns that say which scenes these are: what is swept, and the seed."""
-        ...
-
-    def part(self, numbers: range) -> Source:
-        """What a worker needs to know for these numbers, which stay the same."""
-        ...
-
-    def opened(self) -> Press:
-        """How to press them, with what scenes one after the other share."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -67,6 +49,7 @@ class Tables:
         return self.grid.count
 
     def labels(self, numbers: range) -> dict[str, NDArray[Any]]:
+        """The columns that say which scenes these are: what is swept, and the seed."""
         points = [self.grid.point(number) for number in numbers]
         known = self.grid.tables.get("asperities", {}).get("seed", NO_SEED)
         seeds = [known if each.seed is None else each.seed for each in points]
@@ -80,50 +63,43 @@ class Tables:
         return swept | {"seed": np.array(seeds, dtype=np.int64)}
 
     def part(self, numbers: range) -> Tables:
+        """What a worker needs to know for these numbers, which stay the same."""
         return self
 
     def opened(self) -> Press:
+        """How to press scenes; those one after the other share what they have in common."""
         layouts = Layouts(*map(lru_cache(KEPT), READ))
-        document = _Documents(self)
+        last: dict[str, Any] = {}
 
-        def press_one(number: int) -> Contact:
-            tables = document.at(number)
-            scene, highest = build_scene(self.path, tables, layouts)
+        def press_one(number: int) -> tuple[Contact, Stages]:
+            study = self._study(number, last)
+            scene, highest = build_scene(self.path, study, layouts)
             problem = NormalProblem.assemble(
                 scene,
-                approach=tables.normal.approach,
-                load=tables.normal.load,
-                influence=tables.solver.influence,
+                approach=study.normal.approach,
+                load=study.normal.load,
+                influence=study.solver.influence,
                 highest=highest,
             )
-            return solve(problem, named(tables.solver.name))
+            return solve(problem, named(study.solver.name)), study.stages
 
         return press_one
 
-
-class _Documents:
-    """The checked tables of one scene after the other: those that differ by a seed, once."""
-
-    def __init__(self, source: Tables) -> None:
-        self._source = source
-        self._last: tuple[dict[str, Any], Study] | None = None
-
-    def at(self, number: int) -> Study:
-        """Raises SceneFileError."""
+    def _study(self, number: int, last: dict[str, Any]) -> Study:
+        """The tables of a scene; of those that differ by a seed alone, checked once."""
         from convexrough.run.study import Lattice, validate
 
-        point = self._source.grid.point(number)
-        if self._last is not None and self._last[0] == point.values:
-            known = self._last[1]
-            layout = known.asperities
-            if isinstance(layout, Lattice):
-                layout = layout.model_copy(update={"seed": point.seed})
-            return known.model_copy(update={"asperities": layout})
-        tables, mistakes = validate(self._source.grid.with_values(*point))
-        if tables is None:
-            raise SceneFileError(str(self._source.path), mistakes)
-        self._last = (point.values, tables)
-        return tables
+        point = self.grid.point(number)
+        if last.get("values") != point.values:
+            study, mistakes = validate(self.grid.with_values(*point))
+            if study is None:
+                raise SceneFileError(str(self.path), mistakes)
+            last.update(values=point.values, study=study)
+        known: Study = last["study"]
+        if point.seed is None or not isinstance(known.asperities, Lattice):
+            return known
+        layout = known.asperities.model_copy(update={"seed": point.seed})
+        return known.model_copy(update={"asperities": layout})
 
 
 @dataclass(frozen=True)
@@ -136,6 +112,7 @@ class Objects:
     scenes: Sequence[Scene]
     controls: Array
     by_load: bool
+    stages: Stages
     first: int = 0
 
     @property
@@ -150,12 +127,18 @@ class Objects:
 
     def part(self, numbers: range) -> Objects:
         places = slice(numbers.start - self.first, numbers.stop - self.first)
-        return Objects(self.scenes[places], self.controls[places], self.by_load, numbers.start)
+        scenes, controls = self.scenes[places], self.controls[places]
+        return replace(self, scenes=scenes, controls=controls, first=numbers.start)
 
     def opened(self) -> Press:
-        def press_one(number: int) -> Contact:
+        def press_one(number: int) -> tuple[Contact, Stages]:
             place = number - self.first
             scene, control = self.scenes[place], float(self.controls[place])
-            return press(scene, load=control) if self.by_load else press(scene, approach=control)
+            pressed = press(scene, load=control) if self.by_load else press(scene, approach=control)
+            return pressed, self.stages
 
         return press_one
+
+
+#: The scenes of a sweep, by their numbers from 0.
+Source: TypeAlias = Tables | Objects

@@ -6,7 +6,6 @@ import random
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
@@ -15,12 +14,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweep_files import Deadly, same, sweeping, tables
+from sweep_files import Deadly, same, sweeping, tables, told
 
 import convexrough as cr
-from convexrough.sweeps import engines, running
-from convexrough.sweeps.sources import Tables
-from convexrough.sweeps.sweep_file import plan_of
+from convexrough.sweeps import plan
+from convexrough.sweeps.file import plan_of
+from convexrough.sweeps.plan import Plan
+from convexrough.sweeps.pool import Processes, dask
+from convexrough.sweeps.scenes import Tables
+from convexrough.sweeps.sweep import run
 
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
 SPAWN = multiprocessing.get_context("spawn")
@@ -29,25 +31,19 @@ PLAN = plan_of(tables(sweep={"seeds": 10}), Path("sweep"))
 WHOLE = cr.sweep(tables(sweep={"seeds": 10}), executor=ThreadPoolExecutor(1))
 
 
-class Backwards(Executor):
-    """Computes the last batch first, in this process."""
+class Shuffled(Executor):
+    """Computes every batch before the first is asked for, the last ones first."""
 
     def __init__(self) -> None:
         self._given: list[tuple[Future[Any], Any, Any]] = []
-        self._timer = threading.Timer(0.2, self._compute)
 
     def submit(self, function: Any, /, *arguments: Any, **keys: Any) -> Future[Any]:
-        if not self._given:
-            self._timer = threading.Timer(0.2, self._compute)
-            self._timer.start()
         future: Future[Any] = Future()
         self._given.append((future, function, arguments))
-        return future
-
-    def _compute(self) -> None:
-        while self._given:
-            future, function, arguments = self._given.pop()
-            future.set_result(function(*arguments))
+        if len(self._given) == PLAN.parts:
+            for future, function, arguments in reversed(self._given):
+                future.set_result(function(*arguments))
+        return self._given[-1][0]
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3])
@@ -57,8 +53,8 @@ def test_processes(workers: int) -> None:
 
 @pytest.mark.parametrize(
     "executor",
-    [lambda: ThreadPoolExecutor(3), lambda: ProcessPoolExecutor(2, mp_context=SPAWN), Backwards],
-    ids=["threads", "processes of the user", "backwards"],
+    [lambda: ThreadPoolExecutor(3), lambda: ProcessPoolExecutor(2, mp_context=SPAWN), Shuffled],
+    ids=["threads", "processes of the user", "the last first"],
 )
 def test_executors(executor: Any) -> None:
     given = executor()
@@ -68,34 +64,34 @@ def test_executors(executor: Any) -> None:
 
 @pytest.mark.parametrize("most", [1, 3, 7, 1000])
 def test_batches(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "MOST_SCENES", most)
+    monkeypatch.setattr(plan, "MOST_SCENES", most)
     with ThreadPoolExecutor(1) as here:
         assert same(cr.sweep(tables(sweep={"seeds": 10}), executor=here), WHOLE)
 
 
-def test_a_scene_that_kills_is_found_and_named() -> None:
+def deadly(whole: Plan, worst: int) -> Plan:
+    assert isinstance(whole.source, Tables)
+    return replace(whole, source=Deadly(whole.source.grid, whole.source.path, worst=worst))
+
+
+def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None:
     contents = sweeping(seeds=24, over={"asperities.height_std": [1e-6]})
-    plan = plan_of(contents, Path("sweep"))
-    assert isinstance(plan.source, Tables)
-    deadly = replace(plan, source=Deadly(plan.source.grid, plan.source.path, worst=17))
-    with engines.processes(2) as engine:
-        table = running.run(deadly, engine).table
-    rows = table.read()
-    assert np.flatnonzero(rows["status"] == "failed").tolist() == [17]
-    assert rows["message"][17] == "the process that computed it died, twice"
+    whole = plan_of(contents, Path("sweep"))
+    said = "the process that computed scenes 17 to 17 died, twice"
+    with Processes(2) as mine, pytest.raises(cr.WorkerError, match=said):
+        run(deadly(whole, 17), mine, out=tmp_path / "a")
+    assert cr.open_sweep(tmp_path / "a").read()["scene"].tolist() == [*range(17), *range(18, 24)]
     with ThreadPoolExecutor(1) as here:
-        alone = cr.sweep(contents, executor=here).read()
-    others = np.arange(24) != 17
-    assert rows["contacts"][others].tobytes() == alone["contacts"][others].tobytes()
+        table = run(whole, here, out=tmp_path / "a", resume=True).table
+        assert same(table, cr.sweep(contents, executor=here))
 
 
 def test_an_executor_that_broke_is_said_to_be() -> None:
-    plan = replace(PLAN, source=Deadly(PLAN.source.grid, PLAN.source.path, worst=3))  # type: ignore[attr-defined]
     with (
         ProcessPoolExecutor(1, mp_context=SPAWN) as mine,
         pytest.raises(cr.WorkerError, match="of no use any more"),
     ):
-        running.run(plan, engines.Given(mine))
+        run(deadly(PLAN, 3), mine)
 
 
 SCRIPT = """
@@ -111,7 +107,7 @@ def test_a_script_needs_no_guard(tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
         [sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True,
-        text=True, timeout=120, check=False,
+        text=True, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (0, "16\n", "")
 
@@ -123,7 +119,7 @@ import numpy as np
 import convexrough as cr
 from sweep_files import tables
 many = tables(asperities={"spacing": 0.0012, "tip_radius": 0.01},
-              sweep={"seeds": 2, "measure": ["load", "loss", "certificate", "approach"]})
+              sweep={"seeds": 2, "measure": ["load", "loss", "load_error", "approach"]})
 with ThreadPoolExecutor(2) as here:
     rows = cr.sweep(many, executor=here).read()
 np.savez(sys.argv[1], **rows)
@@ -168,8 +164,8 @@ def cluster() -> Iterator[Any]:
 
 
 def test_dask(cluster: Any) -> None:
-    with engines.dask(cluster.scheduler_address) as engine:
-        assert same(running.run(PLAN, engine).table, WHOLE)
+    with dask(cluster.scheduler_address) as engine:
+        assert same(run(PLAN, engine).table, WHOLE)
 
 
 def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
@@ -179,27 +175,27 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
 
     def kill(news: str) -> None:
         if "of 240 scenes" in news and not killed:
-            pids = list(engine.client.run(os.getpid).values())
-            killed.append(random.choice(pids))
+            killed.append(random.choice(workers))
             os.kill(killed[0], signal.SIGKILL)
 
-    with engines.dask(cluster.scheduler_address) as engine:
-        table = running.run(plan, engine, out=tmp_path / "a", announce=kill).table
+    workers = [each.pid for each in cluster.workers.values()]
+    with dask(cluster.scheduler_address) as engine, told(kill):
+        table = run(plan, engine, out=tmp_path / "a").table
     assert killed
     with ThreadPoolExecutor(1) as here:
         assert same(table, cr.sweep(contents, executor=here))
     assert set(table.read(["status"])["status"]) == {"certified"}
 
 
-def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    dask = pytest.importorskip("dask")
+def test_a_scheduler_that_does_not_answer() -> None:
+    config = pytest.importorskip("dask").config
     with (
-        dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
+        config.set({"distributed.comm.timeouts.connect": "1s"}),
         pytest.raises(cr.InputError, match=r"scheduler: found tcp://127\.0\.0\.1:9"),
-        engines.dask("tcp://127.0.0.1:9"),
+        dask("tcp://127.0.0.1:9"),
     ):
         pass
-    with pytest.raises(cr.InputError, match="scheduler: found nonsense"), engines.dask("nonsense"):
+    with pytest.raises(cr.InputError, match="scheduler: found nonsense"), dask("nonsense"):
         pass
 
 
@@ -207,11 +203,11 @@ def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> No
 def test_sharing_changes_no_bit(spacing: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Scenes one after the other, and each as the first of its batch."""
     lattice = {"spacing": spacing, "tip_radius": 8 * spacing, "within": 0.0102}
-    measured = {"seeds": 3, "measure": ["load", "approach", "certificate", "loss"]}
+    measured = {"seeds": 3, "measure": ["load", "approach", "load_error", "loss"]}
     contents = tables(
         asperities=lattice, sweep=measured | {"over": {"asperities.height_std": [1e-7]}}
     )
     with ThreadPoolExecutor(1) as here:
         shared = cr.sweep(contents, executor=here)
-        monkeypatch.setattr(running, "MOST_SCENES", 1)
+        monkeypatch.setattr(plan, "MOST_SCENES", 1)
         assert same(shared, cr.sweep(contents, executor=here))
