@@ -28,7 +28,7 @@ from convexrough.numbers.balls import TINY, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: Roundoffs of f P that a shear force may be off f P, and still be it: gross sliding.
+#: Roundoffs of f P by which a shear force may differ from f P and count as gross sliding.
 AT_THE_END = 16
 
 
