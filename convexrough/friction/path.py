@@ -258,7 +258,7 @@ def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
         expected = "0, as the load is 0 there: shear must be gone before contact is lost"
         raise InputError(f"forces[{k}]", found=Q[k], expected=expected)
     for k in np.flatnonzero(np.abs(Q) > f * P).tolist():
-        checks.bearable(f"forces[{k}]", float(Q[k]), f * P[k])
+        checks.bearable(f"forces[{k}]", float(Q[k]), float(f * P[k]))
     return [point_at(Fraction(p), q, scene) for p, q in zip(P.tolist(), Q.tolist(), strict=True)]
 
 

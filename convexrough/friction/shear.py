@@ -15,7 +15,7 @@ from convexrough.contact import Contact
 from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.general_step import Followed, followed
+from convexrough.friction.general_step import followed
 from convexrough.friction.levels import AT_THE_END, FrictionLevels, rounded
 from convexrough.friction.order import Order
 from convexrough.friction.state import states_of, stick_radii, words
@@ -190,14 +190,7 @@ def shear(
     else:
         height = levels.load - level_at("displacement", levels, abs(displacement or 0.0))
         height = height if (displacement or 0.0) >= 0 else -height
-    curve = MemoryCurve.pressed(levels.load).go(levels.load, height)[0]
-    order = levels.order({levels.load - abs(height)})
-    if order == "fails" and levels.proved and height:
-        if displacement is not None:
-            height = _by_steps(levels, displacement)
-        found = followed(levels, MemoryCurve.pressed(levels.load), [(levels.load, height)])
-        return _stepped(contact, levels, found, height, force)
-    return _state(contact, levels, curve, order, force, displacement)
+    return _state(contact, levels, height, force, displacement)
 
 
 def one_force(what: str, value: ArrayLike | None, limit: float) -> float:
@@ -235,30 +228,37 @@ def level_at(what: str, levels: FrictionLevels, displacement: float) -> Fraction
 def _state(
     contact: Contact,
     levels: FrictionLevels,
-    curve: MemoryCurve,
-    order: Order,
+    height: Fraction,
     force: float | None,
     displacement: float | None,
 ) -> ShearState:
-    found = states_of(levels, [curve])
-    if order == "fails":
-        found = found.unproved()
-    level = levels.at(levels.load - abs(curve.height))
-    radii, radius_errors = stick_radii(levels, level)
-    loaded = contact.loads > 0
+    """The state at T, by levels; or, where order is seen to fail, by general steps."""
+    start, loaded = MemoryCurve.pressed(levels.load), contact.loads > 0
+    order = levels.order({levels.load - abs(height)})
+    if order == "fails" and levels.proved and height:
+        if displacement is not None:
+            height = _by_steps(levels, displacement)
+        general = followed(levels, start, [(levels.load, height)])
+        found, status = general.states, general.status[0]
+        squared = contact.scene.relative_radii * general.fronts[0]
+        radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
+        total, doubt = float(height) * checks.friction(contact.scene.friction), 0.0
+        moved = float(found.displacements[0])
+    else:
+        curve = start.go(levels.load, height)[0]
+        found, status = states_of(levels, [curve]), words(levels, curve, order)
+        level = levels.at(levels.load - abs(height))
+        radii, radius_errors = stick_radii(levels, level)
+        size, off = rounded((levels.top.load - level.load) * levels.force_unit)
+        total, doubt = float(np.copysign(size, displacement or 0.0)), float(off)
+        moved = float(found.displacements[0]) if displacement is None else displacement
+    error = float(found.displacement_errors[0]) if displacement is None else 0.0
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
     most = np.abs(found.drifts[0]) + found.drift_errors[0]  # where it may or may not touch
     slip_errors = np.where(loaded, found.drift_errors[0], 0.0) + np.where(unsure, most, 0.0)
-    moved, error = float(found.displacements[0]), float(found.displacement_errors[0])
-    doubt = 0.0
-    if displacement is not None:
-        total, off = rounded((levels.top.load - level.load) * levels.force_unit)
-        force, doubt = float(np.copysign(total, displacement)), float(off)
-        moved, error = displacement, 0.0 if order != "fails" else np.inf
-    assert force is not None
     if order == "fails":
-        doubt, radius_errors = np.inf if displacement is not None else 0.0, radii + np.inf
-    status = words(levels, curve, order)
+        found, error, doubt = found.unproved(), np.inf, np.inf
+        slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
     certificate = ShearCertificate(
         scope=contact.certificate.scope if levels.proved and order != "fails" else "none",
         order=order,
@@ -266,17 +266,17 @@ def _state(
         force_errors=found.force_errors[0],
         slip_errors=frozen(slip_errors),
         stick_radius_errors=frozen(radius_errors),
-        force_error=doubt,
+        force_error=doubt if force is None else 0.0,
         displacement_error=error,
     )
     return ShearState(
         contact=contact,
-        force=force,
+        force=total if force is None else force,
         displacement=moved,
         forces=found.forces[0],
         displacements=frozen(np.where(loaded, found.asperity_displacements[0], 0.0)),
         slips=frozen(np.where(loaded, found.drifts[0], 0.0)),
-        stick_radii=radii,
+        stick_radii=frozen(radii),
         certificate=certificate,
     )
 
@@ -294,41 +294,6 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
 
     root = brentq(beyond, -1.0, 1.0, xtol=1e-12)
     return Fraction(root) * levels.load
-
-
-def _stepped(
-    contact: Contact,
-    levels: FrictionLevels,
-    found: Followed,
-    height: Fraction,
-    force: float | None,
-) -> ShearState:
-    """What general steps find where order fails; nothing is proved of it."""
-    states, loaded = found.states, contact.loads > 0
-    unknown = frozen(np.full(len(loaded), np.inf))
-    relative = contact.scene.relative_radii
-    certificate = ShearCertificate(
-        scope="none",
-        order="fails",
-        status=found.status[0],
-        force_errors=unknown,
-        slip_errors=unknown,
-        stick_radius_errors=unknown,
-        force_error=np.inf if force is None else 0.0,
-        displacement_error=np.inf,
-    )
-    if force is None:
-        force = float(height) * checks.friction(contact.scene.friction)
-    return ShearState(
-        contact=contact,
-        force=force,
-        displacement=float(states.displacements[0]),
-        forces=states.forces[0],
-        displacements=frozen(np.where(loaded, states.asperity_displacements[0], 0.0)),
-        slips=frozen(np.where(loaded, states.drifts[0], 0.0)),
-        stick_radii=frozen(np.where(loaded, np.sqrt(relative * found.fronts[0]), 0.0)),
-        certificate=certificate,
-    )
 
 
 def _nothing_loaded(contact: Contact, displacement: float) -> ShearState:

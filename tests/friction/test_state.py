@@ -148,7 +148,7 @@ def test_nothing_loaded() -> None:
     state = cr.shear(contact, force=0.0)
     assert (state.forces == 0).all()
     assert (state.status == "open").all()
-    with pytest.raises(cr.InputError, match=r"found 1e-09, expected at most f P = 0\.0"):
+    with pytest.raises(cr.InputError, match="at most f P = 0"):
         cr.shear(contact, force=1e-9)
 
 
