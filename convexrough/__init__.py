@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     )
     from convexrough.friction.curve import MemoryCurve
     from convexrough.friction.cycle import Cycle, Loop, cycle, cycles, loops, steady
+    from convexrough.friction.fretting import Fretting, fretting
     from convexrough.friction.onset import onset_of_sliding
     from convexrough.friction.path import History, LoadPath, history, load_path
     from convexrough.friction.phases import PhaseLosses, phase_losses
@@ -70,6 +71,7 @@ _HOMES = {
     ),
     "friction.curve": ("MemoryCurve",),
     "friction.cycle": ("Cycle", "Loop", "cycle", "cycles", "loops", "steady"),
+    "friction.fretting": ("Fretting", "fretting"),
     "friction.onset": ("onset_of_sliding",),
     "friction.path": ("History", "LoadPath", "history", "load_path"),
     "friction.phases": ("PhaseLosses", "phase_losses"),
@@ -109,6 +111,7 @@ __all__ = [
     "Cycle",
     "Direction",
     "FileError",
+    "Fretting",
     "FrictionConic",
     "FrictionNewton",
     "Gradient",
@@ -143,6 +146,7 @@ __all__ = [
     "cycle",
     "cycles",
     "elliptic_path",
+    "fretting",
     "history",
     "load_path",
     "loops",

@@ -7,16 +7,14 @@ lengths in units of the sphere's radius and pressures in units of the contact mo
 
 from __future__ import annotations
 
-from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
 
 import convexrough as cr
-from convexrough.arrays import Indices
+from convexrough.paper.states import lettered
 from convexrough.run.stages import Findings, Stages, compute
 from convexrough.run.summary import NORMAL, SHEAR, counts
-from convexrough.scene.rings import rings
 
 APPROACH = 5e-5
 
@@ -37,14 +35,6 @@ def findings() -> Findings:
     minima = tuple(-part for part in maxima)
     contact = cr.press(scene(), approach=APPROACH)
     return compute(contact, Stages(shear=maxima, cycle=(maxima, minima)))
-
-
-def lettered(contact: cr.Contact) -> dict[str, Indices]:
-    """The touching asperities by ring, from the axis outwards; the last ring is A."""
-    groups = rings(contact.scene.asperities.distances, contact.loads)
-    several = -(-len(groups) // 26)
-    names = [letter * (turn + 1) for turn in range(several) for letter in ascii_uppercase]
-    return dict(zip(reversed(names[: len(groups)]), groups, strict=True))
 
 
 def crossover(contact: cr.Contact) -> float:

@@ -1,186 +1,31 @@
-"""The slider page: states of first loading, found and judged here, inside one HTML file.
-
-The page steps through these states and shows their numbers as they are. Loops are made of them by
-Masing's rule (docs/theory/paths.md); nothing else is computed there.
-"""
+"""The slider page of a run: what is proved beside what `plots.slider` shows."""
 
 from __future__ import annotations
 
-import json
-from importlib.resources import files
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from convexrough import checks
-from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
-from convexrough.friction.cycle import Cycle, cycles
-from convexrough.friction.path import History, history
+from convexrough.plots.slider import Slides, slider_data, slider_html
 from convexrough.progress import Announce
-from convexrough.run.report import bound, describe
-from convexrough.run.summary import SHEAR, Summary, counts
-from convexrough.scene.base import sphere_radius
-from convexrough.scene.rings import evenly_chosen
-from convexrough.sphere.smooth import smooth
+from convexrough.run.report import describe
+from convexrough.run.summary import Summary
 from convexrough.tabular.units import UnitNames
-
-#: Forces of the slider for up to so many touching asperities; fewer for still more.
-FORCES = {2_500: 101, 20_000: 51}
-FEWEST_FORCES = 21
-
-#: Discs, and dots for open asperities, that are drawn at most, and asperities that can be followed:
-#: a page stays below 2 MB.
-MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 
 
 def slider_page(
     contact: Contact, summary: Summary, units: UnitNames, announce: Announce | None = None
 ) -> str:
     """The page as HTML. Raises InputError if the scene has no friction, or another base."""
-    found = json.dumps(page_data(contact, summary, units, announce), separators=(",", ":"))
-    template = files("convexrough.run").joinpath("page.html").read_text(encoding="utf-8")
-    return template.replace("{{data}}", found.replace("<", "\\u003c"))
+    return slider_html(Slides.of(contact, announce), _proved(summary, units), units)
 
 
 def page_data(
     contact: Contact, summary: Summary, units: UnitNames, announce: Announce | None = None
 ) -> dict[str, Any]:
-    """What the page shows: lengths of the map in a_H, forces in f P, displacements in X0.
-
-    Numbers have the five digits that are shown. `stick` has a row per force and a column per disc:
-    the stick radius in thousandths of the contact radius, 0 where sliding, -1 where undecided.
-    """
-    sphere_radius(contact.scene.sphere_radius, "slider page")
-    limit = checks.friction(contact.scene.friction) * contact.load
-    touching = np.flatnonzero(contact.loads)
-    fractions = np.linspace(0.0, 1.0, _forces(len(touching)))
-    steady = cycles(contact, fractions * limit, announce=announce)
-    loading = history(contact, forces=fractions * limit, announce=announce)
-    # Nothing is divided by nothing where no asperity touches.
-    sphere = smooth(contact.scene, load=contact.load) if contact.load else None
-    a_H = sphere.contact_radius if sphere else 1.0
-    X0 = float(sphere.displacement(limit)) if sphere else 1.0
-    drawn = _some(touching, MOST_DRAWN)
-    away = np.argsort(contact.scene.asperities.distances[drawn], kind="stable")
-    followed = np.array(evenly_chosen(away.tolist(), MOST_FOLLOWED), dtype=np.intp)
-    x, y = (contact.scene.contact_points / a_H).T
-    points, radii = contact.scene.contact_points[drawn] / a_H, contact.contact_radii[drawn] / a_H
-    radii *= np.sqrt(len(touching) / max(1, len(drawn)))  # together they cover the same area
-    reach = np.hypot(*points.T) + radii
-    empty = _some(np.flatnonzero(contact.loads == 0), MOST_DRAWN)
-    edge = 1.06 * max(1.0, float(reach.max(initial=0.0)))
-    empty = empty[np.maximum(np.abs(x[empty]), np.abs(y[empty])) < edge]
-    return {
-        "units": units._asdict(),
-        "touching": len(touching),
-        "edge": _digits(edge),
-        "certificate": describe(
-            {"normal": summary["normal"]}, length_unit=units.length, force_unit=units.force
-        ),
-        "letters": _letters(limit, a_H, X0, units),
-        "left_out": _left_out(len(touching), len(drawn), len(followed), len(fractions)),
-        "states": _states(fractions, steady, X0, limit),
-        "discs": {"index": drawn.tolist(), "x": _digits(points[:, 0]), "y": _digits(points[:, 1]),
-                  "radius": _digits(radii)},
-        "stick": _stick(contact, loading, steady, drawn),
-        "open": {"x": _digits(x[empty]), "y": _digits(y[empty])},
-        "followed": {"disc": followed.tolist()} | _followed(contact, loading, drawn[followed], X0),
-    }  # fmt: skip
+    """What the page shows."""
+    return slider_data(Slides.of(contact, announce), _proved(summary, units), units)
 
 
-def _forces(touching: int) -> int:
-    return next((count for most, count in FORCES.items() if touching <= most), FEWEST_FORCES)
-
-
-def _some(which: Indices, most: int) -> Indices:
-    """All, or so many of them: drawn by lot, so that no pattern shows, and the same every time."""
-    if len(which) <= most:
-        return which
-    return np.sort(np.random.default_rng(0).choice(which, most, replace=False))
-
-
-def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> dict[str, Any]:
-    """Of the whole contact, and of the smooth sphere under the same load, at each force."""
-    moved = np.array([each.displacement_amplitude for each in steady])
-    words = [counts(each.status, SHEAR) for each in steady]
-    stuck = np.cbrt(1.0 - fractions)
-    return {
-        "fraction": _digits(fractions),
-        "force": _digits(fractions * limit),
-        "length": _digits(moved),
-        "displacement": _digits(moved / X0),
-        "displacement_error": [bound(each.displacement_error) for each in steady],
-        "loss": _digits([each.loss_normalised for each in steady]),
-        "smooth_loss": _digits([each.smooth_normalised for each in steady]),
-        "smooth_displacement": _digits(1.0 - stuck**2),
-        "smooth_stick": _digits(stuck),
-        "sliding": [each["sliding"] for each in words],
-        "partial": [each["partial_slip"] for each in words],
-        "undecided": [each["undecided"] for each in words],
-    }
-
-
-def _stick(
-    contact: Contact, loading: History, steady: list[Cycle], drawn: Indices
-) -> list[list[int]]:
-    """c_i / a_i = (1 - Q_i / (f P_i))^(1/3) in thousandths, 0 sliding, -1 undecided."""
-    left = np.maximum(1.0 - _shares(contact, loading, drawn), 0.0)
-    rows = np.maximum(np.rint(1000.0 * np.cbrt(left)), 1.0).astype(int)
-    words = np.array([each.status[drawn] for each in steady])
-    rows[words == "sliding"] = 0
-    rows[words == "undecided"] = -1
-    return [row.tolist() for row in rows]
-
-
-def _shares(contact: Contact, loading: History, which: Indices) -> Array:
-    """(m, k) Q_i / (f P_i)."""
-    limits = checks.friction(contact.scene.friction) * contact.loads[which]
-    return np.asarray(loading.asperity_forces[:, which] / limits)
-
-
-def _followed(contact: Contact, loading: History, which: Indices, X0: float) -> dict[str, Any]:
-    """Curves and proofs of the asperities that can be followed."""
-    x, y = contact.scene.asperities.positions[which].T
-    certificate = contact.certificate
-    return {
-        "x": _digits(x),
-        "y": _digits(y),
-        "word": certificate.status[which].tolist(),
-        "load": _digits(contact.loads[which]),
-        "load_error": [bound(error) for error in certificate.load_errors[which]],
-        "share": [_digits(curve) for curve in _shares(contact, loading, which).T],
-        "moved": [_digits(curve) for curve in loading.asperity_displacements[:, which].T / X0],
-    }
-
-
-def _digits(values: ArrayLike) -> Any:
-    """A number, or a list of them, to the five digits that the page shows."""
-    if isinstance(values, float):
-        return float(f"{values:.5g}")
-    return [float(f"{value:.5g}") for value in np.asarray(values).tolist()]
-
-
-def _letters(limit: float, a_H: float, X0: float, units: UnitNames) -> list[str]:
-    return [
-        f"f P   {limit:.5g} {units.force}".rstrip() + ": the largest shear force, gross sliding",
-        f"a_H   {a_H:.5g} {units.length}".rstrip() + ": contact radius of the smooth sphere",
-        f"X0    {X0:.5g} {units.length}".rstrip() + ": its displacement at gross sliding",
-        "X     displacement of the deep points, both bodies",
-        "X_i   own deflection of an asperity; s_i its gross slip, a_i its contact radius",
-        "W0    scale of the loss, 9 (2 - nu) f² P² / (5 G a_H)",
-        "The loop is the steady cycle between -Q and Q; the point is its tip, at Q.",
-    ]
-
-
-def _left_out(touching: int, drawn: int, followed: int, forces: int) -> list[str]:
-    """What the page does not show of many asperities, in sentences; the counts are of all."""
-    said = []
-    if drawn < touching:
-        said.append(f"{drawn:,} of {touching:,} touching asperities are drawn, by lot and larger.")
-    if followed < touching:
-        said.append(f"{followed:,} of the asperities can be followed.")
-    if forces < next(iter(FORCES.values())):
-        said.append(f"There are {forces} forces.")
-    return said
+def _proved(summary: Summary, units: UnitNames) -> list[str]:
+    part = {"normal": summary["normal"]}
+    return describe(part, length_unit=units.length, force_unit=units.force)

@@ -1,0 +1,208 @@
+"""The slider page: states of first loading, found before and shown here, inside one HTML file.
+
+The page steps through these states and shows their numbers as they are. Loops are made of them by
+Masing's rule (docs/theory/paths.md); nothing else is computed there, and nothing here.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices
+from convexrough.contact import Contact
+from convexrough.friction.cycle import Cycle, cycles
+from convexrough.friction.path import History, history
+from convexrough.progress import Announce
+from convexrough.scene.base import sphere_radius
+from convexrough.scene.rings import evenly_chosen
+from convexrough.sphere.smooth import smooth
+from convexrough.tabular.units import UnitNames
+
+#: Forces of the slider for up to so many touching asperities; fewer for still more.
+FORCES = {2_500: 101, 20_000: 51}
+FEWEST_FORCES = 21
+
+#: Discs, and dots for open asperities, that are drawn at most, and asperities that can be followed:
+#: a page stays below 2 MB.
+MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
+
+
+@dataclass(frozen=True)
+class Slides:
+    """What the page steps through: first loading to each fraction of f P, and the cycle there."""
+
+    contact: Contact
+    fractions: Array
+    steady: list[Cycle]
+    loading: History
+
+    @classmethod
+    def of(cls, contact: Contact, announce: Announce | None = None) -> Slides:
+        """Of a contact. Raises InputError if the scene has no friction, or another base."""
+        sphere_radius(contact.scene.sphere_radius, "slider page")
+        limit = checks.friction(contact.scene.friction) * contact.load
+        fractions = np.linspace(0.0, 1.0, _forces(int(np.count_nonzero(contact.loads))))
+        steady = cycles(contact, fractions * limit, announce=announce)
+        loading = history(contact, forces=fractions * limit, announce=announce)
+        return cls(contact, fractions, steady, loading)
+
+
+def slider_html(slides: Slides, proved: Sequence[str], units: UnitNames) -> str:
+    """The page.
+
+    proved : lines that say what is proved of the contact
+    """
+    found = json.dumps(slider_data(slides, proved, units), separators=(",", ":"))
+    template = files("convexrough.plots").joinpath("slider.html").read_text(encoding="utf-8")
+    return template.replace("{{data}}", found.replace("<", "\\u003c"))
+
+
+def slider_data(slides: Slides, proved: Sequence[str], units: UnitNames) -> dict[str, Any]:
+    """What the page shows: lengths of the map in a_H, forces in f P, displacements in X0.
+
+    Numbers have the five digits that are shown. `stick` has a row per force and a column per disc:
+    the stick radius in thousandths of the contact radius, 0 where sliding, -1 where undecided.
+    """
+    contact, fractions, steady, loading = (
+        slides.contact, slides.fractions, slides.steady, slides.loading
+    )  # fmt: skip
+    limit = checks.friction(contact.scene.friction) * contact.load
+    touching = np.flatnonzero(contact.loads)
+    # Nothing is divided by nothing where no asperity touches.
+    sphere = smooth(contact.scene, load=contact.load) if contact.load else None
+    a_H = sphere.contact_radius if sphere else 1.0
+    X0 = float(sphere.displacement(limit)) if sphere else 1.0
+    drawn = _some(touching, MOST_DRAWN)
+    away = np.argsort(contact.scene.asperities.distances[drawn], kind="stable")
+    followed = np.array(evenly_chosen(away.tolist(), MOST_FOLLOWED), dtype=np.intp)
+    x, y = (contact.scene.contact_points / a_H).T
+    points, radii = contact.scene.contact_points[drawn] / a_H, contact.contact_radii[drawn] / a_H
+    radii *= np.sqrt(len(touching) / max(1, len(drawn)))  # together they cover the same area
+    reach = np.hypot(*points.T) + radii
+    empty = _some(np.flatnonzero(contact.loads == 0), MOST_DRAWN)
+    edge = 1.06 * max(1.0, float(reach.max(initial=0.0)))
+    empty = empty[np.maximum(np.abs(x[empty]), np.abs(y[empty])) < edge]
+    return {
+        "units": units._asdict(),
+        "touching": len(touching),
+        "edge": _digits(edge),
+        "certificate": list(proved),
+        "letters": _letters(limit, a_H, X0, units),
+        "left_out": _left_out(len(touching), len(drawn), len(followed), len(fractions)),
+        "states": _states(fractions, steady, X0, limit),
+        "discs": {"index": drawn.tolist(), "x": _digits(points[:, 0]), "y": _digits(points[:, 1]),
+                  "radius": _digits(radii)},
+        "stick": _stick(contact, loading, steady, drawn),
+        "open": {"x": _digits(x[empty]), "y": _digits(y[empty])},
+        "followed": {"disc": followed.tolist()} | _followed(contact, loading, drawn[followed], X0),
+    }  # fmt: skip
+
+
+def _forces(touching: int) -> int:
+    return next((count for most, count in FORCES.items() if touching <= most), FEWEST_FORCES)
+
+
+def _some(which: Indices, most: int) -> Indices:
+    """All, or so many of them: drawn by lot, so that no pattern shows, and the same every time."""
+    if len(which) <= most:
+        return which
+    return np.sort(np.random.default_rng(0).choice(which, most, replace=False))
+
+
+def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> dict[str, Any]:
+    """Of the whole contact, and of the smooth sphere under the same load, at each force."""
+    moved = np.array([each.displacement_amplitude for each in steady])
+    stuck = np.cbrt(1.0 - fractions)
+    return {
+        "fraction": _digits(fractions),
+        "force": _digits(fractions * limit),
+        "length": _digits(moved),
+        "displacement": _digits(moved / X0),
+        "displacement_error": [_bound(each.displacement_error) for each in steady],
+        "loss": _digits([each.loss_normalised for each in steady]),
+        "smooth_loss": _digits([each.smooth_normalised for each in steady]),
+        "smooth_displacement": _digits(1.0 - stuck**2),
+        "smooth_stick": _digits(stuck),
+        "sliding": [int((each.status == "sliding").sum()) for each in steady],
+        "partial": [int(np.isin(each.status, ("partial", "stuck")).sum()) for each in steady],
+        "undecided": [int((each.status == "undecided").sum()) for each in steady],
+    }
+
+
+def _stick(
+    contact: Contact, loading: History, steady: list[Cycle], drawn: Indices
+) -> list[list[int]]:
+    """c_i / a_i = (1 - Q_i / (f P_i))^(1/3) in thousandths, 0 sliding, -1 undecided."""
+    left = np.maximum(1.0 - _shares(contact, loading, drawn), 0.0)
+    rows = np.maximum(np.rint(1000.0 * np.cbrt(left)), 1.0).astype(int)
+    words = np.array([each.status[drawn] for each in steady])
+    rows[words == "sliding"] = 0
+    rows[words == "undecided"] = -1
+    return [row.tolist() for row in rows]
+
+
+def _shares(contact: Contact, loading: History, which: Indices) -> Array:
+    """(m, k) Q_i / (f P_i)."""
+    limits = checks.friction(contact.scene.friction) * contact.loads[which]
+    return np.asarray(loading.asperity_forces[:, which] / limits)
+
+
+def _followed(contact: Contact, loading: History, which: Indices, X0: float) -> dict[str, Any]:
+    """Curves and proofs of the asperities that can be followed."""
+    x, y = contact.scene.asperities.positions[which].T
+    certificate = contact.certificate
+    return {
+        "x": _digits(x),
+        "y": _digits(y),
+        "word": certificate.status[which].tolist(),
+        "load": _digits(contact.loads[which]),
+        "load_error": [_bound(error) for error in certificate.load_errors[which]],
+        "share": [_digits(curve) for curve in _shares(contact, loading, which).T],
+        "moved": [_digits(curve) for curve in loading.asperity_displacements[:, which].T / X0],
+    }
+
+
+def _bound(error: float) -> str:
+    """Two digits, never below the error."""
+    return f"{1.05 * error:.2g}" if np.isfinite(error) else "unknown"
+
+
+def _digits(values: ArrayLike) -> Any:
+    """A number, or a list of them, to the five digits that the page shows."""
+    if isinstance(values, float):
+        return float(f"{values:.5g}")
+    return [float(f"{value:.5g}") for value in np.asarray(values).tolist()]
+
+
+def _letters(limit: float, a_H: float, X0: float, units: UnitNames) -> list[list[str]]:
+    """Letter, its value, and what it is."""
+    force, length = (f" {unit}".rstrip() for unit in (units.force, units.length))
+    return [
+        ["f P", f"{limit:.5g}{force}", "the largest shear force: gross sliding"],
+        ["a_H", f"{a_H:.5g}{length}", "contact radius of the smooth sphere"],
+        ["X_0", f"{X0:.5g}{length}", "its displacement at gross sliding"],
+        ["X", "", "displacement of the deep points of both bodies"],
+        ["X_i, s_i, a_i", "", "deflection of an asperity, its gross slip, its contact radius"],
+        ["W_0", "", "scale of the loss, 24/5 f P X\u2080"],
+        ["k", "", "the contact's stiffness at first: Q/k is the elastic part of X"],
+    ]
+
+
+def _left_out(touching: int, drawn: int, followed: int, forces: int) -> list[str]:
+    """What the page does not show of many asperities, in sentences; the counts are of all."""
+    said = []
+    if drawn < touching:
+        said.append(f"{drawn:,} of {touching:,} touching asperities are drawn, by lot and larger.")
+    if followed < touching:
+        said.append(f"{followed:,} of the asperities can be followed.")
+    if forces < next(iter(FORCES.values())):
+        said.append(f"There are {forces} forces.")
+    return said
