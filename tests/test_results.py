@@ -101,8 +101,8 @@ def test_every_kind_is_here() -> None:
     settings = {"FrictionConic", "FrictionNewton", "Material"}
     sweeps = {"SweepTable"}  # tested in tests/sweeps
     assert public - settings - sweeps <= set(NAMES)
-    assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "Fretting", "History",
-                          "Verdict", "Comparison", "LoadPath", "Shakedown",
+    assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "Fretting",
+                          "History", "Verdict", "Comparison", "LoadPath", "Shakedown",
                           "MemoryCurve", "PhaseLosses", "PathComparison",
                           "Gradient", "Surface", "Summits", "Provability"}  # fmt: skip
 
