@@ -16,3 +16,9 @@ class Drawn:
         from convexrough.plots import plot  # it loads matplotlib: only when asked
 
         return plot(self, axes, **options)
+
+    def _picture(self) -> str:
+        """A small map as an image of HTML, for which nothing is solved."""
+        from convexrough.plots import thumbnail
+
+        return thumbnail(self)

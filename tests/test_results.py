@@ -80,6 +80,7 @@ def results() -> dict[str, Any]:
         cr.compare_paths(scene, loads=[contact.load], forces=[Q]).entries[0],
         cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)[0],
         cycle.gradient(),
+        cr.fretting(cycle),
         contact.change(cr.Direction(heights=1e-8)),
         state.change(cr.Direction(heights=1e-8)),
         cr.Direction(heights=1e-8),
@@ -103,8 +104,8 @@ def test_every_kind_is_here() -> None:
     settings = {"FrictionConic", "FrictionNewton", "Material"}
     sweeps = {"SweepTable"}  # tested in tests/sweeps
     assert public - settings - sweeps <= set(NAMES)
-    assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "History",
-                          "Verdict", "Comparison", "LoadPath", "Shakedown",
+    assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "Fretting",
+                          "History", "Verdict", "Comparison", "LoadPath", "Shakedown",
                           "MemoryCurve", "PhaseLosses", "PathComparison",
                           "Gradient", "Surface", "Summits", "Provability"}  # fmt: skip
 

@@ -6,45 +6,45 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from convexrough.arrays import Array, Indices
-from convexrough.contact import Contact
-from convexrough.friction.cycle import cycles
-from convexrough.friction.path import history
+from convexrough.arrays import Array
+from convexrough.paper.states import AMPLITUDES, PaperStates
 from convexrough.plots.cycle import ring_colour
-from convexrough.plots.style import DASHED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE, ShearScale, label
+from convexrough.plots.measure import Scale
+from convexrough.plots.notebook import Figure
+from convexrough.plots.style import (
+    DASHED,
+    DOTTED,
+    DOUBLE,
+    ROUGH,
+    SMOOTH,
+    TICK,
+    UNSURE,
+    label,
+    title,
+)
 
 #: Amplitude Q / (f P) at which the paper reads off its Fig. 9 that the curves cross: "about".
 READ_CROSSING = 0.37
-AMPLITUDES = 81
 
 
-def forces_figure(
-    contact: Contact, named: dict[str, Indices], onsets: Array, scale: ShearScale
-) -> Figure:
-    """Force and displacement of the first asperity of each ring, from Q = 0 to f P.
-
-    named : the rings by letter;  onsets : (n,) [f P] where each asperity starts to slide
-    """
+def forces_figure(found: PaperStates, scale: Scale) -> Figure:
+    """Force and displacement of the first asperity of each ring, from Q = 0 to f P."""
     figure = Figure(figsize=(DOUBLE, 3.2), layout="constrained")
     left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
-    firsts = {name: int(ring[0]) for name, ring in named.items()}
-    starts = np.minimum(onsets[list(firsts.values())], 1.0)
-    even = 1.0 - np.linspace(1.0, 0.0, 61) ** 2  # close together at gross sliding
-    share = np.union1d(even, starts)
-    past = history(contact, forces=np.minimum(share, 1.0) * scale.force)
-    force = 100.0 * past.asperity_forces / scale.force
-    moved = past.asperity_displacements / scale.displacement
-    own = moved - past.slips / scale.displacement
-
-    for order, (i, start) in enumerate(zip(firsts.values(), starts, strict=True)):
+    firsts = {name: int(ring[0]) for name, ring in found.named.items()}
+    path, share = found.path, found.fractions
+    force = 100.0 * path.asperity_forces / found.limit
+    moved = scale.displacement.of(path.asperity_displacements)
+    own = moved - scale.displacement.of(path.slips)
+    for order, i in enumerate(firsts.values()):
+        start = min(found.onsets[i], 1.0)
         look: dict[str, Any] = {"color": ring_colour(order, len(firsts)), "lw": 1.2}
         slid = np.searchsorted(share, start)
         left.plot(share, force[:, i], **look)
         right.plot(share, moved[:, i], **look)
-        right.plot(share[slid:], own[slid:, i], **(look | {"lw": 0.9, "ls": (0, (1, 1.5))}))
+        right.plot(share[slid:], own[slid:, i], **(look | {"lw": 0.9, "ls": DOTTED}))
         for axes, values in ((left, force), (right, moved)):
             axes.plot(start, values[slid, i], "o", ms=4, mec=SMOOTH, mew=0.4, mfc=look["color"],
                       clip_on=False, zorder=3, label="_onset")  # fmt: skip
@@ -52,16 +52,12 @@ def forces_figure(
         axes.set(xlim=(0.0, 1.0))
         axes.set_ylim(0.0, 1.04 * float(values.max()))
         _letters(axes, list(firsts), values[-1, list(firsts.values())])
-    label(left, f"$Q\\,/\\,(fP)$  ({scale.limit()})", "$Q_i\\,/\\,(fP)$  [%]")
-    left.set_title("asperity of each ring; dot: slides from here", fontsize=TICK, loc="left")
-    label(right, "$Q\\,/\\,(fP)$", f"$(X_i + s_i)\\,/\\,X_0$  {_of(scale)}")
-    right.set_title("with gross slip; dotted: without", fontsize=TICK, loc="left")
+    label(left, "$Q\\,/\\,(fP)$", "$Q_i\\,/\\,(fP)$  [%]")
+    title(left, "asperity of each ring; dot: slides from here")
+    label(right, "$Q\\,/\\,(fP)$", scale.displacement.short("(X_i + s_i)"))
+    title(right, "with gross slip; dotted: without")
+    figure.supxlabel(scale.footnote(), fontsize=TICK)
     return figure
-
-
-def _of(scale: ShearScale) -> str:
-    """The bracket of a displacement label."""
-    return scale.displacement_label().partition("  ")[2]
 
 
 def _letters(axes: Axes, names: list[str], heights: Array) -> None:
@@ -83,22 +79,20 @@ def _letters(axes: Axes, names: list[str], heights: Array) -> None:
         )
 
 
-def loss_figure(contact: Contact, scale: ShearScale) -> Figure:
+def loss_figure(found: PaperStates, scale: Scale) -> Figure:
     """Energy per cycle against amplitude, rough and smooth; a zoom on where the curves cross."""
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     whole, zoom = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
-    even = np.linspace(0.0, 1.0, AMPLITUDES)
-    amplitude = np.union1d(even, 1.0 - 0.02 * even[:-1:8] ** 2)  # steep at gross sliding
-    steady = cycles(contact, amplitude * scale.force)
-    rough = np.array([each.loss_normalised for each in steady])
-    smooth = np.array([each.smooth_normalised for each in steady])
+    energy = scale.energy(max(each.loss for each in found.cycles))
+    rough = np.array([energy.of(each.loss) for each in found.cycles])
+    smooth = energy.of(scale.work) * np.array([each.smooth_normalised for each in found.cycles])
     for axes in (whole, zoom):
-        axes.plot(amplitude, rough, lw=1.3, color=ROUGH, label="asperities")
-        axes.plot(amplitude, smooth, ls=DASHED, lw=1.1, color=SMOOTH, label="smooth sphere")
-    crossing = cross(amplitude, rough, smooth)
+        axes.plot(AMPLITUDES, rough, lw=1.3, color=ROUGH, label="asperities")
+        axes.plot(AMPLITUDES, smooth, ls=DASHED, lw=1.1, color=SMOOTH, label=scale.name)
+    crossing = cross(AMPLITUDES, rough, smooth)
     middle = READ_CROSSING if crossing is None else crossing
     window = np.clip(middle, 0.07, 0.93) + np.array([-0.07, 0.07])
-    inside = (amplitude >= window[0]) & (amplitude <= window[1])
+    inside = (window[0] <= AMPLITUDES) & (window[1] >= AMPLITUDES)
     energies = np.concatenate((rough[inside], smooth[inside]))
     margin = 0.04 * float(np.ptp(energies))
     low, high = float(energies.min()) - margin, float(energies.max()) + margin
@@ -106,22 +100,15 @@ def loss_figure(contact: Contact, scale: ShearScale) -> Figure:
     zoom.set(xlim=tuple(window), ylim=(low, high))
     box = Rectangle((window[0], low), np.ptp(window), high - low, fill=False, ec=SMOOTH, lw=0.8)
     whole.add_patch(box)
-    whole.annotate(
-        "zoom",
-        (float(window[1]), high),
-        xytext=(-2, 3),
-        textcoords="offset points",
-        ha="right",
-        va="bottom",
-        fontsize=TICK,
-    )
+    whole.annotate("zoom", (float(window[1]), high), xytext=(-2, 3), textcoords="offset points",
+                   ha="right", va="bottom", fontsize=TICK)  # fmt: skip
     if crossing is not None:
-        _mark_crossing(zoom, crossing, float(np.interp(crossing, amplitude, smooth)))
-    label(whole, f"amplitude of $Q\\,/\\,(fP)$  ({scale.limit()})", scale.energy_label())
-    label(zoom, "amplitude of $Q\\,/\\,(fP)$", "$W\\,/\\,W_0$")
+        _mark_crossing(zoom, crossing, float(np.interp(crossing, AMPLITUDES, smooth)))
+    label(whole, "amplitude of $Q\\,/\\,(fP)$", energy.label("W"))
+    label(zoom, "amplitude of $Q\\,/\\,(fP)$", energy.short("W"))
     whole.legend(loc="upper left", fontsize=TICK, frameon=False)
-    whole.set_title("energy lost per cycle", fontsize=TICK, loc="left")
-    zoom.set_title("zoom", fontsize=TICK, loc="left")
+    title(whole, "energy lost per cycle")
+    title(zoom, "zoom")
     return figure
 
 
@@ -137,21 +124,10 @@ def cross(amplitude: Array, rough: Array, smooth: Array) -> float | None:
 
 
 def _mark_crossing(axes: Axes, crossing: float, height: float) -> None:
-    axes.axvline(READ_CROSSING, ls=(0, (1, 1.5)), lw=1.0, color=SMOOTH, label="_read")
+    axes.axvline(READ_CROSSING, ls=DOTTED, lw=1.0, color=SMOOTH, label="_read")
     axes.plot(crossing, height, "o", ms=5, mfc="white", mec=UNSURE, mew=1.3, label="_crossing")
-    axes.annotate(
-        f"curves cross at {crossing:.3f}",
-        (crossing, height),
-        xytext=(10, -14),
-        textcoords="offset points",
-        fontsize=TICK,
-        color=UNSURE,
-    )
-    axes.annotate(
-        f"read off the paper's\ngraph: about {READ_CROSSING:g}",
-        (READ_CROSSING, axes.get_ylim()[0]),
-        xytext=(4, 4),
-        textcoords="offset points",
-        fontsize=TICK,
-        va="bottom",
-    )
+    axes.annotate(f"curves cross at {crossing:.3f}", (crossing, height), xytext=(10, -14),
+                  textcoords="offset points", fontsize=TICK, color=UNSURE)  # fmt: skip
+    said = f"read off the paper's\ngraph: about {READ_CROSSING:g}"
+    axes.annotate(said, (READ_CROSSING, axes.get_ylim()[0]), xytext=(4, 4), fontsize=TICK,
+                  textcoords="offset points", va="bottom")  # fmt: skip

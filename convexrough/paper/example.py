@@ -7,17 +7,15 @@ lengths in units of the sphere's radius and pressures in units of the contact mo
 
 from __future__ import annotations
 
-from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import convexrough as cr
-from convexrough.arrays import Indices
+from convexrough.paper.states import lettered
 from convexrough.run.stage import Result
 from convexrough.run.stages import Cycle, Normal, Shear
-from convexrough.scene.rings import rings
 
 APPROACH = 5e-5
 
@@ -38,14 +36,6 @@ def results() -> list[Result]:
     stages = (Normal(approach=APPROACH), Shear(fractions=parts), Cycle(maximum=parts))
     contact = cr.press(scene(), approach=APPROACH)
     return [stage.compute(contact) for stage in stages]
-
-
-def lettered(contact: cr.Contact) -> dict[str, Indices]:
-    """The touching asperities by ring, from the axis outwards; the last ring is A."""
-    groups = rings(contact.scene.asperities.distances, contact.loads)
-    several = -(-len(groups) // 26)
-    names = [letter * (turn + 1) for turn in range(several) for letter in ascii_uppercase]
-    return dict(zip(reversed(names[: len(groups)]), groups, strict=True))
 
 
 def crossover(contact: cr.Contact) -> float:

@@ -8,50 +8,47 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from convexrough import checks, fields
-from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
-from convexrough.friction.cycle import cycle
-from convexrough.friction.onset import onset_of_sliding
-from convexrough.friction.shear import ShearState, shear
+from convexrough.friction.shear import ShearState
 from convexrough.paper.curves import forces_figure, loss_figure
-from convexrough.paper.example import lettered
+from convexrough.paper.states import SHARE, PaperStates
+from convexrough.plots.asperity_map import SLIDING, STICK, Layer, draw_contact
 from convexrough.plots.cycle import MOST_ASPERITIES, loops_figure
+from convexrough.plots.measure import Measure, Scale, measure, product, quantity
+from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.press import pressure_figure
-from convexrough.plots.shear import SLIDING, STICK, draw_state, legend_handles
+from convexrough.plots.shear import draw_state, legend_handles
 from convexrough.plots.style import (
     COLOURS,
     DASHED,
+    DOTTED,
     DOUBLE,
     ROUGH,
     SMOOTH,
     TICK,
-    Scale,
-    ShearScale,
     abscissae,
-    draw_discs,
-    draw_smooth,
-    frame_map,
+    bar,
     label,
     legend_above,
-    map_edge,
+    legend_outside,
     no_contact_figure,
-    quantity,
+    title,
     towards_rim,
 )
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 
-#: Q / (f P) of the paper's Figs. 4 to 6 and 8.
-SHARE = 0.5
-
 
 def paper_figures(
-    contact: Contact, *, length_unit: str = "", force_unit: str = ""
-) -> dict[str, Figure]:
+    contact: Contact,
+    found: PaperStates | None = None,
+    *,
+    length_unit: str = "",
+    force_unit: str = "",
+) -> Figures:
     """The figures of the paper's example, or of any contact whose asperities stand in rings.
 
     "fig3_pressure"   : contact pressure
@@ -64,186 +61,150 @@ def paper_figures(
     "fig9_energy"     : energy per cycle against amplitude, rough and smooth, and where they cross
 
     Rings have letters as in the paper: A is the outermost.
+
+    found : what they show, where it is known; else it is computed
     """
+    scale = Scale(contact, length_unit, force_unit)
     if not contact.loads.any():
-        return _no_contact(contact, length_unit, force_unit)
-    scale = Scale.of(contact, length_unit, force_unit)
-    friction = ShearScale.of(contact, length_unit, force_unit)
-    state = shear(contact, force=SHARE * friction.force)
-    onsets = onset_of_sliding(contact) / friction.force
-    named = lettered(contact)
-    steady = cycle(contact, maximum=SHARE * friction.force)
-    some = evenly_chosen(list(named), MOST_ASPERITIES)
-    firsts = [int(named[name][0]) for name in some]
-    centre = firsts[0]
-    return {
-        "fig3_pressure": pressure_figure(contact, scale),
-        "fig4_rings": _rings_figure(state, named, onsets, scale, friction),
-        "fig5_traction": _traction_figure(state, centre, scale, friction),
-        "fig6_section": _section_figure(state, scale),
-        "fig7_asperities": forces_figure(contact, named, onsets, friction),
-        "fig8_loops": loops_figure([steady], firsts, some, "ring", friction),
-        "fig9_energy": loss_figure(contact, friction),
-    }
+        return _no_contact(scale)
+    found = found or PaperStates.of(contact)
+    some = evenly_chosen(list(found.named), MOST_ASPERITIES)
+    firsts = [int(found.named[name][0]) for name in some]
+    pressure = product(force_unit, under=length_unit)
+    f = checks.friction(contact.scene.friction)
+    traction = measure(f * scale.peak, pressure, "(fp_0)")
+    return Figures(
+        fig3_pressure=pressure_figure(scale),
+        fig4_rings=_rings_figure(found, scale),
+        fig5_traction=_traction_figure(found.half, firsts[0], scale, traction),
+        fig6_section=_section_figure(found.half, scale, traction),
+        fig7_asperities=forces_figure(found, scale),
+        fig8_loops=loops_figure([found.steady], firsts, some, "ring", scale, [found.loop]),
+        fig9_energy=loss_figure(found, scale),
+    )
 
 
-def _rings_figure(
-    state: ShearState, named: dict[str, Indices], onsets: Array, scale: Scale, friction: ShearScale
-) -> Figure:
-    contact = state.contact
+def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
+    contact, named, onsets = found.contact, found.named, found.onsets
     figure = Figure(figsize=(DOUBLE, 3.4), layout="constrained")
     chart, bars = figure.subplots(1, 2, width_ratios=[1.0, 0.9], gridspec_kw={"wspace": 0.06})
-    draw_state(chart, state, scale)
-    frame_map(chart, 1.08 * map_edge(contact, scale))  # room for the letters
-    points = contact.scene.contact_points / scale.length
+    draw_state(chart, found.half, scale)
+    left, right = chart.get_xlim()
+    chart.set(xlim=(1.08 * left, 1.08 * right), ylim=(1.08 * left, 1.08 * right))  # for letters
+    beside = contact.scene.contact_points + np.array([0.015 * scale.typical, 0.0])
     halo = [withStroke(linewidth=1.5, foreground="white")]
     for name, ring in named.items():
         for i in ring:
-            x, y = points[i]
-            beside = x + contact.contact_radii[i] / scale.length + 0.015
-            chart.text(beside, y, name, va="center", fontsize=7, path_effects=halo, clip_on=True)
-    label(chart, scale.length_label("x"), "$y\\,/\\,a_H$")
-    slides = ", ".join(name for name, ring in named.items() if _slides(state, ring)) or "none"
-    chart.set_title(f"slide at $Q/(fP)$ = {SHARE:g}: {slides}", fontsize=TICK, loc="left")
+            x, y = scale.length.of(beside[i] + np.array([contact.contact_radii[i], 0.0]))
+            chart.text(x, y, name, va="center", fontsize=7, path_effects=halo, clip_on=True)
+    slides = [name for name, ring in named.items() if (found.half.status[ring] == "sliding").any()]
+    title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides) or 'none'}")
 
     rows = np.arange(len(named))
     start = np.array([onsets[ring].min() for ring in named.values()])
-    bars.barh(rows, start, height=0.62, color=STICK, ec=SMOOTH, lw=0.4, label="stick in part")
-    bars.barh(
-        rows, 1.0 - start, left=start, height=0.62, color=SLIDING, ec=SMOOTH, lw=0.4, label="slide"
-    )
+    look: dict[str, Any] = {"height": 0.62, "ec": SMOOTH, "lw": 0.4}
+    bars.barh(rows, start, color=STICK, **look)
+    bars.barh(rows, 1.0 - start, left=start, color=SLIDING, **look)
     bars.axvline(SHARE, ls=DASHED, lw=1.0, color=SMOOTH)
     bars.set_yticks(rows, [f"{name} ({len(ring)})" for name, ring in named.items()])
     bars.set(xlim=(0.0, 1.0), ylim=(len(rows) - 0.4, -0.6))
     bars.tick_params(axis="y", length=0)
     for row, value in zip(rows, start, strict=True):
         bars.text(1.02, row, f"{value:.4f}", fontsize=TICK, va="center")
-    label(bars, f"$Q\\,/\\,(fP)$  ({friction.limit()})", "ring (asperities)")
-    bars.set_title("light: stick in part; dark: slide", fontsize=TICK, loc="left")
-    above: dict[str, Any] = {"textcoords": "offset points", "xycoords": "axes fraction"}
-    bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK, **above)
-    figure.legend(
-        handles=legend_handles(contact, [state], scale),
-        loc="outside upper center",
-        ncols=4,
-        fontsize=TICK,
-        frameon=False,
-        handletextpad=0.5,
-        columnspacing=1.4,
-    )
+    limit = f"$fP$ = {quantity(scale.limit, scale.force_unit)}"
+    label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
+    title(bars, "light: stick in part; dark: slide")
+    bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK,
+                  textcoords="offset points", xycoords="axes fraction")  # fmt: skip
+    legend_outside(figure, legend_handles([found.half], scale), "upper center", 4)
     return figure
 
 
-def _slides(state: ShearState, ring: Indices) -> bool:
-    return bool((state.status[ring] == "sliding").any())
-
-
-def _traction_figure(state: ShearState, centre: int, scale: Scale, friction: ShearScale) -> Figure:
+def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure) -> Figure:
     contact = state.contact
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
-    unit = _traction_unit(state, scale)
-    top = _draw_tractions(chart, state, scale, unit)
-    draw_smooth(chart, scale)
-    frame_map(chart, map_edge(contact, scale))
+    _draw_tractions(chart, state, scale, unit)
     chart.set_anchor("E")
-    label(chart, scale.length_label("x"), "$y\\,/\\,a_H$")
-    chart.set_title(f"$Q/(fP)$ = {SHARE:g}", fontsize=TICK, loc="left")
-    bar = figure.colorbar(ScalarMappable(Normalize(0, top), COLOURS), ax=chart, aspect=28, pad=0.02)
-    bar.ax.tick_params(labelsize=TICK)
-    bar.ax.set_title("$q\\,/\\,(fp_0)$", fontsize=TICK)
+    title(chart, f"$Q/(fP)$ = {SHARE:g}")
 
     a, c = contact.contact_radii[centre], state.stick_radii[centre]
-    middle = contact.scene.contact_points[centre]
     x = np.unique(np.concatenate((a * towards_rim(), c * towards_rim())))
-    line = middle + np.column_stack((x, np.zeros_like(x)))
+    line = contact.scene.contact_points[centre] + np.column_stack((x, np.zeros_like(x)))
     if c > 0:
         profile.axvspan(-c / a, c / a, fc=STICK, alpha=0.5, lw=0, label="stick disc")
-    fp = checks.friction(contact.scene.friction) * fields.pressure(contact, line) / unit
+    fp = unit.of(checks.friction(contact.scene.friction) * fields.pressure(contact, line))
     profile.plot(x / a, fp, ls=DASHED, lw=1.2, color=SMOOTH, label="$fp$")
-    profile.plot(x / a, fields.traction(state, line) / unit, lw=1.4, color=ROUGH, label="$q$")
+    profile.plot(x / a, unit.of(fields.traction(state, line)), lw=1.4, color=ROUGH, label="$q$")
     profile.set(xlim=(-1.08, 1.08), ylim=(0.0, 1.06 * fp.max()))
+    title(profile, "central asperity")
     across = f"$x\\,/\\,a_i$  ($a_i$ = {quantity(a, scale.length_unit)})"
-    profile.set_title("central asperity", fontsize=TICK, loc="left")
-    label(profile, across, _traction_label(unit, scale))
+    label(profile, across, unit.label("q"))
     legend_above(profile)
     return figure
 
 
-def _traction_unit(state: ShearState, scale: Scale) -> float:
-    """f p0 [force / length^2]."""
-    return checks.friction(state.contact.scene.friction) * scale.pressure
-
-
-def _traction_label(unit: float, scale: Scale) -> str:
-    return f"$q\\,/\\,(fp_0)$  ($fp_0$ = {quantity(unit, scale.pressure_unit)})"
-
-
-def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: float) -> float:
+def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) -> None:
     """Each traction as a stack of discs, from the rim to the stick disc and on to the centre.
 
-    Radii go by equal steps of the pressure's shape, and of the same shape on the stick disc. The
-    result is the largest traction [unit], the top of the colours.
+    Radii go by equal steps of the pressure's shape, and of the same shape on the stick disc.
     """
     contact = state.contact
     touching = contact.loads > 0
-    centres, a = contact.scene.contact_points[touching], contact.contact_radii[touching]
-    c = np.where(state.status[touching] == "sliding", 0.0, state.stick_radii[touching])
-    steps = int(np.clip(1000 // len(a), 8, 24))
+    a, c = contact.contact_radii, np.where(state.status == "sliding", 0.0, state.stick_radii)
+    steps = int(np.clip(1000 // touching.sum(), 8, 24))
+    slip = np.sqrt(1.0 - np.divide(c, a, out=np.zeros(len(a)), where=touching) ** 2)
+
+    def radii(s: Any) -> Any:
+        return np.concatenate((a * np.sqrt(1.0 - (slip * s) ** 2), c * np.sqrt(1.0 - s**2)))
+
     s = np.arange(steps)[:, None] / steps
-    slip = np.sqrt(1.0 - (c / a) ** 2)  # the shape at the edge of the stick disc
-    outer = np.concatenate((a * np.sqrt(1.0 - (slip * s) ** 2), c * np.sqrt(1.0 - s**2)))
-    s = s + 0.5 / steps
-    mid = np.concatenate((a * np.sqrt(1.0 - (slip * s) ** 2), c * np.sqrt(1.0 - s**2)))
-    places = np.stack((centres[:, 0] + mid, np.broadcast_to(centres[:, 1], mid.shape)), axis=2)
-    tractions = np.abs(fields.traction(state, places)) / unit
-    top = float(tractions.max())
-    colours = ScalarMappable(Normalize(0.0, top), COLOURS)
-    for k, (radii, shown) in enumerate(zip(outer, tractions, strict=True)):
-        word = "contact discs" if k == 0 else "_inner discs"
-        some = radii > 0
-        look = {"facecolors": colours.to_rgba(shown[some]), "linewidths": 0}
-        draw_discs(axes, centres[some] / scale.length, radii[some] / scale.length, word, **look)
-    return top
+    middle = radii(s + 0.5 / steps)[..., None] * (1.0, 0.0) + contact.scene.contact_points
+    tractions = unit.of(np.abs(fields.traction(state, middle)))
+    colours = ScalarMappable(Normalize(0.0, float(tractions[:, touching].max())), COLOURS)
+    layers = [
+        Layer("contact discs", np.where(touching, outer, 0.0), shades, None)
+        for outer, shades in zip(radii(s), colours.to_rgba(tractions), strict=True)
+    ]
+    draw_contact(axes, scale, layers)
+    bar(axes, colours, unit.short("q"), above=True)
 
 
-def _section_figure(state: ShearState, scale: Scale) -> Figure:
+def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
     """f p and q along y = 0, of the asperities and of the smooth sphere."""
     contact, sphere = state.contact, smooth(state.contact.scene, load=state.contact.load)
     figure = Figure(figsize=(DOUBLE, 2.9), layout="constrained")
     axes = figure.subplots()
-    unit = _traction_unit(state, scale)
-    edge = map_edge(contact, scale)
-    points = contact.scene.contact_points
-    x = np.union1d(
-        abscissae(points, contact.contact_radii, edge * scale.length),
-        abscissae(points, state.stick_radii, edge * scale.length),
-    )
+    points, radii = contact.scene.contact_points, contact.contact_radii
+    edge = 1.06 * max(scale.typical, float((np.hypot(*points.T) + radii)[contact.loads > 0].max()))
+    x = np.union1d(abscissae(points, radii, edge), abscissae(points, state.stick_radii, edge))
     line = np.column_stack((x, np.zeros_like(x)))
-    fp = checks.friction(contact.scene.friction) * fields.pressure(contact, line) / unit
-    q = fields.traction(state, line) / unit
-    x = x / scale.length
-    axes.fill_between(x, fp, fc=(ROUGH, 0.15), ec=ROUGH, lw=0.8, label="asperities: $fp$")
-    axes.fill_between(x, q, fc=(ROUGH, 0.65), ec=ROUGH, lw=0.8, label="asperities: $q$")
-    s = np.union1d(towards_rim(), towards_rim() * sphere.stick_radius(state.force) / scale.length)
-    smooth_q = sphere.traction(np.abs(s) * scale.length, state.force) / unit
-    axes.plot(s, np.sqrt(1.0 - s**2), ls=DASHED, lw=1.3, color=SMOOTH, label="smooth sphere: $fp$")
-    axes.plot(s, smooth_q, ls=(0, (1, 1)), lw=1.5, color=SMOOTH, label="smooth sphere: $q$")
-    axes.set(xlim=(-edge, edge), ylim=(0.0, 1.05 * max(1.0, float(fp.max()))))
-    label(axes, scale.length_label("x"), _traction_label(unit, scale))
-    axes.set_title(f"$y$ = 0, $Q/(fP)$ = {SHARE:g}", fontsize=TICK, loc="left")
+    f = checks.friction(contact.scene.friction)
+    fp, q = unit.of(f * fields.pressure(contact, line)), unit.of(fields.traction(state, line))
+    across = scale.length.of(x)
+    axes.fill_between(across, fp, fc=(ROUGH, 0.15), ec=ROUGH, lw=0.8, label="asperities: $fp$")
+    axes.fill_between(across, q, fc=(ROUGH, 0.65), ec=ROUGH, lw=0.8, label="asperities: $q$")
+    s = scale.typical * towards_rim()
+    s = np.union1d(s, towards_rim() * sphere.stick_radius(state.force))
+    smooth_fp, smooth_q = f * sphere.pressure(np.abs(s)), sphere.traction(np.abs(s), state.force)
+    for values, ls, name in ((smooth_fp, DASHED, "$fp$"), (smooth_q, DOTTED, "$q$")):
+        axes.plot(scale.length.of(s), unit.of(values), ls=ls, lw=1.4, color=SMOOTH,
+                  label=f"smooth sphere: {name}")  # fmt: skip
+    most = max(float(unit.of(f * scale.peak)), float(fp.max()))
+    axes.set(xlim=(-scale.length.of(edge), scale.length.of(edge)), ylim=(0.0, 1.05 * most))
+    label(axes, scale.length.label("x"), unit.label("q"))
+    title(axes, f"$y$ = 0, $Q/(fP)$ = {SHARE:g}")
     legend_above(axes, ncols=4)
     return figure
 
 
-def _no_contact(contact: Contact, length_unit: str, force_unit: str) -> dict[str, Figure]:
-    amplitude = "amplitude of $Q$"
-    return {
-        "fig3_pressure": pressure_figure(contact, Scale.of(contact, length_unit, force_unit)),
-        "fig4_rings": no_contact_figure(("$x$", "$y$"), ("$Q$", "ring")),
-        "fig5_traction": no_contact_figure(("$x$", "$y$"), ("$x$", "traction")),
-        "fig6_section": no_contact_figure(("$x$", "traction")),
-        "fig7_asperities": no_contact_figure(("$Q$", "$Q_i$"), ("$Q$", "$X_i$ + slip")),
-        "fig8_loops": no_contact_figure(("$X$", "$Q$"), ("$X_i$ + slip", "$Q_i$")),
-        "fig9_energy": no_contact_figure((amplitude, "$W$")),
-    }
+def _no_contact(scale: Scale) -> Figures:
+    return Figures(
+        fig3_pressure=pressure_figure(scale),
+        fig4_rings=no_contact_figure(("$x$", "$y$"), ("$Q$", "ring")),
+        fig5_traction=no_contact_figure(("$x$", "$y$"), ("$x$", "traction")),
+        fig6_section=no_contact_figure(("$x$", "traction")),
+        fig7_asperities=no_contact_figure(("$Q$", "$Q_i$"), ("$Q$", "$X_i$ + slip")),
+        fig8_loops=no_contact_figure(("$X$", "$Q$"), ("$X_i$ + slip", "$Q_i$")),
+        fig9_energy=no_contact_figure(("amplitude of $Q$", "$W$")),
+    )

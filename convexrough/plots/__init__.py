@@ -1,25 +1,30 @@
 """Figures of every stage, fit to print.
 
-`..._figures` return figures by the stem of the file each belongs in; units are only said, never
-converted. No global state of matplotlib is touched: save a figure, or show it in a notebook. Discs
-of dense scenes are pixels inside a vector file: save that with a `dpi` too.
+`..._figures` return figures by the stem of the file each belongs in. Where units are named, axes
+are in SI with prefixes. No global state of matplotlib is touched: `save` a figure, or show it in a
+notebook. Discs of dense scenes are pixels inside a vector file: save that with a `dpi` too.
 
 `plot` draws the main picture of any result into axes of your own; `contact.plot()` is the same.
 """
 
-from convexrough.plots.axes import plot
+from convexrough.plots.axes import plot, thumbnail
+from convexrough.plots.between import between
 from convexrough.plots.closed_path import phase_figures, steady_figures
 from convexrough.plots.cycle import cycle_figures
+from convexrough.plots.fretting import fretting_figures
 from convexrough.plots.gradient import gradient_figures
-from convexrough.plots.history import history_figures
-from convexrough.plots.path import path_figures
+from convexrough.plots.notebook import save
+from convexrough.plots.path import history_figures, path_figures
 from convexrough.plots.press import press_figures
 from convexrough.plots.shakedown import shakedown_figures
 from convexrough.plots.shear import shear_figures
 from convexrough.plots.surface import provability_figure, surface_figures
+from convexrough.plots.verdict import verdict_figures
 
 __all__ = [
+    "between",
     "cycle_figures",
+    "fretting_figures",
     "gradient_figures",
     "history_figures",
     "path_figures",
@@ -27,8 +32,11 @@ __all__ = [
     "plot",
     "press_figures",
     "provability_figure",
+    "save",
     "shakedown_figures",
     "shear_figures",
     "steady_figures",
     "surface_figures",
+    "thumbnail",
+    "verdict_figures",
 ]

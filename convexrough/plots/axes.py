@@ -1,4 +1,4 @@
-"""The main picture of a result in axes of one's own, among other things."""
+"""The main picture of a result in axes of one's own."""
 
 from __future__ import annotations
 
@@ -9,41 +9,49 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from convexrough.arrays import Array
 from convexrough.compare import Comparison
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.cycle import Cycle
-from convexrough.friction.path import History, LoadPath
+from convexrough.friction.fretting import Fretting
+from convexrough.friction.path import History, LoadPath, Path
 from convexrough.friction.phases import PhaseLosses
 from convexrough.friction.shear import ShearState
 from convexrough.friction.side_by_side import PathComparison
 from convexrough.gradients.gradient import Gradient
 from convexrough.melan.shakedown import Shakedown
+from convexrough.plots.asperity_map import (
+    Layer,
+    draw_contact,
+    draw_map,
+    even_radii,
+    status_handles,
+    status_layers,
+)
+from convexrough.plots.between import between
 from convexrough.plots.closed_path import draw_losses
-from convexrough.plots.cycle import few_ticks, smooth_loop
+from convexrough.plots.cycle import draw_loop, smooth_loop
+from convexrough.plots.fretting import draw_slip
 from convexrough.plots.gradient import draw_gradient
-from convexrough.plots.history import between_steps
 from convexrough.plots.load_plane import draw_closed, draw_curve, draw_path
-from convexrough.plots.notebook import Figure
-from convexrough.plots.press import draw_pressure, draw_pressure_bar
+from convexrough.plots.measure import Scale, measure
+from convexrough.plots.notebook import Figure, image_tag
+from convexrough.plots.path import draw_loop as draw_path_loop
+from convexrough.plots.press import draw_pressure
 from convexrough.plots.shakedown import draw_factors
 from convexrough.plots.shear import State, draw_state, legend_handles, state_title
 from convexrough.plots.style import (
-    DASHED,
     ROUGH,
     SINGLE,
-    SMOOTH,
     TICK,
     UNSURE,
-    Scale,
-    ShearScale,
+    few_ticks,
     label,
-    literal,
-    say_no_contact,
+    legend_below,
+    say_nothing,
 )
-from convexrough.plots.surface import draw_provability, draw_summits, draw_surface
+from convexrough.plots.surface import SUMMIT, draw_provability, draw_surface
 from convexrough.plots.verdict import draw_claim
 from convexrough.surface.provability import Provability
 from convexrough.surface.summits import Summits
@@ -58,13 +66,13 @@ def plot(
     """Draw the main picture of a result, and return the axes it is in.
 
     result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
-        Cycle: its loop, or the plane of loads where P varies; History: its path, Q against X;
-        Gradient: map of who matters; Verdict: map of who is not as claimed; Comparison: what each
-        solver took; LoadPath, MemoryCurve: the plane of loads; PhaseLosses: loss against phase;
-        Shakedown: map of the factors; PathComparison: what each way took; Surface, Summits: map;
-        Provability: contacts by pruning
+        Cycle: its loop, or the plane of loads where P varies; Fretting: map of slip amplitudes;
+        History: its path, Q against X; Gradient: map of derivatives; Verdict: map of asperities
+        that are not as claimed; Comparison, PathComparison: what each solver or method took;
+        LoadPath, MemoryCurve: the plane of loads; PhaseLosses: loss against phase; Shakedown: map
+        of the factors; Surface, Summits: map; Provability: contacts by pruning
     axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
-    length_unit, force_unit : only said, never converted
+    length_unit, force_unit : of the scene; where they are named, axes are in SI units with prefixes
 
     Raises InputError for anything else.
     """
@@ -73,146 +81,140 @@ def plot(
         raise InputError("result", found=f"type {type(result).__name__}", expected=expected)
     if axes is None:
         axes = Figure(figsize=(SINGLE, 3.2), layout="constrained").subplots()
-    _draw(result, axes, length_unit, force_unit)
+    contact = getattr(result, "contact", result)
+    if isinstance(contact, Contact) and not contact.loads.any():
+        say_nothing(axes)
+    else:
+        _draw(result, axes, length_unit, force_unit)
     return axes
 
 
+def thumbnail(result: object) -> str:
+    """A small picture of a result as an image of HTML: of a cycle or a path a map of its status."""
+    figure = Figure(figsize=(SINGLE, 3.0), layout="constrained")
+    axes = figure.subplots()
+    if isinstance(result, (Cycle, Path)) and result.contact.loads.any() and len(result.forces):
+        status = result.status if isinstance(result, Cycle) else result.status[-1]
+        scale, radii = Scale(result.contact), result.contact.contact_radii
+        draw_contact(axes, scale, status_layers(status, radii))
+        legend_below(axes, handles=status_handles(np.unique(status)))
+    else:
+        plot(result, axes)
+    return image_tag(type(result).__name__, figure, 80)
+
+
 @singledispatch
-def _draw(result: Any, axes: Axes, length_unit: str, force_unit: str) -> None:
+def _draw(result: Any, axes: Axes, *units: str) -> None:
     """What `plot` does for each kind of result."""
 
 
 @_draw.register
-def _(contact: Contact, axes: Axes, length_unit: str, force_unit: str) -> None:
-    if not contact.loads.any():
-        return say_no_contact(axes)
-    scale = Scale.of(contact, length_unit, force_unit)
-    colours, _ = draw_pressure(axes, contact, scale)
-    label(axes, scale.length_label("x"), scale.short("y"))
-    return draw_pressure_bar(axes, contact, colours, scale)
+def _(contact: Contact, axes: Axes, *units: str) -> None:
+    draw_pressure(axes, Scale(contact, *units))
 
 
 @_draw.register(ShearState)
 @_draw.register(VectorShearState)
-def _(state: State, axes: Axes, length_unit: str, force_unit: str) -> None:
-    if not state.contact.loads.any():
-        return say_no_contact(axes)
-    scale = Scale.of(state.contact, length_unit, force_unit)
-    friction = ShearScale.of(state.contact, length_unit, force_unit)
+def _(state: State, axes: Axes, *units: str) -> None:
+    scale = Scale(state.contact, *units)
     draw_state(axes, state, scale)
-    axes.set_title(state_title(state, friction, narrow=False), fontsize=TICK)
-    label(axes, scale.length_label("x"), scale.short("y"))
-    handles = legend_handles(state.contact, [state], scale)
-    axes.legend(handles=handles, fontsize=TICK - 2, ncols=2, frameon=False,
-                loc="upper center", bbox_to_anchor=(0.5, -0.2))  # fmt: skip
-    return None
+    axes.set_title(state_title(state, scale, narrow=False), fontsize=TICK)
+    legend_below(axes, handles=legend_handles([state], scale))
 
 
 @_draw.register
-def _(cycle: Cycle, axes: Axes, length_unit: str, force_unit: str) -> None:
-    if not cycle.contact.loads.any():
-        return say_no_contact(axes)
+def _(cycle: Cycle, axes: Axes, *units: str) -> None:
     if np.ptp(cycle.loads) > 0:
-        return draw_closed(axes, cycle, force_unit)
-    scale = ShearScale.of(cycle.contact, length_unit, force_unit)
+        return draw_closed(axes, cycle, units[1])
+    scale = Scale(cycle.contact, *units)
     loop = cycle.loop(asperities=[])
-    _against(axes, scale, loop.displacements, loop.forces, color=ROUGH, label="asperities")
+    draw_loop(axes, scale, loop.displacements, loop.forces)
     if scale.sphere is not None:
-        look = {"color": SMOOTH, "ls": DASHED, "label": scale.name}
-        _against(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, **look)
+        draw_loop(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, smooth=True)
     axes.legend(fontsize=TICK, frameon=False, loc="upper left")
-    return None
+    return label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
 @_draw.register
-def _(past: History, axes: Axes, length_unit: str, force_unit: str) -> None:
-    if not past.contact.loads.any():
-        return say_no_contact(axes)
-    scale = ShearScale.of(past.contact, length_unit, force_unit)
-    x, q, _ = between_steps(past)[1:]
-    return _against(axes, scale, x, q, color=ROUGH)
+def _(past: History, axes: Axes, *units: str) -> None:
+    draw_path_loop(axes, past, Scale(past.contact, *units), between(past))
 
 
 @_draw.register
-def _(gradient: Gradient, axes: Axes, length_unit: str, force_unit: str) -> None:
-    draw_gradient(axes, gradient, Scale.of(gradient.contact, length_unit, force_unit))
+def _(gradient: Gradient, axes: Axes, *units: str) -> None:
+    draw_gradient(axes, gradient, Scale(gradient.contact, *units))
 
 
 @_draw.register
-def _(verdict: Verdict, axes: Axes, length_unit: str, force_unit: str) -> None:
-    draw_claim(axes, verdict, verdict.scene.asperities.positions, length_unit)
+def _(fretting: Fretting, axes: Axes, *units: str) -> None:
+    draw_slip(axes, fretting, Scale(fretting.contact, *units))
 
 
 @_draw.register
-def _(comparison: Comparison, axes: Axes, length_unit: str, force_unit: str) -> None:
-    """Solvers from above in the order of their entries; those without an answer say so."""
-    for place, entry in enumerate(comparison.entries):
-        if entry.contact is None:
-            axes.text(0.02, place, entry.outcome, transform=axes.get_yaxis_transform(),
+def _(verdict: Verdict, axes: Axes, *units: str) -> None:
+    draw_claim(axes, verdict, verdict.scene.asperities.positions, units[0])
+
+
+@_draw.register
+def _(comparison: Comparison, axes: Axes, *units: str) -> None:
+    entries = comparison.entries
+    _draw_times(
+        axes, [(e.solver, e.contact.seconds if e.contact else None, e.outcome) for e in entries]
+    )
+
+
+@_draw.register
+def _(comparison: PathComparison, axes: Axes, *units: str) -> None:
+    rows = [(e.way, e.seconds if e.path else None, e.outcome) for e in comparison.entries]
+    _draw_times(axes, rows)
+
+
+def _draw_times(axes: Axes, rows: Sequence[tuple[str, Any, str]]) -> None:
+    """From above, what each took [s]; those without an answer say why."""
+    for place, (_, seconds, outcome) in enumerate(rows):
+        if seconds is None:
+            axes.text(0.02, place, outcome, transform=axes.get_yaxis_transform(),
                       va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
         else:
-            axes.plot(entry.contact.seconds, place, "o", color=ROUGH)
-    _name_rows(axes, [entry.solver for entry in comparison.entries])
-
-
-def _name_rows(axes: Axes, names: Sequence[str]) -> None:
-    axes.set(xscale="log", ylim=(len(names) - 0.5, -0.5))
-    axes.set_yticks(range(len(names)), names, fontsize=TICK)
+            axes.plot(seconds, place, "o", color=ROUGH)
+    axes.set(xscale="log", ylim=(len(rows) - 0.5, -0.5))
+    axes.set_yticks(range(len(rows)), [name for name, *_ in rows], fontsize=TICK)
     few_ticks(axes.xaxis)
     label(axes, "time [s]", "")
 
 
 @_draw.register
-def _(path: LoadPath, axes: Axes, length_unit: str, force_unit: str) -> None:
-    draw_path(axes, path, force_unit)
+def _(path: LoadPath, axes: Axes, *units: str) -> None:
+    draw_path(axes, path, units[1])
 
 
 @_draw.register
-def _(curve: MemoryCurve, axes: Axes, length_unit: str, force_unit: str) -> None:
-    draw_curve(axes, curve, force_unit)
+def _(curve: MemoryCurve, axes: Axes, *units: str) -> None:
+    draw_curve(axes, curve, units[1])
 
 
 @_draw.register
-def _(losses: PhaseLosses, axes: Axes, length_unit: str, force_unit: str) -> None:
-    draw_losses(axes, losses, length_unit, force_unit)
+def _(losses: PhaseLosses, axes: Axes, *units: str) -> None:
+    draw_losses(axes, losses, *units)
 
 
 @_draw.register
-def _(comparison: PathComparison, axes: Axes, length_unit: str, force_unit: str) -> None:
-    """What each way took, from above; those without an answer say so."""
-    for place, entry in enumerate(comparison.entries):
-        if entry.path is None:
-            axes.text(0.02, place, entry.outcome, transform=axes.get_yaxis_transform(),
-                      va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
-        else:
-            axes.plot(entry.seconds, place, "o", color=ROUGH)
-    _name_rows(axes, [entry.way for entry in comparison.entries])
+def _(limit: Shakedown, axes: Axes, *units: str) -> None:
+    draw_factors(axes, limit, units[0])
 
 
 @_draw.register
-def _(limit: Shakedown, axes: Axes, length_unit: str, force_unit: str) -> None:
-    draw_factors(axes, limit, length_unit)
-
-
-@_draw.register
-def _(surface: Surface, axes: Axes, length_unit: str, force_unit: str) -> None:
+def _(surface: Surface, axes: Axes, *units: str) -> None:
     draw_surface(axes, surface)
 
 
 @_draw.register
-def _(summits: Summits, axes: Axes, length_unit: str, force_unit: str) -> None:
-    draw_summits(axes, summits.positions)
-    unit = f"  [{literal(summits.origin.unit)}]" if summits.origin.unit else ""
-    label(axes, f"$x${unit}", f"$y${unit}")
-    axes.set_aspect("equal")
+def _(summits: Summits, axes: Axes, *units: str) -> None:
+    every = np.ones(len(summits), dtype=bool)
+    layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
+    draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
 
 
 @_draw.register
-def _(curve: Provability, axes: Axes, length_unit: str, force_unit: str) -> None:
+def _(curve: Provability, axes: Axes, *units: str) -> None:
     draw_provability(axes, curve)
-
-
-def _against(axes: Axes, scale: ShearScale, x: Array, q: Array, **look: Any) -> None:
-    """Q against X, as parts of f P and X0."""
-    axes.plot(x / scale.displacement, q / scale.force, lw=1.2, **look)
-    label(axes, scale.displacement_label(), f"$Q\\,/\\,(fP)$  ({scale.limit()})")

@@ -1,4 +1,4 @@
-"""Steady cycles and histories: hysteresis loops, and the energy they cost."""
+"""Steady cycles: hysteresis loops, the energy they cost, and fretting."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.figure import Figure as MatplotlibFigure
-from matplotlib.patheffects import withStroke
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from convexrough.arrays import Array
 from convexrough.friction.cycle import Cycle, Loop
 from convexrough.friction.cycle import loops as steady_loops
+from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     DASHED,
@@ -24,12 +21,13 @@ from convexrough.plots.style import (
     ROUGH,
     SMOOTH,
     TICK,
-    Scale,
-    ShearScale,
+    few_ticks,
     label,
+    legend_outside,
     no_contact_figure,
     round_ticks,
     say_nothing,
+    title,
 )
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.sphere import mindlin
@@ -52,7 +50,7 @@ def cycle_figures(
     """The figures of steady cycles of one contact.
 
     loops      : of each cycle, where they are known; else they are computed
-    asperities : whose loops to show; default: one at each distance from the axis, at most 6
+    asperities : whose loops to show; default: one at each distance from the centre, at most 6
 
     "hysteresis" : the loops of the cycles, with the smooth sphere's; of more than 4 cycles, those
         of about the whole, 3/4, 1/2 and 1/4 of the widest range. And of chosen asperities in the
@@ -69,20 +67,18 @@ def cycle_figures(
         if several:
             figures["loss"] = no_contact_figure(("amplitude of $Q$", "$W$"))
         return figures
-    lengths = Scale.of(contact, length_unit, force_unit)
-    scale = ShearScale.of(contact, length_unit, force_unit)
+    scale = Scale(contact, length_unit, force_unit)
     by_range = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
-    distances = np.hypot(*contact.scene.contact_points.T)
-    if asperities is None:
-        known = np.arange(len(distances)) if loops is None else loops[0].asperities
-        asperities = one_of_each_ring(distances[known], contact.loads[known], MOST_ASPERITIES)
-        asperities = known[asperities].tolist()
-    names = [f"{r:.2f}" for r in distances[list(asperities)] / lengths.length]
+    r = np.hypot(*(contact.scene.contact_points - scale.centre).T)
+    known = np.arange(len(r)) if loops is None else loops[0].asperities
+    rings = one_of_each_ring(r[known], contact.loads[known], MOST_ASPERITIES)
+    chosen = known[rings].tolist() if asperities is None else list(asperities)
+    names = [f"{scale.length.of(each):.3g}" for each in r[chosen]]
     shown = _spread([cycles[i].force_amplitude for i in by_range])
     some = [cycles[by_range[i]] for i in shown]
     theirs = None if loops is None else [loops[by_range[i]] for i in shown]
-    meaning = lengths.short("r")
-    figure = loops_figure(some, asperities, names, meaning, scale, theirs, len(cycles))
+    meaning = scale.length.short("r")
+    figure = loops_figure(some, chosen, names, meaning, scale, theirs, len(cycles))
     figures = Figures({"hysteresis": figure})
     if several:
         figures["loss"] = _loss_figure([cycles[i] for i in by_range], scale)
@@ -106,11 +102,11 @@ def loops_figure(
     asperities: Sequence[int],
     names: Sequence[str],
     meaning: str,
-    scale: ShearScale,
+    scale: Scale,
     loops: Sequence[Loop] | None = None,
     count: int = 0,
 ) -> Figure:
-    """Loops of the contact, the same sheared upright, and of single asperities in the last cycle.
+    """Loops of the contact, the same less an elastic part, and of asperities in the last cycle.
 
     names, meaning : entries and title of the legend of the asperities
     loops : of the cycles, with those of the asperities;  count : of cycles from which these are
@@ -118,60 +114,49 @@ def loops_figure(
     loops = steady_loops(cycles, POINTS, None, asperities) if loops is None else loops
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     whole, upright, single = figure.subplots(1, 3, width_ratios=[1, 1, 1.1])
+    x, q = scale.displacement, scale.force
     for cycle, loop in zip(cycles, loops, strict=True):
-        forces = _around(cycle, POINTS)
-        rough = loop.displacements / scale.displacement
-        up, smooth_up = loop.forces / scale.force, forces / scale.force
-        for axes, elastic in ((whole, 0.0), (upright, 2.0 / 3.0)):
-            look: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "label": "asperities"}
-            axes.plot(rough - elastic * up, up, **look)
+        for axes, slope in ((whole, 0.0), (upright, 2.0 / 3.0 * scale.travel / scale.limit)):
+            draw_loop(axes, scale, loop.displacements, loop.forces, slope)
             if scale.sphere is not None:
-                smooth = smooth_loop(scale.sphere, forces) / scale.displacement
-                look = {"color": SMOOTH, "lw": 1.0, "ls": DASHED}
-                look["label"] = scale.name
-                axes.plot(smooth - elastic * smooth_up, smooth_up, **look)
-        _name(upright, rough[0] - 2.0 / 3.0 * up[0], up[0], _range(cycle, scale))
-    label(whole, "$X\\,/\\,X_0$", "$Q\\,/\\,(fP)$")
-    label(upright, r"$X\,/\,X_0 - \frac{2}{3}\,Q\,/\,(fP)$", "")
+                forces = _around(cycle, POINTS)
+                moved = smooth_loop(scale.sphere, forces)
+                draw_loop(axes, scale, moved, forces, slope, smooth=True)
+        end = loop.displacements[0] - slope * loop.forces[0]
+        upright.annotate(_range(cycle, scale), (x.of(end), q.of(loop.forces[0])), xytext=(0, 2),
+                         textcoords="offset points", fontsize=7, ha="center",
+                         va="bottom")  # fmt: skip
+    label(whole, x.short("X"), q.short("Q"))
+    label(upright, x.short("X - Q/k") if x.said and not x.symbol
+          else f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$", "")  # fmt: skip
     upright.sharey(whole)
     upright.tick_params(labelleft=False)
+    upright.margins(y=0.1)
     which = f": {len(cycles)} of {count} cycles" if count > len(cycles) else ""
-    whole.set_title(f"whole contact{which}", fontsize=TICK, loc="left")
-    upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
-    upright.set_title("less the smooth elastic part", fontsize=TICK, loc="left")
+    title(whole, f"whole contact{which}")
+    title(upright, "less an elastic part")
     _draw_asperity_loops(single, loops[-1], asperities, names, cycles[-1], scale)
-    title = f"asperities, $Q/(fP)$ = {_range(cycles[-1], scale)}"
-    single.set_title(title, fontsize=TICK, loc="left")
-    single.legend(
-        title=meaning,
-        loc="center left",
-        bbox_to_anchor=(1.0, 0.5),
-        fontsize=TICK,
-        title_fontsize=TICK,
-        frameon=False,
-        handlelength=2.4,
-        handletextpad=0.5,
-        borderpad=0.2,
-    )
+    title(single, f"asperities, $Q/(fP)$ = {_range(cycles[-1], scale)}")
+    single.legend(title=meaning, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=TICK,
+                  title_fontsize=TICK, frameon=False, handlelength=2.4, handletextpad=0.5,
+                  borderpad=0.2)  # fmt: skip
     for axes in (whole, upright, single):
-        axes.xaxis.set_major_locator(round_ticks(5))
-    _legend(figure, whole)
-    figure.supxlabel(f"{scale.footnote()},   $s_i$: gross slip", fontsize=TICK)
+        axes.xaxis.set_major_locator(round_ticks(4))
+    handles = {line.get_label(): line for line in reversed(whole.lines)}
+    legend_outside(figure, list(handles.values())[::-1], "upper left", 2)
+    elastic = ",   $k = 3fP/(2X_0)$" if x.said and not x.symbol else ""
+    figure.supxlabel(f"{scale.footnote()},   $s_i$: gross slip{elastic}", fontsize=TICK)
     return figure
 
 
-def _name(axes: Axes, x: float, y: float, text: str) -> None:
-    """The range of a loop, to the right of its upper end."""
-    axes.annotate(
-        text,
-        (x, y),
-        xytext=(4, 2),
-        textcoords="offset points",
-        fontsize=7,
-        ha="left",
-        va="center",
-        path_effects=[withStroke(linewidth=2.0, foreground="white")],
-    )
+def draw_loop(
+    axes: Axes, scale: Scale, X: Array, Q: Array, slope: float = 0.0, *, smooth: bool = False
+) -> None:
+    """Q against X less a slope times Q, of the asperities or of the smooth contact."""
+    rough: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "label": "asperities"}
+    other: dict[str, Any] = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": scale.name}
+    look = other if smooth else rough
+    axes.plot(scale.displacement.of(X - slope * Q), scale.force.of(Q), **look)
 
 
 def _around(cycle: Cycle, points: int) -> Array:
@@ -203,22 +188,18 @@ def _draw_asperity_loops(
     asperities: Sequence[int],
     names: Sequence[str],
     cycle: Cycle,
-    scale: ShearScale,
+    scale: Scale,
 ) -> None:
-    """Q_i / (f P_i) against (X_i + slip_i) / X0: an asperity that slides runs along +-1."""
-    limits = scale.force * cycle.contact.loads / cycle.contact.load
+    """Q_i / (f P_i) against X_i + slip_i: an asperity that slides runs along +-1."""
+    limits = scale.limit * cycle.contact.loads / cycle.contact.load
     kept = loop.asperities.tolist()
     for order, (i, name) in enumerate(zip(asperities, names, strict=True)):
         at = kept.index(i)
-        axes.plot(
-            loop.asperity_displacements[:, at] / scale.displacement,
-            loop.asperity_forces[:, at] / limits[i],
-            lw=1.1,
-            ls=DASHES[order % len(DASHES)],
-            color=ring_colour(order, len(asperities)),
-            label=name,
-        )
-    label(axes, "$(X_i + s_i)\\,/\\,X_0$", "$Q_i\\,/\\,(fP_i)$")
+        moved = scale.displacement.of(loop.asperity_displacements[:, at])
+        axes.plot(moved, loop.asperity_forces[:, at] / limits[i], lw=1.1, label=name,
+                  ls=DASHES[order % len(DASHES)],
+                  color=ring_colour(order, len(asperities)))  # fmt: skip
+    label(axes, scale.displacement.short("(X_i + s_i)"), "$Q_i\\,/\\,(fP_i)$")
     for limit in (-1.0, 1.0):
         axes.axhline(limit, lw=0.5, color=FAINT, zorder=0.5)
 
@@ -228,72 +209,44 @@ def ring_colour(order: int, count: int) -> Any:
     return matplotlib.colormaps["viridis"](0.82 * order / max(1, count - 1))
 
 
-def _legend(figure: MatplotlibFigure, axes: Axes) -> None:
-    """Above all panels, the lines of one, each name once."""
-    figure.legend(
-        handles=list({line.get_label(): line for line in reversed(axes.lines)}.values())[::-1],
-        loc="outside upper left",
-        ncols=2,
-        fontsize=TICK,
-        frameon=False,
-        borderpad=0.2,
-    )
-
-
-def _range(cycle: Cycle, scale: ShearScale) -> str:
+def _range(cycle: Cycle, scale: Scale) -> str:
     """The range of a cycle, in fractions of f P."""
-    high, low = cycle.maximum / scale.force, cycle.minimum / scale.force
+    high, low = cycle.maximum / scale.limit, cycle.minimum / scale.limit
     if high == -low:
         return f"±{high:.4g}"
     return f"{low:.4g} to {high:.4g}".replace("-", "\u2212")
 
 
-def _loss_figure(cycles: Sequence[Cycle], scale: ShearScale) -> Figure:
+def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     """Energy against amplitude; `cycles` by amplitude."""
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     loss, ratio = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     some = [each for each in cycles if each.maximum > each.minimum]
-    amplitude = np.array([each.force_amplitude for each in some]) / scale.force
-    rough = np.array([each.loss for each in some]) / scale.energy
-    smooth = np.array([each.smooth_normalised for each in some])
-    marks: dict[str, Any] = {
-        "color": ROUGH,
-        "lw": 1.2,
-        "ms": 4 if len(some) < 30 else 2.5,
-        "mew": 0,
-        "clip_on": False,
-    }
+    amplitude = np.array([each.force_amplitude for each in some])
+    rough = np.array([each.loss for each in some])
+    marks: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "ms": 4 if len(some) < 30 else 2.5}
     marks |= {"marker": "o", "ls": ""} if len(some) < 100 else {"ls": "-"}
-
-    t = np.geomspace(min(0.7 * amplitude[0], 0.3), 1.0, 300)
+    marks |= {"mew": 0, "clip_on": False}
+    q, w = scale.force, scale.energy(float(rough.max()))
+    t = np.geomspace(min(0.7 * amplitude[0] / scale.limit, 0.3), 1.0, 300)
     if scale.sphere is not None:
-        loss.plot(t, mindlin.loss(t), ls=DASHED, lw=1.1, color=SMOOTH, label=scale.name)
-    loss.plot(amplitude, rough, label="asperities", **marks)
-    loss.set(xscale="log", yscale="log", xlim=(t[0], 1.0))
+        whole = w.of(scale.work) * mindlin.loss(t)
+        loss.plot(q.of(scale.limit) * t, whole, ls=DASHED, lw=1.1, color=SMOOTH, label=scale.name)
+    loss.plot(q.of(amplitude), w.of(rough), label="asperities", **marks)
+    ends = q.of(scale.limit)
+    loss.set(xscale="log", yscale="log", xlim=(ends * t[0], ends))
     few_ticks(loss.xaxis)
     few_ticks(loss.yaxis)
-    label(loss, f"amplitude of $Q\\,/\\,(fP)$  ({scale.limit()})", scale.energy_label())
+    label(loss, "amplitude of " + q.label("Q"), w.label("W"))
     loss.legend(loc="upper left", fontsize=TICK, frameon=False)
-    loss.set_title("energy lost per cycle", fontsize=TICK, loc="left")
-
+    title(loss, "energy lost per cycle")
     if scale.sphere is None:
         say_nothing(ratio, "no smooth reference")
         return figure
     ratio.axhline(1.0, ls=DASHED, lw=1.1, color=SMOOTH)
-    ratio.plot(amplitude, rough / smooth, **marks)
-    ratio.set(xlim=(0.0, 1.0))
-    label(ratio, "amplitude of $Q\\,/\\,(fP)$", "$W\\,/\\,W_\\mathrm{smooth}$")
-    ratio.set_title(f"the same, over the {scale.name}'s", fontsize=TICK, loc="left")
+    smooth = np.array([each.smooth_normalised for each in some]) * scale.work
+    ratio.plot(q.of(amplitude), rough / smooth, **marks)
+    ratio.set(xlim=(0.0, ends))
+    label(ratio, "amplitude of " + q.short("Q"), "$W\\,/\\,W_\\mathrm{smooth}$")
+    title(ratio, f"the same, over the {scale.name}'s")
     return figure
-
-
-def few_ticks(axis: Axis) -> None:
-    """At most 6 labelled powers of ten, or where there are too few, 2 and 5 times them too."""
-    low, high = axis.get_view_interval()
-    subs = (1.0, 2.0, 5.0) if high / low < 50 else (1.0,)
-    axis.set_major_locator(LogLocator(subs=subs, numticks=6))
-    if len(subs) == 1:
-        axis.set_major_formatter(LogFormatterSciNotation())
-    else:
-        axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())

@@ -1,29 +1,65 @@
-"""Figures that show themselves in a notebook, without pyplot and its global state."""
+"""Figures that show themselves in a notebook, and that are saved as journals want them."""
 
 from __future__ import annotations
 
 from base64 import b64encode
 from io import BytesIO
+from pathlib import Path
+from typing import Any
 
+from matplotlib import rc_context
 from matplotlib.figure import Figure as MatplotlibFigure
+
+from convexrough.errors import InputError
+
+#: What a figure can be saved as, and how fine pixels may be [per inch].
+FORMATS = ("png", "svg", "pdf")
+LEAST_DPI, MOST_DPI = 50, 600
+
+#: Text that stays text: in SVG as it is, in PDF as TrueType; no date, so that files compare.
+REAL_TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg.hashsalt": "convexrough"}
 
 
 class Figure(MatplotlibFigure):
     """A figure of matplotlib that shows itself in a notebook, without pyplot."""
 
     def _repr_png_(self) -> bytes:
-        file = BytesIO()
-        self.savefig(file, format="png", dpi=100)
-        return file.getvalue()
+        return as_png(self)
 
 
 class Figures(dict[str, MatplotlibFigure]):
     """Figures by the stem of the file each belongs in; a notebook shows them all."""
 
     def _repr_html_(self) -> str:
-        parts = []
-        for stem, figure in self.items():
-            figure.savefig(file := BytesIO(), format="png", dpi=100)
-            picture = b64encode(file.getvalue()).decode()
-            parts.append(f'<img alt="{stem}" src="data:image/png;base64,{picture}">')
-        return "<br>".join(parts)
+        return "<br>".join(image_tag(stem, figure) for stem, figure in self.items())
+
+
+def as_png(figure: MatplotlibFigure, dpi: int = 100) -> bytes:
+    figure.savefig(file := BytesIO(), format="png", dpi=dpi)
+    return file.getvalue()
+
+
+def image_tag(name: str, figure: MatplotlibFigure, dpi: int = 100) -> str:
+    """The figure as an image inside HTML."""
+    picture = b64encode(as_png(figure, dpi)).decode()
+    return f'<img alt="{name}" src="data:image/png;base64,{picture}">'
+
+
+def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200) -> None:
+    """Write a figure as PNG, SVG or PDF, whose text stays text; dpi is that of pixels in it.
+
+    Raises InputError for another format, or pixels that are too coarse or too fine.
+    """
+    check_saving((form,), dpi)
+    dates: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    with rc_context(REAL_TEXT):
+        figure.savefig(path, format=form, dpi=dpi, metadata=dates.get(form))
+
+
+def check_saving(formats: tuple[str, ...], dpi: int) -> None:
+    """Raise InputError for formats or a dpi that `save` does not know."""
+    for form in formats:
+        if form not in FORMATS:
+            raise InputError("formats", found=repr(form), expected=f"of {', '.join(FORMATS)}")
+    if not LEAST_DPI <= dpi <= MOST_DPI:
+        raise InputError("dpi", found=dpi, expected=f"from {LEAST_DPI} to {MOST_DPI}")

@@ -1,90 +1,150 @@
-"""Load paths: the load plane, the loop, energy, and maps of who sticks."""
+"""Histories and load paths: loops, the energy they cost, and maps of what sticks."""
 
 from __future__ import annotations
 
-from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap, Normalize
 
-from convexrough.friction.path import LoadPath, load_path
-from convexrough.plots.load_plane import dots, draw_path, number
+from convexrough.arrays import Array
+from convexrough.friction.path import History, LoadPath, Path
+from convexrough.plots.asperity_map import (
+    draw_map,
+    map_window,
+    status_handles,
+    status_layers,
+)
+from convexrough.plots.between import MOST_POINTS, between
+from convexrough.plots.load_plane import draw_path
+from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import DOUBLE, ROUGH, TICK, label, quantity
-from convexrough.plots.words import draw_words, word_handles
+from convexrough.plots.style import (
+    DOUBLE,
+    MOST_NUMBERS,
+    TICK,
+    bar,
+    label,
+    legend_outside,
+    mark_points,
+    no_contact_figure,
+    round_ticks,
+    shades_of,
+    title,
+)
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere import hertz
 
 MOST_MAPS = 8
 
-#: Points between two of the path at which loops are drawn, of so many asperities and segments.
-BETWEEN, MOST_BETWEEN, MOST_SEGMENTS = 8, 2000, 24
+
+def history_figures(
+    past: History, *, fine: Path | None = None, length_unit: str = "", force_unit: str = ""
+) -> Figures:
+    """The figure of a history.
+
+    fine : the same with points between its own, as `between` finds; None to find them
+
+    "history" : Q against X, its steps numbered where they are few and in darkening colours; and
+        the energy lost since the beginning against the step
+    """
+    if not past.contact.loads.any():
+        return Figures({"history": no_contact_figure(("$X$", "$Q$"), ("step", "energy lost"))})
+    scale = Scale(past.contact, length_unit, force_unit)
+    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
+    loop, cost = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
+    fine = fine or between(past)
+    draw_loop(loop, past, scale, fine)
+    draw_cost(cost, past, scale, fine)
+    title(cost, "energy lost since the beginning")
+    figure.supxlabel(scale.footnote(), fontsize=TICK)
+    return Figures({"history": figure})
 
 
-def path_figures(path: LoadPath, *, length_unit: str = "", force_unit: str = "") -> Figures:
+def path_figures(
+    path: LoadPath, *, fine: Path | None = None, length_unit: str = "", force_unit: str = ""
+) -> Figures:
     """The figures of a load path.
 
+    fine : as in `history_figures`
+
     "path" : its points in the load plane, with the memory curve at some; Q against X; energy lost
-    "path_stick_slip" : who sticks and who slides, at some of its points
+    "path_stick_slip" : which asperities stick and which slide, at some of its points
     """
-    unit = float(path.loads.max()) or 1.0
-    figure = Figure(figsize=(DOUBLE, 3.1), layout="constrained")
+    scale = Scale(path.contact, length_unit, force_unit)
+    figure = Figure(figsize=(DOUBLE, 3.2), layout="constrained")
     plane, loop, cost = figure.subplots(1, 3)
     draw_path(plane, path, force_unit)
-    fine = between_points(path)
-    travel = float(np.abs(fine.displacements).max()) or 1.0
-    f = path.scene.friction or 1.0
-    x, q = fine.displacements / travel, fine.forces / (f * unit)
-    loop.plot(np.append(0.0, x), np.append(0.0, q), color=ROUGH, lw=1.2)
-    x, q = path.displacements / travel, path.forces / (f * unit)
-    dots(loop, x, q)
-    number(loop, x, q)
-    loop.margins(0.12)
-    label(
-        loop,
-        f"$X$ / {quantity(travel, length_unit)}",
-        f"$Q\\,/\\,f$ / {quantity(unit, force_unit)}",
-    )
-    work = float(path.losses.max()) or 1.0
-    steps = np.linspace(0.0, len(path.loads), len(fine.losses) + 1)
-    cost.plot(steps, np.append(0.0, fine.losses) / work, color=ROUGH, lw=1.2)
-    dots(cost, np.arange(1.0, len(path.loads) + 1), path.losses / work)
-    name = f"{force_unit} {length_unit}".strip()
-    label(cost, "point", f"energy lost / {quantity(work, name)}")
-    cost.set_ylim(bottom=0.0)
-    return Figures({"path": figure, "path_stick_slip": _maps(path)})
+    fine = fine or between(path)
+    draw_loop(loop, path, scale, fine)
+    draw_cost(cost, path, scale, fine)
+    figure.supxlabel(scale.footnote(), fontsize=TICK)
+    return Figures({"path": figure, "path_stick_slip": _maps(path, scale)})
 
 
-def between_points(path: LoadPath) -> LoadPath:
-    """The same path with points in between, where that is affordable; loops are curved."""
-    m, n = path.asperity_forces.shape
-    if n > MOST_BETWEEN or m > MOST_SEGMENTS or path.order == "fails":
-        return path
-    corners = np.vstack(([0.0, 0.0], np.column_stack((path.loads, path.forces))))
-    parts = (np.arange(1, BETWEEN + 1) / BETWEEN)[:, None]
-    pieces = [a + parts * (b - a) for a, b in pairwise(corners)]
-    P, Q = np.concatenate(pieces).T
-    limit = (path.scene.friction or 1.0) * P
-    return load_path(path.scene, loads=P, forces=np.clip(Q, -limit, limit))
+def draw_loop(axes: Axes, path: Path, scale: Scale, fine: Path) -> None:
+    """Q against X."""
+    x, q = scale.displacement, scale.force
+    _draw_darkening(axes, path, fine, x.of(fine.displacements), q.of(fine.forces))
+    mark_points(axes, x.of(path.displacements), q.of(path.forces))
+    axes.margins(0.12)
+    label(axes, x.short("X"), q.short("Q"))
 
 
-def _maps(path: LoadPath) -> Figure:
+def draw_cost(axes: Axes, path: Path, scale: Scale, fine: Path) -> None:
+    """Energy lost since the beginning against the point."""
+    m = len(path.losses)
+    energy = scale.energy(float(path.losses.max(initial=0.0)))
+    at = np.arange(1.0, len(fine.losses) + 1) * m / max(1, len(fine.losses))
+    colours = _draw_darkening(axes, path, fine, at, energy.of(fine.losses))
+    if m <= MOST_NUMBERS:
+        axes.plot(np.arange(1.0, m + 1), energy.of(path.losses), "o", ms=3.5, color="0.15")
+    else:
+        bar(axes, colours, "step", above=True)
+    axes.set(xlim=(0, max(1, m)))
+    axes.set_ylim(bottom=0.0)
+    axes.xaxis.set_major_locator(round_ticks(8, whole=True))
+    label(axes, "step", energy.label("W"))
+
+
+def _draw_darkening(axes: Axes, path: Path, fine: Path, x: Array, y: Array) -> ScalarMappable:
+    """A curve from the origin, light first and dark last; nothing so light that it is lost."""
+    steps = max(1, len(path.forces))
+    colours = ScalarMappable(Normalize(0, steps), ListedColormap(shades_of(256, low=0.15)))
+    points = np.column_stack((np.append(0.0, x), np.append(0.0, y)))
+    pieces = list(np.stack((points[:-1], points[1:]), axis=1))
+    shades = colours.to_rgba(np.linspace(0, steps, len(pieces) + 1)[1:])
+    axes.add_collection(
+        LineCollection(pieces, colors=shades, linewidths=1.2, capstyle="round",
+                       rasterized=len(pieces) > MOST_POINTS)
+    )  # fmt: skip
+    axes.autoscale_view()
+    return colours
+
+
+def _maps(path: LoadPath, scale: Scale) -> Figure:
     chosen = evenly_chosen(range(len(path.loads)), MOST_MAPS)
     columns = min(4, len(chosen))
     rows = -(-len(chosen) // columns)
     figure = Figure(figsize=(DOUBLE, 0.5 + 1.9 * rows), layout="constrained")
     places = figure.subplots(rows, columns, squeeze=False)
-    modulus = path.scene.material.contact_modulus
+    scene, modulus = path.scene, path.scene.material.contact_modulus
+    radii = hertz.contact_radius(path.asperity_loads, modulus, scene.relative_radii)
+    window = map_window(scene.contact_points, radii[chosen].max(axis=0), scale.length)
     for axes, k in zip(places.ravel(), chosen, strict=False):
-        radii = hertz.contact_radius(path.asperity_loads[k], modulus, path.scene.relative_radii)
-        draw_words(axes, path.scene, radii, path.status[k])
+        layers = status_layers(path.status[k], radii[k])
+        draw_map(axes, scene.contact_points, layers, scale.length, window=window)
         slide = int((path.status[k] == "sliding").sum())
         touch = int((path.asperity_loads[k] > 0).sum())
         axes.set_title(f"{k + 1}: {slide:,} of {touch:,} slide", fontsize=TICK)
+        axes.set(xlabel="", ylabel="")
         axes.tick_params(labelbottom=False, labelleft=False)
     for axes in places.ravel()[len(chosen) :]:
         axes.set_axis_off()
-    handles = word_handles(np.unique(path.status[chosen]))
+    handles: Any = status_handles(np.unique(path.status[chosen]))
     if handles:
-        figure.legend(handles=handles, fontsize=TICK, frameon=False, ncols=len(handles),
-                      loc="outside lower center")  # fmt: skip
+        legend_outside(figure, handles, "lower center", len(handles))
     return figure

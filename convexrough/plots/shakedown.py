@@ -5,28 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from convexrough.arrays import Array
 from convexrough.melan.shakedown import Shakedown
+from convexrough.plots.asperity_map import Layer, draw_map, even_radii
+from convexrough.plots.measure import measure
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     COLOURS,
-    CROWDED,
     DASHED,
-    DENSE,
     FAINT,
-    LABEL,
     SINGLE,
     SMOOTH,
-    TICK,
     UNSURE,
-    draw_mosaic,
-    draw_open,
-    frame_map,
+    bar,
     label,
+    title,
 )
 
 #: Points of the map along each of its axes.
@@ -41,7 +38,7 @@ def shakedown_figures(found: Shakedown, *, length_unit: str = "", force_unit: st
         constant load, where the shear force swings about different means. Of kind "exact", where
         every onset is known
     """
-    figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
+    figure = Figure(figsize=(SINGLE + 0.7, 3.4), layout="constrained")
     draw_factors(figure.subplots(), found, length_unit)
     figures = Figures({"shakedown": figure})
     if found.kind == "exact" and len(onsets := _onsets(found)) > 1:
@@ -51,39 +48,24 @@ def shakedown_figures(found: Shakedown, *, length_unit: str = "", force_unit: st
 
 def draw_factors(axes: Axes, found: Shakedown, length_unit: str) -> None:
     """Each asperity in the shade of its factor; by "vector", which has one for all, of its slip."""
-    scene, vector = found.scene, found.kind == "vector"
-    known = np.isfinite(found.factors)
+    vector = found.kind == "vector"
+    known, points = np.isfinite(found.factors), found.scene.contact_points
     values = np.linalg.norm(found.mechanism, axis=-1).max(axis=0) if vector else found.factors
-    points = scene.contact_points
-    reach = np.hypot(*points.T)
-    edge = 1.12 * float(reach[known].max(initial=0.0) or reach.max() or 1.0)
     low, high = values[known].min(initial=np.inf), values[known].max(initial=-np.inf)
     spread = Normalize(min(low, high), high if high > low else low * 1.01 + 1e-300)
-    if int(known.sum()) >= CROWDED:
-        shades = colormaps[COLOURS](spread(np.nan_to_num(values)))
-        draw_mosaic(axes, points, shades, known, edge, 320)
-        mapped = axes.scatter([], [], c=[], cmap=COLOURS, norm=spread)
-        ringed = ""
-    else:
-        draw_open(axes, points[~known & (reach < 1.2 * edge)])
-        size = min(4.8e3 / max(8.0, float(known.sum())), 120.0)
-        look: dict[str, Any] = {"s": size, "rasterized": int(known.sum()) >= DENSE}
-        x, y = points[known].T
-        shaded: dict[str, Any] = {"c": values[known], "cmap": COLOURS, "norm": spread}
-        mapped = axes.scatter(x, y, lw=0.4, ec=SMOOTH, **shaded, **look)
-        first = known & (found.factors <= found.factor * (1 + 1e-6)) & (not vector)
-        x, y = points[first].T
-        axes.scatter(x, y, fc="none", ec=UNSURE, lw=1.4, **look)
-        ringed = "\nringed: the first to slide on" if first.any() else ""
-    frame_map(axes, edge)
-    label(axes, f"$x$ {length_unit}".strip(), f"$y$ {length_unit}".strip())
-    axes.set_title(f"{found.kind}: {found.factor:.5g}{ringed}", fontsize=TICK, loc="left")
-    if not high > low:
-        return
-    bar = axes.figure.colorbar(mapped, ax=axes, shrink=0.8)
-    what = "slip in the mechanism [1]" if vector else "factor up to which sliding ceases"
-    bar.set_label(what, fontsize=LABEL)
-    bar.ax.tick_params(labelsize=TICK)
+    colours = ScalarMappable(spread, COLOURS)
+    radii = even_radii(points, known)
+    first = known & (found.factors <= found.factor * (1 + 1e-6)) & (not vector)
+    layers = [
+        Layer("first", np.where(first, 1.25 * radii, 0.0), UNSURE, None),
+        Layer("known", radii, colours.to_rgba(np.nan_to_num(values))),
+    ]
+    draw_map(axes, points, layers, measure(float(np.ptp(points)), length_unit))
+    ringed = "\nringed: the first to slide on" if first.any() else ""
+    title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
+    if high > low:
+        what = "slip in the mechanism [1]" if vector else "factor up to which sliding ceases"
+        bar(axes, colours, what)
 
 
 def _onsets(found: Shakedown) -> Array:
@@ -134,12 +116,8 @@ def _map(found: Shakedown, onsets: Array) -> Figure:
     at = unit_p * found.factor if varies else float(found.force) / (f * found.load)
     axes.plot([at], [unit_t * found.factor], "o", ms=5, mfc="white", mec=UNSURE, mew=1.4)
     axes.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
-    bar = figure.colorbar(filled, ax=axes, shrink=0.8)
-    bar.set_label("asperities that slide on, or open", fontsize=LABEL)
-    bar.ax.tick_params(labelsize=TICK)
+    bar(axes, filled, "asperities that slide on, or open")
     across_label = "load amplitude / $P_0$" if varies else "mean shear $Q_0\\,/\\,(fP_0)$"
     label(axes, across_label, "shear amplitude / $(fP_0)$")
-    axes.set_title(
-        "hatched: gross sliding\nline: the limit; dot: of this path", fontsize=TICK, loc="left"
-    )
+    title(axes, "hatched: gross sliding\nline: the limit; dot: of this path")
     return figure

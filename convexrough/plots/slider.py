@@ -1,11 +1,15 @@
-"""The slider page: states of first loading, found and judged here, inside one HTML file.
+"""The slider page: states of first loading, found before and shown here, inside one HTML file.
 
 The page steps through these states and shows their numbers as they are. Loops are made of them by
-Masing's rule (docs/theory/paths.md); nothing else is computed there.
+Masing's rule (docs/theory/paths.md); nothing else is computed there, and nothing here.
 """
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -16,11 +20,10 @@ from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.friction.cycle import Cycle, cycles
 from convexrough.friction.path import History, history
-from convexrough.progress import tell
+from convexrough.progress import Announce
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
-from convexrough.tabular.columns import bound
 from convexrough.tabular.units import UnitNames
 
 #: Forces of the slider for up to so many touching asperities; fewer for still more.
@@ -32,20 +35,47 @@ FEWEST_FORCES = 21
 MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 
 
-def slider_data(contact: Contact, said: list[str], units: UnitNames) -> dict[str, Any]:
-    """What the page shows: lengths of the map in a_H, forces in f P, displacements in X0.
+@dataclass(frozen=True)
+class Slides:
+    """What the page steps through: first loading to each fraction of f P, and the cycle there."""
 
-    said : lines on the contact
+    contact: Contact
+    fractions: Array
+    steady: list[Cycle]
+    loading: History
+
+    @classmethod
+    def of(cls, contact: Contact, announce: Announce | None = None) -> Slides:
+        """Of a contact. Raises InputError if the scene has no friction, or another base."""
+        sphere_radius(contact.scene.sphere_radius, "slider page")
+        limit = checks.friction(contact.scene.friction) * contact.load
+        fractions = np.linspace(0.0, 1.0, _forces(int(np.count_nonzero(contact.loads))))
+        steady = cycles(contact, fractions * limit, announce=announce)
+        loading = history(contact, forces=fractions * limit, announce=announce)
+        return cls(contact, fractions, steady, loading)
+
+
+def slider_html(slides: Slides, proved: Sequence[str], units: UnitNames) -> str:
+    """The page.
+
+    proved : lines that say what is proved of the contact
+    """
+    found = json.dumps(slider_data(slides, proved, units), separators=(",", ":"))
+    template = files("convexrough.plots").joinpath("slider.html").read_text(encoding="utf-8")
+    return template.replace("{{data}}", found.replace("<", "\\u003c"))
+
+
+def slider_data(slides: Slides, proved: Sequence[str], units: UnitNames) -> dict[str, Any]:
+    """What the page shows: lengths of the map in a_H, forces in f P, displacements in X0.
 
     Numbers have the five digits that are shown. `stick` has a row per force and a column per disc:
     the stick radius in thousandths of the contact radius, 0 where sliding, -1 where undecided.
     """
-    sphere_radius(contact.scene.sphere_radius, "slider page")
+    contact, fractions, steady, loading = (
+        slides.contact, slides.fractions, slides.steady, slides.loading
+    )  # fmt: skip
     limit = checks.friction(contact.scene.friction) * contact.load
     touching = np.flatnonzero(contact.loads)
-    fractions = np.linspace(0.0, 1.0, _forces(len(touching)))
-    steady = cycles(contact, fractions * limit, announce=tell)
-    loading = history(contact, forces=fractions * limit, announce=tell)
     # Nothing is divided by nothing where no asperity touches.
     sphere = smooth(contact.scene, load=contact.load) if contact.load else None
     a_H = sphere.contact_radius if sphere else 1.0
@@ -64,7 +94,7 @@ def slider_data(contact: Contact, said: list[str], units: UnitNames) -> dict[str
         "units": units._asdict(),
         "touching": len(touching),
         "edge": _digits(edge),
-        "certificate": said,
+        "certificate": list(proved),
         "letters": _letters(limit, a_H, X0, units),
         "left_out": _left_out(len(touching), len(drawn), len(followed), len(fractions)),
         "states": _states(fractions, steady, X0, limit),
@@ -96,15 +126,14 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
         "force": _digits(fractions * limit),
         "length": _digits(moved),
         "displacement": _digits(moved / X0),
-        "displacement_error": [bound(each.displacement_error) for each in steady],
+        "displacement_error": [_bound(each.displacement_error) for each in steady],
         "loss": _digits([each.loss_normalised for each in steady]),
         "smooth_loss": _digits([each.smooth_normalised for each in steady]),
         "smooth_displacement": _digits(1.0 - stuck**2),
         "smooth_stick": _digits(stuck),
-        **{
-            word: [int((each.status == word).sum()) for each in steady]
-            for word in ("sliding", "partial", "undecided")
-        },
+        "sliding": [int((each.status == "sliding").sum()) for each in steady],
+        "partial": [int(np.isin(each.status, ("partial", "stuck")).sum()) for each in steady],
+        "undecided": [int((each.status == "undecided").sum()) for each in steady],
     }
 
 
@@ -135,10 +164,15 @@ def _followed(contact: Contact, loading: History, which: Indices, X0: float) -> 
         "y": _digits(y),
         "word": certificate.status[which].tolist(),
         "load": _digits(contact.loads[which]),
-        "load_error": [bound(error) for error in certificate.load_errors[which]],
+        "load_error": [_bound(error) for error in certificate.load_errors[which]],
         "share": [_digits(curve) for curve in _shares(contact, loading, which).T],
         "moved": [_digits(curve) for curve in loading.asperity_displacements[:, which].T / X0],
     }
+
+
+def _bound(error: float) -> str:
+    """Two digits, never below the error."""
+    return f"{1.05 * error:.2g}" if np.isfinite(error) else "unknown"
 
 
 def _digits(values: ArrayLike) -> Any:
@@ -148,15 +182,17 @@ def _digits(values: ArrayLike) -> Any:
     return [float(f"{value:.5g}") for value in np.asarray(values).tolist()]
 
 
-def _letters(limit: float, a_H: float, X0: float, units: UnitNames) -> list[str]:
+def _letters(limit: float, a_H: float, X0: float, units: UnitNames) -> list[list[str]]:
+    """Letter, its value, and what it is."""
+    force, length = (f" {unit}".rstrip() for unit in (units.force, units.length))
     return [
-        f"f P   {limit:.5g} {units.force}".rstrip() + ": the largest shear force, gross sliding",
-        f"a_H   {a_H:.5g} {units.length}".rstrip() + ": contact radius of the smooth sphere",
-        f"X0    {X0:.5g} {units.length}".rstrip() + ": its displacement at gross sliding",
-        "X     displacement of the deep points, both bodies",
-        "X_i   own deflection of an asperity; s_i its gross slip, a_i its contact radius",
-        "W0    scale of the loss, 9 (2 - nu) f² P² / (5 G a_H)",
-        "The loop is the steady cycle between -Q and Q; the point is its tip, at Q.",
+        ["f P", f"{limit:.5g}{force}", "the largest shear force: gross sliding"],
+        ["a_H", f"{a_H:.5g}{length}", "contact radius of the smooth sphere"],
+        ["X_0", f"{X0:.5g}{length}", "its displacement at gross sliding"],
+        ["X", "", "displacement of the deep points of both bodies"],
+        ["X_i, s_i, a_i", "", "deflection of an asperity, its gross slip, its contact radius"],
+        ["W_0", "", "scale of the loss, 24/5 f P X\u2080"],
+        ["k", "", "the contact's stiffness at first: Q/k is the elastic part of X"],
     ]
 
 

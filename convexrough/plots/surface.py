@@ -12,6 +12,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough.arrays import Array, Number
 from convexrough.contact import Contact
+from convexrough.plots.asperity_map import Layer, draw_discs, draw_outline
+from convexrough.plots.measure import Scale, quantity
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     DASHED,
@@ -23,13 +25,12 @@ from convexrough.plots.style import (
     SMOOTH,
     TICK,
     UNSURE,
-    Scale,
-    draw_discs,
-    draw_smooth,
+    bar,
     label,
+    legend_outside,
     literal,
-    quantity,
     round_ticks,
+    title,
 )
 from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
 from convexrough.surface.summits import Summits
@@ -40,9 +41,6 @@ MANY = 1000
 
 #: The colour of a summit, bright on every grey.
 SUMMIT = "#ffd24a"
-
-#: Round a contact, so that it also stands out of dark valleys in print.
-RIM: dict[str, Any] = dict(edgecolors="white", linewidths=0.3, zorder=3)
 
 #: Parts of Sz that the axis of a pruning names.
 PRUNINGS = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5)
@@ -131,7 +129,7 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
     word = "nowhere" if np.isnan(first) else f"from {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
     size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
-    upper.set_title(f"to be trusted: {word}{size}", fontsize=TICK, loc="left")
+    title(upper, f"to be trusted: {word}{size}")
     return figure
 
 
@@ -172,28 +170,26 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
         width, height = (min(edge, side / 2) for side in surface.size)
         axes.set(xlim=(-width, width), ylim=(-height, height))
     draw_summits(axes, positions)
-    bar = figure.colorbar(image, ax=axes, aspect=30, pad=0.02)
-    bar.ax.tick_params(labelsize=TICK)
-    bar.ax.set_title(_named("$z$", surface.unit), fontsize=TICK)
+    bar(axes, image, _named("$z$", surface.unit), above=True)
     look: dict[str, Any] = dict(marker="o", ls="", ms=5.0, mec="0.4", mew=0.3)
     handles = [Line2D([], [], color=colour, label=word, **look) for colour, word in named]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=TICK,
-                  frameon=False, handletextpad=0.3)  # fmt: skip
+    legend_outside(figure, handles, "lower center", 2)
     return figure
 
 
 def _draw_contacts(axes: Axes, contact: Contact) -> float:
-    """The contacts, that of the smooth sphere, and who is crowded most; half the width they need.
+    """The contacts, that of the smooth sphere, and the most crowded two; half the width they need.
 
     Discs are of true size, as long as that can be seen.
     """
-    touching = contact.loads > 0
-    centres, radii = contact.scene.contact_points[touching], contact.contact_radii[touching]
-    scale = Scale.of(contact, "", "")
-    edge = 1.2 * max(scale.length, float((np.abs(centres).max(axis=1) + radii).max()))
-    shown = np.maximum(radii, edge * float(np.clip(0.1 / np.sqrt(len(radii)), 0.002, 0.01)))
-    draw_discs(axes, centres, shown, "_contacts", facecolors=UNSURE, **RIM)
-    draw_smooth(axes, scale, scale.length, colour="white")
+    points, radii = contact.scene.contact_points, contact.contact_radii
+    touching, scale = contact.loads > 0, Scale(contact)
+    reach = np.abs(points - scale.centre).max(axis=1) + radii
+    edge = 1.2 * max(scale.typical, float(reach[touching].max()))
+    least = edge * float(np.clip(0.1 / np.sqrt(touching.sum()), 0.002, 0.01))
+    discs = np.where(touching, np.maximum(radii, least), 0.0)
+    draw_discs(axes, points, Layer("_contacts", discs, UNSURE, "white"))
+    draw_outline(axes, scale.axes, colour="white")
     pairs, _ = crowded(contact)
     for i, j in pairs[:1]:
         place = contact.scene.asperities.positions[[i, j]].mean(axis=0)
@@ -234,8 +230,7 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
     _draw_both(right, np.linspace(0.0, 1.0, 21), maxima.eccentricities, summits.eccentricities)
     right.set_xlim(0.0, 1.0)
     label(right, "eccentricity of the tip", "")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3,
-                  fontsize=TICK, frameon=False)  # fmt: skip
+    legend_outside(figure, left.get_legend_handles_labels()[0], "lower center", 3)
     return figure
 
 

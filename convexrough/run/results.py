@@ -13,7 +13,7 @@ import platform
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib import metadata, resources
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,12 +138,9 @@ def slider_page(pressed: Result, units: UnitNames) -> str:
 
     Raises InputError if the scene has no friction, or another base than a sphere.
     """
-    from convexrough.plots.slider import slider_data  # matplotlib: only when it draws
+    from convexrough.plots.slider import Slides, slider_html  # matplotlib: only when it draws
 
-    data = slider_data(pressed.contact, pressed.lines(units), units)
-    found = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-    template = resources.files("convexrough.plots").joinpath("slider.html")
-    return template.read_text(encoding="utf-8").replace("{{data}}", found)
+    return slider_html(Slides.of(pressed.contact, tell), pressed.lines(units), units)
 
 
 def write_json(path: Path, summary: Summary) -> Path:
@@ -158,12 +155,14 @@ def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> list[
 
 def write_figures(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
     """Write each figure as PNG and SVG; the paths."""
+    from convexrough.plots import save  # matplotlib: only when it draws
+
     written = []
     for stem, figure in figures.items():
         for kind in ("png", "svg"):
             path = folder / f"{stem}.{kind}"
             with replacing(path) as temporary:
-                figure.savefig(temporary, format=kind, dpi=200)
+                save(figure, temporary, kind)
             written.append(path)
             figure.set_layout_engine("none")  # laid out once: the second file takes half the time
     return written

@@ -152,6 +152,7 @@ class Result(Tabular, Drawn):
 
     def prepare(self, *, figures: bool) -> None:
         """Compute what only tables need, and figures, so that nothing is solved in writing them."""
+        _ = self.known
 
     def lines(self, units: UnitNames) -> list[str]:
         """A table for people."""
@@ -197,6 +198,18 @@ class Steps(Result):
             name: number(found, name) if name in WORDS else getattr(found, arrays[name])
             for name in self.stage.numbers
         }
+
+    @cached_property
+    def fine(self) -> Any:
+        """The same with points between its own, for figures."""
+        from convexrough.plots.between import between  # matplotlib: only when it draws
+
+        return between(self.found[0])
+
+    def prepare(self, *, figures: bool) -> None:
+        super().prepare(figures=figures)
+        if figures:
+            _ = self.fine
 
     def summary(self) -> Summary:
         """A list for each number."""

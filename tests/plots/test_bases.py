@@ -10,9 +10,9 @@ from scenes import MATERIAL, paper
 
 import convexrough as cr
 from convexrough.plots.cycle import cycle_figures
+from convexrough.plots.measure import Scale
 from convexrough.plots.press import press_figures
 from convexrough.plots.shear import shear_figures
-from convexrough.plots.style import ShearScale
 
 
 def pressed(base: Any) -> cr.Contact:
@@ -61,6 +61,6 @@ def test_no_smooth_reference(base: Any) -> None:
     assert "r_c" in said
     assert "no smooth reference" in said
     assert not figures["stick_slip"].axes[0].findobj(Ellipse)
-    X0 = ShearScale.of(contact, "", "").displacement
+    X0 = Scale(contact).travel
     nearly = cr.shear(contact, force=0.5 * contact.load * (1 - 1e-9)).displacement
     assert pytest.approx(X0, rel=1e-5) == nearly

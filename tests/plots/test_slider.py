@@ -51,7 +51,7 @@ def inside(text: str) -> Any:
 
 
 def data_of(contact: cr.Contact) -> Any:
-    return slider.slider_data(contact, said(contact), UNITS)
+    return slider.slider_data(slider.Slides.of(contact), said(contact), UNITS)
 
 
 @pytest.fixture(scope="module")
@@ -179,7 +179,8 @@ class Opened:
         return self.page.locator(f"#{name}").inner_text()
 
     def number(self, name: str) -> float:
-        return float(self.text(name).split()[0])
+        """As Python found it; what is shown has its powers of ten typeset."""
+        return float(self.page.locator(f"#{name}").get_attribute("data-value") or "nan")
 
     def points(self, curve: str) -> np.ndarray[Any, Any]:
         pairs = self.page.locator(curve).get_attribute("points") or ""
@@ -210,7 +211,7 @@ def test_in_metres_the_list_has_room_for_both_coordinates(browser: Browser, tmp_
     shown = Opened(browser, tmp_path / "slider.html")
     chooser = shown.page.locator("#follow")
     labels = chooser.locator("option").all_inner_texts()
-    assert "1: (2.5e-5, 0) m" in labels
+    assert "1: (2.5\xa0×\xa010⁻⁵, 0) m" in labels
     room = chooser.evaluate("""list => {
         const pen = document.createElement("canvas").getContext("2d");
         pen.font = getComputedStyle(list).font;
@@ -258,7 +259,7 @@ def assert_shown(shown: Opened, contact: cr.Contact, fraction: float, index: int
     past = cr.history(contact, forces=limit * share.clip(-fraction, fraction))
     assert moved == near(past.displacements / X0)
     own_moved, own_share = shown.points("#own .line").T
-    assert own_share == near(past.forces[:, index] / (0.5 * load))
+    assert own_share == near(past.asperity_forces[:, index] / (0.5 * load))
     assert own_moved == near(past.asperity_displacements[:, index] / X0)
     at = shown.page.locator("#whole .now").first.get_attribute("d")
     assert at == f"M{moved[0]:g} {share[0]:g}h0"

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
@@ -290,10 +291,10 @@ def read_scene_of(folder: Path) -> cr.Scene:
     return read_scene(folder / "one.toml").scene
 
 
-def test_nothing_is_solved_while_writing(
+def test_nothing_is_solved_while_writing_or_drawing(
     command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Presses and levels are done when the first table is written."""
+    """All presses, levels and states are found when the first table is written."""
     (tmp_path / "a.toml").write_text(scene_text(more=SHEAR + PATHS))
     write = results.write_results
 
@@ -307,8 +308,10 @@ def test_nothing_is_solved_while_writing(
         raise AssertionError("solved")
 
     monkeypatch.setattr(results, "write_results", after)
-    ran = command("run", "a.toml", "--no-figures")
+    monkeypatch.setattr(Figure, "savefig", lambda self, path, **_: Path(path).touch())
+    ran = command("run", "a.toml")
     assert (ran.status, ran.err) == (0, "")
+    assert (tmp_path / "a-results" / "hysteresis.svg").exists()
 
 
 # Every line of what counts as bad input, through the command.

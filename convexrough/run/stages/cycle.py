@@ -127,6 +127,7 @@ class Cycled(Result):
         return loops(self.found, stage.loop_points or affordable, None, chosen)
 
     def prepare(self, *, figures: bool) -> None:
+        super().prepare(figures=figures)
         _ = self.loops
 
     def tables(self) -> dict[str, Columns]:

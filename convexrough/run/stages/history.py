@@ -44,4 +44,4 @@ class Followed(Steps):
     def figures(self, **units: Any) -> Mapping[str, Any]:
         from convexrough.plots import history_figures  # matplotlib: only when it draws
 
-        return history_figures(self.found[0], **units)
+        return history_figures(self.found[0], fine=self.fine, **units)

@@ -137,7 +137,7 @@ class Pathed(Steps):
     def figures(self, **units: Any) -> Mapping[str, Any]:
         from convexrough.plots import path_figures  # matplotlib: only when it draws
 
-        return path_figures(self.found[0], **units)
+        return path_figures(self.found[0], fine=self.fine, **units)
 
 
 class Steady(_Points):

@@ -1,0 +1,74 @@
+"""The states and paths behind the source paper's Figs. 4 to 9, found once for a contact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import convexrough as cr
+from convexrough import checks
+from convexrough.arrays import Array, Indices
+from convexrough.scene.rings import rings
+
+#: Q / (f P) of the paper's Figs. 4 to 6 and 8.
+SHARE = 0.5
+
+#: Forces of first loading, close together at gross sliding; amplitudes of the curve of the loss.
+FRACTIONS = np.union1d(np.linspace(0.0, 1.0, 51), 1.0 - np.linspace(0.0, 1.0, 31) ** 2)
+AMPLITUDES = np.union1d(
+    np.concatenate((np.geomspace(1e-3, 0.0125, 6), np.linspace(0.0125, 1.0, 80))),
+    1.0 - 0.02 * np.linspace(0.0, 1.0, 11)[:-1] ** 2,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class PaperStates:
+    """What the figures and their tables show.
+
+    named  : touching asperities by ring, from the axis outwards; the last ring is A
+    onsets : (n,) Q / (f P) at which each asperity starts to slide
+    half   : sheared to half of gross sliding;  steady, loop : the cycle between +- that
+    path   : first loading at `fractions`, which hold the onsets;  cycles : at AMPLITUDES
+    """
+
+    contact: cr.Contact
+    limit: float
+    named: dict[str, Indices]
+    onsets: Array
+    half: cr.ShearState
+    steady: cr.Cycle
+    loop: cr.Loop
+    fractions: Array
+    path: cr.History
+    cycles: list[cr.Cycle]
+
+    @classmethod
+    def of(cls, contact: cr.Contact) -> PaperStates:
+        """Of a pressed contact with friction."""
+        limit = checks.friction(contact.scene.friction) * contact.load
+        named = lettered(contact)
+        onsets = cr.onset_of_sliding(contact) / limit
+        firsts = [ring[0] for ring in named.values()]
+        fractions = np.minimum(np.union1d(FRACTIONS, onsets[firsts]), 1.0)
+        steady = cr.cycle(contact, maximum=SHARE * limit)
+        return cls(
+            contact=contact,
+            limit=limit,
+            named=named,
+            onsets=onsets,
+            half=cr.shear(contact, force=SHARE * limit),
+            steady=steady,
+            loop=steady.loop(400),
+            fractions=fractions,
+            path=cr.history(contact, forces=fractions * limit),
+            cycles=cr.cycles(contact, AMPLITUDES * limit),
+        )
+
+
+def lettered(contact: cr.Contact) -> dict[str, Indices]:
+    """The touching asperities by ring, from the axis outwards; the last ring is A."""
+    groups = rings(contact.scene.asperities.distances, contact.loads)
+    several = -(-len(groups) // 26)
+    letters = [chr(ord("A") + k) * (turn + 1) for turn in range(several) for k in range(26)]
+    return dict(zip(reversed(letters[: len(groups)]), groups, strict=True))

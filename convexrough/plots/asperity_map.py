@@ -1,0 +1,248 @@
+"""The one map of asperities that every figure uses: discs of true size, or a mosaic of many."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.colors import to_rgba, to_rgba_array
+from matplotlib.lines import Line2D
+from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices
+from convexrough.plots.measure import Measure, Scale
+from convexrough.plots.style import DASHED, DOTTED, FAINT, SMOOTH, label, round_ticks
+
+#: From these numbers of discs on, they are pixels inside a vector file, and too small to be drawn.
+DENSE, CROWDED = 200, 3000
+
+#: Of a mosaic, across.
+PIXELS = 400
+
+#: What each asperity does: the more it moves the darker, also in grey.
+STICK, SLIP, SLIDING, UNKNOWN = "#b9d0e5", "#e0842a", "#701c05", "white"
+LOOKS = {
+    "stuck": (STICK, "sticks"),
+    "partial": (SLIP, "slips in part"),
+    "sliding": (SLIDING, "slides"),
+    "intermittent": ("#5b5b9a", "loses contact"),
+    "undecided": (UNKNOWN, "undecided"),
+}
+
+
+class Layer(NamedTuple):
+    """Discs of one kind, above those of the layers before.
+
+    radii  : (n,) [length], 0 where there is none;  shades : (n, 4), or one colour for all
+    rim    : colour of their outline, None of none where discs are many or stacked
+    """
+
+    word: str
+    radii: Array
+    shades: Any
+    rim: str | None = SMOOTH
+
+
+class Window(NamedTuple):
+    """A square part of the plane, in the measure of a map."""
+
+    x: float
+    y: float
+    half: float
+
+    @property
+    def sides(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top."""
+        return self.x - self.half, self.x + self.half, self.y - self.half, self.y + self.half
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        """(n,) which points lie inside."""
+        away: Array = np.abs(points - (self.x, self.y)).max(axis=1)
+        return away < self.half
+
+
+def draw_map(
+    axes: Axes,
+    points: Array,
+    layers: Sequence[Layer],
+    length: Measure,
+    *,
+    smooth: Sequence[float] = (),
+    window: Window | None = None,
+    dots: str = FAINT,
+) -> Window:
+    """Draw layers of discs about the points, faint dots where there is none; name the axes.
+
+    points : (n, 2) [length]
+    smooth : semi-axes of the smooth contact [length], drawn as a dashed outline about the origin
+    window : what to show; default: the least square that holds all discs, or else all points
+
+    Of many discs a mosaic: each place in the colour of the nearest asperity, the mean one of its
+    layers, white where that is open.
+    """
+    whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
+    shown, window = whole > 0, window or map_window(points, whole, length, smooth)
+    points, whole = length.of(points), length.of(whole)
+    layers = [each._replace(radii=length.of(each.radii)) for each in layers]
+    if int(shown.sum()) >= CROWDED:
+        _draw_mosaic(axes, points, _blended(layers, whole), shown, window)
+    else:
+        _draw_open(axes, points[~shown & window.holds(points)], dots)
+        for each in layers:
+            draw_discs(axes, points, each)
+    draw_outline(axes, [length.of(axis) for axis in smooth])
+    left, right, bottom, top = window.sides
+    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+    axes.xaxis.set_major_locator(round_ticks(5))
+    axes.yaxis.set_major_locator(round_ticks(5))
+    label(axes, length.label("x"), length.short("y"))
+    return window
+
+
+def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> Window:
+    """`draw_map` of a contact, with the outline of its smooth reference."""
+    points = scale.contact.scene.contact_points
+    return draw_map(axes, points, layers, scale.length, smooth=scale.axes)
+
+
+def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
+    """The discs of a layer, in true size."""
+    there = layer.radii > 0
+    if not there.any():
+        return
+    shades = to_rgba_array(layer.shades)
+    few = int(there.sum()) < DENSE or layer.word == "undecided"
+    axes.add_collection(
+        EllipseCollection(
+            *(2.0 * layer.radii[there],) * 2,
+            np.zeros(int(there.sum())),
+            units="xy",
+            offsets=points[there],
+            offset_transform=axes.transData,
+            facecolors=shades[there] if len(shades) == len(there) > 1 else shades,
+            edgecolors=layer.rim or "none",
+            linewidths=0.4 if few and layer.rim else 0.0,
+            rasterized=int(there.sum()) >= DENSE,
+            label=layer.word,
+        ),
+        autolim=False,
+    )
+
+
+def draw_outline(
+    axes: Axes, semi_axes: Sequence[float], style: Any = DASHED, colour: str = SMOOTH
+) -> None:
+    """A circle or ellipse about the origin; nothing of none."""
+    if semi_axes:
+        width, height = (2.0 * axis for axis in semi_axes)
+        axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=style, lw=0.9, ec=colour))
+
+
+def status_layers(
+    status: NDArray[np.str_], radii: Array, stick_radii: Array | None = None
+) -> list[Layer]:
+    """A layer for each word of the status, and the stick discs inside those that slip in part."""
+    layers = [
+        Layer(word, np.where(status == word, radii, 0.0), colour)
+        for word, (colour, _) in LOOKS.items()
+    ]
+    if stick_radii is not None:
+        stick = np.where((status == "partial") & (radii > 0), stick_radii, 0.0)
+        layers.append(Layer("stick", stick, STICK))
+    return layers
+
+
+def status_handles(words: Iterable[str], *, stick: bool = False) -> list[Line2D]:
+    """For a legend: the words that there are, and stick discs."""
+    entries = [each for word, each in LOOKS.items() if word in words]
+    if stick and "partial" in words:
+        entries.insert(0, (STICK, "stick disc"))
+    return [_handle(colour, text) for colour, text in entries]
+
+
+def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
+    """For a legend: the outlines of the smooth contact, and of its stick disc."""
+    if scale.sphere is None:
+        return []
+    styles = {"contact": DASHED} | ({"stick": DOTTED} if stick else {})
+    return [
+        Line2D([], [], ls=style, lw=0.9, color=SMOOTH, label=f"{scale.name}: {what}")
+        for what, style in styles.items()
+    ]
+
+
+def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
+    """(n,) one radius for all the chosen, small enough to part neighbours; 0 of others."""
+    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+
+    size = float(np.ptp(points, axis=0).max()) or 1.0
+    apart = size
+    if len(points) > 1:
+        sample = points[:: max(1, len(points) // 1000)]
+        apart = float(np.median(np.asarray(cKDTree(points).query(sample, k=2)[0])[:, 1]))
+    return np.where(chosen, float(np.clip(0.42 * apart, 0.006 * size, 0.05 * size)), 0.0)
+
+
+def _handle(colour: str, text: str) -> Line2D:
+    return Line2D([], [], ls="", marker="o", ms=6, mew=0.4, mec=SMOOTH, mfc=colour, label=text)
+
+
+def map_window(
+    points: Array, radii: Array, length: Measure, smooth: Sequence[float] = ()
+) -> Window:
+    """The least square round all discs and the smooth outline; without discs, round all points."""
+    points, radii = length.of(points), length.of(radii)
+    outline = [length.of(axis) for axis in smooth]
+    there = radii > 0 if (radii > 0).any() else np.ones(len(points), dtype=bool)
+    ends = [points[there] - radii[there, None], points[there] + radii[there, None]]
+    if outline:
+        ends += [-np.array([outline]), np.array([outline])]
+    low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
+    x, y = (low + high) / 2
+    return Window(float(x), float(y), 0.53 * (float((high - low).max()) or 1.0))
+
+
+def _draw_open(axes: Axes, points: Array, colour: str) -> None:
+    """Faint dots, smaller where they are many."""
+    size = float(np.clip(25.0 / np.sqrt(len(points) + 1), 0.4, 1.5))
+    axes.plot(*points.T, "o", ms=size, mew=0, color=colour, rasterized=len(points) >= CROWDED,
+              label="open")  # fmt: skip
+
+
+def _blended(layers: Sequence[Layer], whole: Array) -> Array:
+    """(n, 4) the mean colour of each asperity, every layer above the ones before."""
+    mean = np.tile(to_rgba("white"), (len(whole), 1))
+    for each in layers:
+        part = np.divide(each.radii, whole, out=np.zeros(len(whole)), where=whole > 0) ** 2
+        mean += part[:, None] * (to_rgba_array(each.shades) - mean)
+    return mean
+
+
+def _draw_mosaic(
+    axes: Axes, points: Array, shades: Array, shown: NDArray[np.bool_], window: Window
+) -> None:
+    """Each pixel in the colour of the nearest asperity; of several in it, in their mean colour.
+
+    So no pattern of the pixels beats with that of the asperities.
+    """
+    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+
+    left, right, bottom, top = window.sides
+    steps = 2.0 * window.half * (np.arange(PIXELS) + 0.5) / PIXELS
+    places = np.stack(np.meshgrid(left + steps, bottom + steps), axis=-1)
+    cell = 2.0 * window.half / np.sqrt(np.count_nonzero(shown))  # none so near: outside them all
+    _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
+    visible = np.where(shown[:, None], shades, (1.0, 1.0, 1.0, 0.0))
+    image = np.vstack((visible, np.zeros(4)))[nearest]
+    inside = window.holds(points)
+    column, row = ((points[inside] - (left, bottom)) / (2 * window.half) * PIXELS).astype(int).T
+    place: Indices = row * PIXELS + column
+    several = np.bincount(place, minlength=PIXELS**2)
+    mean = np.stack([np.bincount(place, part, PIXELS**2) for part in visible[inside].T], axis=1)
+    crowded = several > 1
+    image.reshape(-1, 4)[crowded] = mean[crowded] / several[crowded, None]
+    axes.imshow(image, origin="lower", extent=(left, right, bottom, top), interpolation="nearest")

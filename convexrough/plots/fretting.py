@@ -1,0 +1,60 @@
+"""Fretting of each asperity: slip, energy and tractions, as maps."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+
+from convexrough.arrays import Array
+from convexrough.friction.fretting import Fretting
+from convexrough.plots.asperity_map import Layer, draw_contact
+from convexrough.plots.measure import Measure, Scale, measure, product
+from convexrough.plots.notebook import Figure, Figures
+from convexrough.plots.style import COLOURS, DOUBLE, TICK, bar, no_contact_figure, title
+
+
+def fretting_figures(worn: Fretting, *, length_unit: str = "", force_unit: str = "") -> Figures:
+    """The figure of fretting in a steady cycle.
+
+    "fretting" : maps of the slip amplitude at the rim of each disc, the energy lost per cycle, the
+        mean shear traction and the largest, both at the largest force
+    """
+    if not worn.contact.loads.any():
+        return Figures({"fretting": no_contact_figure(("$x$", "$y$"))})
+    scale = Scale(worn.contact, length_unit, force_unit)
+    figure = Figure(figsize=(DOUBLE, 6.2), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
+    work = product(force_unit, length_unit)
+    pressure, f = product(force_unit, under=length_unit), scale.limit / worn.contact.load
+    most = float(worn.largest_tractions.max()) if pressure else f * scale.peak
+    traction = measure(most, pressure, f"(f{scale.pressure.symbol})")
+    lost = float(worn.losses.max(initial=0.0, where=np.isfinite(worn.losses)))
+    draw_slip(panels[0], worn, scale)
+    energy = measure(lost, work, "W_m")
+    _draw(panels[1], scale, worn.losses, energy, "energy lost per cycle", "W_i")
+    _draw(panels[2], scale, worn.mean_tractions, traction, "mean traction", "\\bar q_i")
+    _draw(panels[3], scale, worn.largest_tractions, traction, "largest traction", "q_i")
+    for axes in panels:
+        axes.label_outer()
+    low, high = worn.minimum / scale.limit, worn.maximum / scale.limit
+    between = f"cycle of $Q/(fP)$ from {low:.4g} to {high:.4g}".replace("-", "\u2212")
+    figure.suptitle(between, fontsize=TICK)
+    return Figures({"fretting": figure})
+
+
+def draw_slip(axes: Axes, worn: Fretting, scale: Scale) -> None:
+    """The map of slip amplitudes."""
+    most = float(worn.slip_amplitudes.max(initial=0.0))
+    slip = measure(most if scale.length_unit else scale.travel, scale.length_unit, "X_0")
+    _draw(axes, scale, worn.slip_amplitudes, slip, "slip amplitude at the rim", "s_i")
+
+
+def _draw(axes: Axes, scale: Scale, values: Array, unit: Measure, name: str, symbol: str) -> None:
+    shown = np.nan_to_num(unit.of(values))
+    colours = ScalarMappable(Normalize(0.0, float(shown.max()) or 1.0), COLOURS)
+    radii = scale.contact.contact_radii
+    draw_contact(axes, scale, [Layer("contact discs", radii, colours.to_rgba(shown))])
+    title(axes, name)
+    bar(axes, colours, unit.short(symbol), above=True)

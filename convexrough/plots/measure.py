@@ -1,0 +1,191 @@
+"""What the axes of figures count in: SI units with prefixes, or numbers of the smooth contact.
+
+Where the scene names its units, axes are in SI with the prefix that suits them. Where it does not,
+lengths are in a_H and pressures in p0, contact radius and peak pressure of the smooth sphere under
+the same load, shear forces in f P, displacements in X0 and energies in W0. Where the base has no
+smooth reference, lengths are in r_c, how far contact reaches from its centre, and pressures in the
+mean one over the circle of that radius.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from convexrough import checks
+from convexrough.arrays import Array, Number
+from convexrough.contact import Contact
+from convexrough.fields import peak_pressures
+from convexrough.sphere import mindlin
+from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
+from convexrough.tabular.units import parsed
+
+#: Units of SI by their powers of length and force, and prefixes by their powers of a thousand.
+SYMBOLS = {(1, 0): "m", (0, 1): "N", (-2, 1): "Pa", (1, 1): "J"}
+PREFIXES = ("f", "p", "n", "µ", "m", "", "k", "M", "G", "T")
+
+
+class Measure(NamedTuple):
+    """What values are divided by on an axis [their own unit], and how its label says so.
+
+    symbol : of what they are divided by, as a formula; "" where `said` is a unit
+    said   : the unit of the axis; or how large the symbol is
+    """
+
+    size: float = 1.0
+    symbol: str = ""
+    said: str = ""
+
+    def of(self, values: Number) -> Number:
+        """The values in this measure."""
+        return values / self.size
+
+    def short(self, name: str) -> str:
+        """A label of an axis, without how large the symbol is."""
+        if self.symbol:
+            return f"${name}\\,/\\,{self.symbol}$"
+        return f"${name}$  [{literal(self.said)}]" if self.said else f"${name}$"
+
+    def label(self, name: str) -> str:
+        """A label of an axis."""
+        known = f"  (${self.symbol.strip('()')}$ = {self.said})" if self.symbol else ""
+        return self.short(name) + known
+
+
+def measure(size: float, unit: str, symbol: str = "") -> Measure:
+    """Of values about so large: in SI with a prefix, or in their own unit; without, in `size`s."""
+    if known := _metric(unit):
+        name, exponent = known
+        step = _step(abs(size) * 10.0**exponent)
+        return Measure(10.0 ** (3 * step - exponent), "", _prefixed(step, name))
+    if unit or not symbol:
+        return Measure(1.0, "", unit)
+    return Measure(size or 1.0, symbol, quantity(size, ""))
+
+
+def quantity(value: float, unit: str) -> str:
+    """Three digits and the unit: in SI with a prefix, as 4.12 µm, or as 4.12 × 10^-3 in."""
+    if (known := _metric(unit)) and value:
+        name, exponent = known
+        step = _step(abs(float(f"{value:.3g}")) * 10.0**exponent)
+        return f"{value * 10.0 ** (exponent - 3 * step):.3g} {_prefixed(step, name)}"
+    digits, _, power = f"{value:.2e}".partition("e")
+    plain = value == 0 or -3 < int(power) < 3
+    number = f"{value:.3g}" if plain else f"${digits}\\times 10^{{{int(power)}}}$"
+    return f"{number} {literal(unit)}".strip()
+
+
+def literal(text: str) -> str:
+    """Text in which no dollar sign begins a formula."""
+    return text.replace("$", r"\$")
+
+
+def product(*units: str, under: str | None = None) -> str:
+    """The unit of a product, over the square of another; "" unless all are named."""
+    if not all(units) or under == "":
+        return ""
+    return " ".join(units) + (f"/{under}²" if under else "")
+
+
+def _metric(unit: str) -> tuple[str, int] | None:
+    """The unit of SI that a unit is a power of ten of, and the power; None of others."""
+    if (known := parsed(unit) if unit.strip() else None) is None:
+        return None
+    power = round(math.log10(known.size))
+    name = SYMBOLS.get((known.length, known.force))
+    return (name, power) if name and known.size * 10 ** (-power) == 1 else None
+
+
+def _step(size: float) -> int:
+    """The power of a thousand in which this is from 1 to 1000."""
+    if not size or not math.isfinite(size):
+        return 0
+    return int(np.clip(math.floor(math.log10(size * (1 + 1e-12)) / 3), -5, 4))
+
+
+def _prefixed(step: int, name: str) -> str:
+    return f"{PREFIXES[step + 5]}{name}"
+
+
+class Scale:
+    """The measures of a contact's figures, and its smooth reference.
+
+    sphere : the smooth sphere or ellipsoid under the same load, or None
+    axes   : its semi-axes [length];  centre : (2,) [length] where distances are counted from
+    """
+
+    def __init__(self, contact: Contact, length_unit: str = "", force_unit: str = "") -> None:
+        self.contact, self.length_unit, self.force_unit = contact, length_unit, force_unit
+        load, points = contact.load, contact.scene.contact_points
+        self.sphere = smooth_reference(contact.scene, load) if load else None
+        self.centre: Array = np.zeros(2)
+        self.axes: Sequence[float] = ()
+        if self.sphere is not None:
+            a_H = self.sphere.contact_radius
+            self.axes = (a_H, a_H)
+            if isinstance(self.sphere, SmoothEllipsoid):
+                self.axes = self.sphere.semi_axes
+            self.typical, self.peak = a_H, self.sphere.peak_pressure
+            symbols = "a_H", "p_0"
+        else:
+            touching = contact.loads > 0
+            if load:
+                self.centre = contact.loads @ points / load
+            rims = np.hypot(*(points - self.centre).T) + contact.contact_radii
+            self.typical = float(rims[touching].max(initial=0.0))
+            self.peak = load / (np.pi * self.typical**2) if load else 0.0
+            symbols = "r_c", "\\bar p"
+        self.length = measure(self.typical, length_unit, symbols[0])
+        pressure, most = product(force_unit, under=length_unit), peak_pressures(contact).max()
+        self.pressure = measure(float(most) if pressure else self.peak, pressure, symbols[1])
+
+    @property
+    def name(self) -> str:
+        """What the smooth reference is called."""
+        return f"smooth {'ellipsoid' if isinstance(self.sphere, SmoothEllipsoid) else 'sphere'}"
+
+    @cached_property
+    def limit(self) -> float:
+        """f P [force]."""
+        return checks.friction(self.contact.scene.friction) * self.contact.load
+
+    @cached_property
+    def travel(self) -> float:
+        """X0 [length]: X at gross sliding, of the smooth contact; without one, of this contact."""
+        if self.sphere is not None:
+            return float(self.sphere.displacement(self.limit))
+        scene = self.contact.scene  # by Ciavarella and Jaeger, c_t f the approach from first touch
+        c_t = float(mindlin.ratio(scene.material.poisson_ratio))
+        first = self.contact.approach + float(scene.offsets.max())
+        return checks.friction(scene.friction) * c_t * first
+
+    @property
+    def work(self) -> float:
+        """W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) [force length], which is 24/5 f P X0."""
+        return 4.8 * self.limit * self.travel
+
+    @cached_property
+    def force(self) -> Measure:
+        """Of shear forces."""
+        return measure(self.limit, self.force_unit, "(fP)")
+
+    @cached_property
+    def displacement(self) -> Measure:
+        """Of displacements along the shear."""
+        return measure(self.travel, self.length_unit, "X_0")
+
+    def energy(self, largest: float) -> Measure:
+        """Of energies up to the largest."""
+        unit = product(self.force_unit, self.length_unit)
+        return measure(largest if unit else self.work, unit, "W_0")
+
+    def footnote(self) -> str:
+        """What f P and X0 are."""
+        whose = f"the {self.name}'s" if self.sphere else "this contact's"
+        X0 = quantity(self.travel, self.length_unit)
+        limit = quantity(self.limit, self.force_unit)
+        return f"$fP$ = {limit},   $X_0$ = {X0}: {whose} $X$ at gross sliding"

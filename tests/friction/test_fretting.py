@@ -1,0 +1,95 @@
+"""Fretting: tractions against the field, slip against the energy that it costs."""
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import PAPER_APPROACH, paper, rough
+
+import convexrough as cr
+from convexrough import fields
+from convexrough.friction.fretting import fretting_columns, rim_gap
+from convexrough.sphere import mindlin
+
+
+@cache
+def contact(name: str) -> cr.Contact:
+    scene = {"paper": paper, "rough": rough}[name]()
+    return cr.press(dataclasses.replace(scene, friction=0.5), approach=PAPER_APPROACH)
+
+
+def worn(name: str, high: float, low: float) -> tuple[cr.Cycle, cr.Fretting]:
+    limit = 0.5 * contact(name).load
+    cycle = cr.cycle(contact(name), maximum=high * limit, minimum=low * limit)
+    return cycle, cr.fretting(cycle)
+
+
+@pytest.mark.parametrize(("high", "low"), [(0.3, -0.3), (0.6, -0.6), (0.2, -0.7), (0.8, 0.1)])
+def test_tractions_are_those_of_the_field(high: float, low: float) -> None:
+    _, found = worn("rough", high, low)
+    pressed = found.contact
+    state = cr.shear(pressed, force=max(high, low, key=abs) * 0.5 * pressed.load)
+    for i in np.flatnonzero(pressed.loads)[::6]:
+        a = pressed.contact_radii[i]
+        r = np.sort(np.append(np.linspace(0.0, a, 20_001), state.stick_radii[i]))
+        points = pressed.scene.contact_points[i] + np.column_stack((r, 0.0 * r))
+        q = np.abs(fields.traction(state, points))
+        assert found.largest_tractions[i] == pytest.approx(q.max(), rel=1e-7)
+        if 0 < state.stick_radii[i] < a:
+            assert r[q.argmax()] == pytest.approx(state.stick_radii[i], rel=1e-3)
+        mean = np.trapezoid(q * 2 * r, r) / a**2
+        assert found.mean_tractions[i] == pytest.approx(mean, rel=1e-5)
+
+
+@pytest.mark.parametrize(("high", "low"), [(0.3, -0.3), (0.6, -0.6), (0.8, 0.1)])
+def test_slip_against_friction_costs_the_energy(high: float, low: float) -> None:
+    """Each asperity loses 4 times the integral of f p times the amplitude of slip, by either law.
+
+    In the annulus of a disc that sticks, and everywhere of one that slides, the slip at a distance
+    r is that at the rim of a contact of the radius r.
+    """
+    cycle, found = worn("rough", high, low)
+    scene, f = cycle.scene, 0.5
+    c_t = float(mindlin.ratio(scene.material.poisson_ratio))
+    for i in np.flatnonzero(cycle.contact.loads)[::6]:
+        a, c, R = cycle.contact.contact_radii[i], cycle.stick_radii[i], scene.relative_radii[i]
+        s = 1.0 - np.linspace(0.0, np.sqrt(1.0 - c / a), 4001) ** 2  # r / a, close at the rim
+        slip = f * c_t * (a * s) ** 2 / R * rim_gap(np.minimum(c / (a * np.maximum(s, 1e-9)), 1.0))
+        slip += found.gross_slip_amplitudes[i]
+        p = fields.peak_pressures(cycle.contact)[i] * np.sqrt(1.0 - s**2)
+        lost = -4.0 * np.trapezoid(f * p * slip * 2.0 * np.pi * a**2 * s, s)
+        assert cycle.asperity_losses[i] == pytest.approx(lost, rel=1e-4)
+        assert found.slip_amplitudes[i] == pytest.approx(slip[0], rel=1e-12)
+    assert_array_equal(found.losses, cycle.asperity_losses)
+
+
+def test_open_asperities_and_no_shear() -> None:
+    cycle, found = worn("paper", 0.0, 0.0)
+    for values in (found.slip_amplitudes, found.mean_tractions, found.largest_tractions):
+        assert_array_equal(values, 0.0)
+    _, found = worn("paper", 0.5, -0.5)
+    assert_array_equal(found.slip_amplitudes[cycle.contact.loads == 0], 0.0)
+    slides = found.status == "sliding"
+    assert_array_equal(found.gross_slip_amplitudes > 0, slides)
+    f_p0 = 0.5 * fields.peak_pressures(found.contact)
+    assert_allclose(found.largest_tractions[slides], f_p0[slides], rtol=1e-15)
+    assert_allclose(found.mean_tractions[slides], 2 / 3 * f_p0[slides], rtol=1e-12)
+
+
+def test_a_varying_load_is_refused() -> None:
+    load = contact("paper").load
+    settled = cr.steady(contact("paper").scene, loads=[load, load / 2], forces=[0.1 * load, 0.0])
+    with pytest.raises(cr.InputError, match="constant normal load"):
+        cr.fretting(settled)
+
+
+def test_columns_have_a_row_for_each_touching_asperity() -> None:
+    several = [worn("paper", share, -share)[1] for share in (0.2, 0.5)]
+    columns = fretting_columns(several)
+    assert {len(values) for values in columns.values()} == {2 * 37}
+    last = columns["maximum"] == several[1].maximum
+    touching = np.flatnonzero(several[1].contact.loads)
+    assert_array_equal(columns["asperity"][last], touching)
+    assert_array_equal(columns["largest_traction"][last], several[1].largest_tractions[touching])

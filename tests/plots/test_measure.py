@@ -1,0 +1,113 @@
+"""Units of axes, and files as journals want them."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from drawn import fits, words
+from matplotlib.figure import Figure
+
+import convexrough as cr
+from convexrough import plots
+from convexrough.plots.measure import measure, product, quantity
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "said"),
+    [
+        (4.12e-3, "mm", "4.12 µm"),
+        (0.5, "N", "500 mN"),
+        (999.9e-6, "m", "1 mm"),
+        (-2.5, "µm", "-2.5 µm"),
+        (591.0, "N/mm²", "591 MPa"),
+        (4.82e-3, "N mm", "4.82 µJ"),
+        (3.0, "GPa", "3 GPa"),
+        (0.0, "mm", "0 mm"),
+        (0.25, "in", "0.25 in"),
+        (4.12e-5, "", r"$4.12\times 10^{-5}$"),
+        (4.12e-5, "in", r"$4.12\times 10^{-5}$ in"),
+        (12.0, "$", r"12 \$"),
+    ],
+)
+def test_quantities_are_written_one_way(value: float, unit: str, said: str) -> None:
+    assert quantity(value, unit) == said
+
+
+def test_axes_are_in_si_where_units_are_named() -> None:
+    axis = measure(4.12e-3, "mm", "a_H")
+    assert axis.label("x") == "$x$  [µm]"
+    assert axis.of(4.12e-3) == pytest.approx(4.12)
+    assert measure(3.0, "in", "a_H").label("x") == "$x$  [in]"
+    assert measure(4.0, "", "a_H").label("x") == "$x\\,/\\,a_H$  ($a_H$ = 4)"
+    assert measure(4.0, "").label("x") == "$x$"
+    assert product("N", under="mm") == "N/mm²"
+    assert product("N", under="") == product("", "mm") == ""
+
+
+def scattered(load: float = 2.0) -> cr.Contact:
+    random = np.random.default_rng(4)
+    points = random.uniform(-0.12, 0.12, (90, 2))
+    asperities = cr.Asperities(points, random.uniform(0.02, 0.06, 90), random.normal(0, 2e-4, 90))
+    material = cr.Material.from_youngs(210e3, 0.3)
+    return cr.press(cr.Scene(10.0, asperities, material, friction=0.4), load=load)
+
+
+def test_scattered_asperities_are_all_in_the_right_panel() -> None:
+    contact = scattered()
+    figure = plots.press_figures(contact, length_unit="mm", force_unit="N")["pressure"]
+    fits(figure)
+    panel = figure.axes[1]
+    (points,) = [line for line in panel.lines if line.get_marker() == "o"]
+    r, p = np.asarray(points.get_data(), dtype=float)
+    touching = contact.loads > 0
+    np.testing.assert_allclose(r, 1e3 * np.hypot(*contact.scene.contact_points[touching].T))
+    np.testing.assert_allclose(p, 1e-3 * cr.fields.peak_pressures(contact)[touching])
+    assert (panel.get_xlabel(), panel.get_ylabel()) == ("$r$  [µm]", "$p$  [GPa]")
+
+
+def test_no_half_of_the_map_of_ones_own_surface_is_empty() -> None:
+    """Flat, and far from the origin: the window is that of the contacts."""
+    random = np.random.default_rng(5)
+    points = random.uniform(500.0, 550.0, (80, 2))
+    asperities = cr.Asperities(points, random.uniform(0.5, 2.0, 80), random.normal(0, 0.3, 80))
+    scene = cr.Scene(np.inf, asperities, cr.Material.from_youngs(210.0, 0.3))
+    contact = cr.press(scene, load=20.0)
+    chart = plots.press_figures(contact)["pressure"].axes[0]
+    size, r_c = np.ptp(chart.get_xlim()), plots.measure.Scale(contact).typical
+    discs = contact.scene.contact_points[contact.loads > 0] / r_c
+    assert np.ptp(discs, axis=0).max() > 0.7 * size
+
+
+def test_fretting_is_drawn_with_units() -> None:
+    contact = scattered()
+    cycle = cr.cycle(contact, maximum=0.2 * contact.load)
+    worn = cr.fretting(cycle)
+    figure = plots.fretting_figures(worn, length_unit="mm", force_unit="N")["fretting"]
+    fits(figure)
+    said = " ".join(text.get_text() for text in words(figure))
+    for unit in ("nm]", "nJ]", "GPa]"):
+        assert unit in said, said
+    assert worn.plot().get_title(loc="left") == "slip amplitude at the rim"
+
+
+def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
+    figure = Figure(figsize=(1, 1))
+    figure.subplots().set_xlabel("load [mN]")
+    for form in ("svg", "pdf", "png"):
+        plots.save(figure, tmp_path / f"a.{form}", form, dpi=600)
+    text = (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert re.search(r"<text[^>]*>load \[mN\]</text>", text)
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+    head = (tmp_path / "a.png").read_bytes()[16:24]
+    assert (int.from_bytes(head[:4]), int.from_bytes(head[4:])) == (600, 600)
+    before = text
+    plots.save(figure, tmp_path / "a.svg", "svg")
+    assert (tmp_path / "a.svg").read_text(encoding="utf-8") == before  # no date inside
+
+
+@pytest.mark.parametrize(("form", "dpi"), [("eps", 200), ("png", 601), ("png", 10)])
+def test_other_formats_are_refused(tmp_path: Path, form: str, dpi: Any) -> None:
+    with pytest.raises(cr.InputError, match=r"formats|dpi"):
+        plots.save(Figure(), tmp_path / "a", form, dpi)
