@@ -40,11 +40,18 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 @click.argument("sweep", type=PATH, required=False)
 @json_option
 @click.option("--part", metavar="K/N", callback=_part, help="The K-th of N parts of the sweep.")
-@click.option("--force", is_flag=True, help="Overwrite results in a folder in use.")
-@click.option("--resume", is_flag=True, help="Compute what is not in the folder yet.")
-@click.option("--scheduler", metavar="ADDRESS", help='Of Dask: tcp://..., a file, or "local".')
-@click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes; default: all.")
-@click.option("--summary", metavar="DIR", type=PATH, help="Only say what is in a folder.")
+@click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
+@click.option("--resume", is_flag=True, help="Compute the missing parts.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help='Dask scheduler: tcp://..., a file, or "local".'
+)
+@click.option(
+    "--workers",
+    metavar="N",
+    type=click.IntRange(1),
+    help="Number of processes; default: all cores.",
+)
+@click.option("--summary", metavar="DIR", type=PATH, help="Print quantiles of a folder.")
 @click.option("--out", metavar="DIR", type=PATH, help="Folder for results.")
 def sweep(
     sweep: Path | None,
@@ -57,14 +64,13 @@ def sweep(
     part: tuple[int, int] | None,
     as_json: bool,
 ) -> int:
-    """Measure every scene of a sweep file.
+    """Compute every scene of a sweep file.
 
-    Results go to the folder SWEEP-sweep unless --out names another: a manifest and parts, each
-    written once and whole. With --summary: quantiles of what is in a folder; with --out, too, a
-    table of them and figures.
+    Results go to the folder SWEEP-sweep unless --out names another. With --summary, print quantiles
+    of the results in a folder; with --out also write them, and figures.
 
     Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or a
-    worker died; 130 interrupted. What was computed until then is kept, and --resume goes on.
+    worker died; 130 interrupted. Completed parts are kept, and --resume continues.
     """
     if (sweep is None) == (summary is None):
         raise click.UsageError("Either SWEEP, or --summary DIR.")

@@ -1,1 +1,1 @@
-"""Many scenes: which they are, what is measured of each, who computes them, and their table."""
+"""Many scenes: their enumeration, the measures, the workers, and the table."""

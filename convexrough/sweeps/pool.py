@@ -1,4 +1,4 @@
-"""Who computes the batches: processes here, Dask workers anywhere, or any executor."""
+"""The workers that compute the batches: local processes, Dask workers, or any executor."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     """The rows of batches, as they come.
 
     A batch whose worker died is computed again, alone, after the others. Raises WorkerError where
-    its worker dies again, or where nobody is left to compute.
+    its worker dies again, or where no worker is left.
     """
     lost = yield from _together(iter(batches), executor)
     dead = []
@@ -120,9 +120,9 @@ class Processes(Executor):
 
 
 def _end_with(held: Any) -> None:
-    """A process of ours ends with whoever started it, however that ends, and not by an interrupt.
+    """Let this process end with the process that started it, and not by an interrupt.
 
-    held : one end of a pipe whose other end nobody else has
+    held : one end of a pipe whose other end only that process has
     """
 
     def watch() -> None:
@@ -159,7 +159,7 @@ def dask(address: str) -> Iterator[Executor]:
     address : of the scheduler, "tcp://host:port"; or its file, "scheduler.json"; or "local" for a
         cluster of its own on this machine
 
-    Raises ExtraError where Dask is not installed, and InputError where nobody answers.
+    Raises ExtraError where Dask is not installed, and InputError where no scheduler answers.
     """
     try:
         from distributed import Client

@@ -56,18 +56,18 @@ def sweep(
     what     : a sweep file; or the tables of one, as a mapping; or scenes, with `approach` [length]
         or `load` [force], one for all or one for each, and the amplitudes of `cycle` and forces of
         `shear` as fractions of f P
-    measure  : numbers of a run's summary, by name or its end; of a file, instead of what it says
-    out      : folder for the results; default: they are returned only
-    executor : who computes, any executor of `concurrent.futures`; default: processes
-    workers  : how many processes; default: as many as there are processors
-    resume   : go on with what is in the folder;  overwrite : or compute it again
+    measure  : numbers of a run's summary, by name or its end; replaces the list of a file
+    out      : folder for the results; default: they are only returned
+    executor : any executor of `concurrent.futures`; default: processes
+    workers  : number of processes; default: number of processors
+    resume   : continue an interrupted sweep in the folder;  overwrite : compute it again
     part     : (k, n), the k-th of n parts of the sweep, from 1
 
-    The table is the same, bit for bit, whoever computes it in whatever order and in how many
-    sittings. A scene that fails has a row that says why.
+    The table is the same, bit for bit, for any executor, order and number of interruptions. The row
+    of a failed scene has the reason.
 
-    Raises FileError and InputError for what is wrong before anything is computed, and WorkerError
-    where a worker died with some scenes, twice, or nobody is left to compute.
+    Raises FileError and InputError for wrong input before anything is computed, and WorkerError
+    where a worker died twice with the same scenes, or no worker is left.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
     >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)
