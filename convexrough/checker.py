@@ -571,7 +571,7 @@ def word(depth: Interval, positive: str, negative: str) -> str:
 
 
 def hold(what: str, claimed: Any, proved: Any) -> None:
-    """Hold claims against what is proved: words and bounds, in tables and lists."""
+    """Compare claims with what is proved: statuses and bounds, in tables and lists."""
     if isinstance(proved, dict):
         for key, claim in zip(proved, table(claimed, *proved), strict=True):
             hold(f"{what} {key}", claim, proved[key])

@@ -1,4 +1,4 @@
-"""Checks of single values, each raising an InputError that says what was expected."""
+"""Checks of single values; each raises an InputError with the value found and what is expected."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from convexrough.errors import InputError
 #: Sizes of numbers, in a scene's own units, whose products and powers float64 can hold.
 SMALLEST, LARGEST = 1e-60, 1e60
 
-#: What is expected of other numbers.
+#: Expectation for numbers outside this range.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
@@ -53,8 +53,8 @@ def array(
 ) -> Array:
     """A read-only copy of a vector; `sign` is "", "positive" or "not negative".
 
-    A number stands for a vector of `length` equal values. smallest : least size, or 0
-    one : what there is one value for, in messages
+    A number stands for a vector of `length` equal values. smallest : smallest size, unless 0
+    one : the name of what has one value each, in messages
     """
     try:
         if np.iscomplexobj(values) or np.asarray(values).dtype.kind in "USV":
@@ -85,7 +85,7 @@ def array(
 
 
 def friction(coefficient: float | None) -> float:
-    """Coulomb's coefficient f of a scene that must have one."""
+    """The coefficient of friction f; raises InputError if the scene has none."""
     if coefficient is None:
         expected = "a coefficient of friction, as shear needs one"
         raise InputError("friction", found="none", expected=expected)
@@ -93,7 +93,7 @@ def friction(coefficient: float | None) -> float:
 
 
 def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
-    """Shear forces that friction can bear, |Q| <= limit = f P; of any shape."""
+    """Shear forces, of any shape; raises InputError unless |Q| <= limit = f P."""
     try:
         if np.iscomplexobj(forces) or np.asarray(forces).dtype.kind in "USV":
             raise TypeError("no real numbers")
@@ -105,24 +105,24 @@ def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
         place = np.unravel_index(int(np.argmin(good)), given.shape)
         name = f"{what}[{', '.join(map(str, place))}]" if place else what
         worst = float(given[place])
-        over = ""
-        if math.isfinite(worst):
-            excess = f", {abs(worst) / limit - 1:.3g} beyond it" if limit > 0 else ""
-            over = f": gross sliding{excess}"
-        raise InputError(
-            name, found=f"{worst:.17g}{over}", expected=f"at most f P = {limit:.17g} in size"
-        )
+        found = f"{worst!r}"
+        if math.isfinite(worst) and limit > 0:
+            times = abs(worst) / limit
+            found += f" ({times:.4g} f P" if times > 1.001 else f" ((1 + {times - 1:.1g}) f P"
+            found += ": gross sliding)"
+        raise InputError(name, found=found, expected=f"at most f P = {limit!r} in size")
     return given
 
 
 def instance(what: str, value: object, kind: type) -> None:
-    """An object of a class of this package: no class, and no other object."""
+    """Raise InputError unless the value is an object of this class."""
     if not isinstance(value, kind):
-        article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        expected = f"{article} {kind.__name__}"
-        name = type(value).__name__
-        found = f"the class {value.__name__}" if isinstance(value, type) else f"something of {name}"
-        raise InputError(what, found=found, expected=expected)
+        found = f"type {type(value).__name__}"
+        if isinstance(value, type):
+            found = f"the class {value.__name__}"
+        name = kind.__name__  # "Asperities" has no article
+        article = "" if name.endswith("s") else "an " if name[0] in "AEIOU" else "a "
+        raise InputError(what, found=found, expected=article + name)
 
 
 def exactly_one(first: str, a: object, second: str, b: object) -> None:
@@ -133,7 +133,7 @@ def exactly_one(first: str, a: object, second: str, b: object) -> None:
 
 
 def fits_in_memory(what: str, count: float, bytes_each: float, power: int = 1) -> None:
-    """Refuse to start on something this machine cannot hold: bytes_each * count^power."""
+    """Raise InputError if bytes_each * count^power exceeds the memory available."""
     count = float(count)
     needed = bytes_each * count**power
     if needed < 2**26:

@@ -1,10 +1,9 @@
-"""Every formulation and solver on one scene: do they agree, what is proved, what does it cost?
+"""Comparison of all formulations and solvers on one scene: agreement, certificate and time.
 
-Answers found in different ways are certified by the same code, which knows no solver. A proof of
-global scope speaks of the only solution that there is, so an answer with any proof that is further
-from it than their bounds allow would be a contradiction in the mathematics of this package, or a
-mistake in its code. Two local proofs need not contradict each other: their boxes, fitted to
-different loads, need not hold each other, and each may hold a solution of its own.
+The same code certifies all results; it does not depend on the solver. A certificate of global scope
+is about the only solution. If another certified result differs from it by more than the bounds, the
+mathematics or the code of the package has a mistake. Two certificates of local scope need not
+contradict each other: each box may contain a solution of its own.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from importlib.util import find_spec
 from itertools import combinations
 from typing import Literal, NamedTuple
@@ -43,15 +43,15 @@ THROUGH_CVXPY = ("SCS", "QOCO")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Entry(Record):
-    """What one solver made of the scene.
+    """The result of one solver.
 
-    outcome : "answered"; "refused": the scene is not one for this solver; or "failed"
-    message : why, where it did not answer; else ""
-    contact : its answer, judged; None without one
+    outcome : "answered", "refused" (the solver does not accept the scene) or "failed"
+    message : the reason where there is no solution, else ""
+    contact : the certified solution, or None
     disagreement : max |load - reference| over the largest load of the reference; nan without both
-    different_words : asperities whose word is not that of the reference; None without both
-    memory : [bytes] by which the resident memory of the process rose at most while it worked.
-        An allocator that reuses what it holds hides some. None where the system is not Linux
+    different_words : asperities whose status differs from the reference; None without both
+    memory : [bytes] largest increase of the resident memory of the process during the solution,
+        without memory that the allocator reused; None if the system is not Linux
     """
 
     solver: str
@@ -67,8 +67,8 @@ class Entry(Record):
 class Comparison(Table, Drawn):
     """All entries, that of the reference (Newton's method) first.
 
-    contradictions : pairs of certified answers, one of them globally, that exclude each other, in
-        words; each would be a mistake in the mathematics or in the code
+    contradictions : sentences about pairs of certified results, at least one of global scope, that
+        contradict each other; each would be a mistake in the mathematics or in the code
     """
 
     entries: tuple[Entry, ...]
@@ -81,7 +81,7 @@ class Comparison(Table, Drawn):
 
     @property
     def certified(self) -> bool:
-        """Some answer has a proved word for every asperity."""
+        """True if some result has a proved status for all asperities."""
         return any(contact.certificate.holds for contact in self.contacts)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
@@ -125,14 +125,14 @@ def compare(
 ) -> Comparison:
     """Press on the scene with every solver.
 
-    approach [length] or load [force] : what is prescribed, exactly one
+    approach [length] or load [force] : the prescribed quantity, exactly one
     solvers  : settings objects; the default is `every_solver()`. Newton's method is the reference
         and always the first
-    influence : how to couple the asperities, as for `press`
-    announce : told the name of each solver before it starts
+    influence : compliance operator, as for `press`
+    announce : called with the name of each solver before it starts
 
-    Raises InputError where the reference refuses the scene or what is prescribed. What happens to
-    the others is in their entries.
+    Raises InputError where the reference refuses the input. Errors of the other solvers are in
+    their entries.
     """
     reference = _REFERENCE
     others = every_solver() if solvers is None else solvers
@@ -157,9 +157,9 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """Each formulation, and without its final Newton step where it can end with one.
+    """All solvers: each formulation with its final Newton step and without it.
 
-    The cone program in CVXPY also through SCS and QOCO, where they are installed.
+    The cone program in CVXPY is also solved by SCS and QOCO, where they are installed.
     """
     return (
         solvers.Newton(),
@@ -171,6 +171,22 @@ def every_solver() -> tuple[solvers.Solver, ...]:
         solvers.BristleQP(),
         solvers.BristleQP(newton_step=False),
     )
+
+
+def solver_named(name: str) -> solvers.Solver:
+    """A solver by its name in a scene file, or made by `package.Class` without arguments.
+
+    Raises InputError where there is none, it cannot be made, or it is no solver.
+    """
+    module, _, attribute = name.rpartition(".")
+    if not module:
+        return solvers.named(name)
+    expected = "package.Class, importable from here, of a solver that needs no arguments"
+    try:
+        made = getattr(import_module(module), attribute)()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise InputError("solver", found=f"{name} ({error})", expected=expected) from error
+    return solvers.named(made)
 
 
 _REFERENCE = solvers.Newton()
@@ -218,7 +234,7 @@ def _load_code_of(solver: solvers.Solver) -> None:
 
 
 class Answer(NamedTuple):
-    """Loads from somewhere, with what is proved of them; `name` says from where."""
+    """Loads with their certificate; `name` is their source."""
 
     name: str
     loads: Array
@@ -230,10 +246,10 @@ class Answer(NamedTuple):
 
 
 def contradictions(first: Answer, second: Answer) -> list[str]:
-    """Where two answers exclude each other as one solution, one line for each kind; else none.
+    """Sentences about contradictions of two results, one for each kind; empty if there are none.
 
-    Loads, gaps or approaches further apart than the sum of their bounds, or an asperity that is
-    proved to touch by one and to be open by the other. An answer without proof excludes nothing.
+    Loads, gaps or approaches differ by more than the sum of their bounds, or one result proves that
+    an asperity touches and the other that it is open. A result without proof contradicts nothing.
     """
     one, other = first.certificate, second.certificate
     if "none" in (one.scope, other.scope):
@@ -265,7 +281,7 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
 
 
 def listed(items: Iterator[str]) -> str:
-    """The first few, and how many more there are."""
+    """The first few items as text, and the number of the others."""
     named = list(items)
     more = f"; and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
     return "; ".join(named[:MOST_NAMED]) + more

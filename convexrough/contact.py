@@ -1,4 +1,4 @@
-"""`press`: pick what the scene needs, solve, certify."""
+"""`press`: assemble the normal problem of a scene, solve it and certify the loads."""
 
 from __future__ import annotations
 
@@ -49,15 +49,15 @@ class Contact(Keeper, Table, Drawn):
     contact_radii : [length]
     approach      : D0 [length];  load : total [force]
     prescribed_load : [force] None where the approach was prescribed
-    certificate   : what is proved of the loads, whatever the solver said
-    model_error   : largest relative error of the indentations from treating each asperity's
-        pressure as a point force, to leading order: max sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i
-        over the loaded asperities
+    certificate   : what is proved about the loads, independent of the solver
+    model_error   : largest relative error of the indentations due to point forces in place of
+        pressures, to leading order: max sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i over the loaded
+        asperities
     crowding      : largest (a_i + a_j) / r_ij; above 1 contact discs overlap and the model fails
-    covered       : how many open summits lie under the contact disc of a neighbour, where a point
-        force does not stand for its pressure
-    influence     : how the candidates were coupled: "dense", "lattice" or "scattered"
-    seconds       : [s] that `press` took, or `solve`
+    covered       : number of open summits under the contact disc of a neighbour, where a point
+        force does not represent the pressure
+    influence     : the compliance operator: "dense", "lattice" or "scattered"
+    seconds       : [s] time of `press` or `solve`
 
     >>> contact = cr.press(scene, approach=5e-5)
     >>> print(contact.status[0], contact.status[-1], f"{contact.loads[0] / contact.load:.4f}")
@@ -97,7 +97,7 @@ class Contact(Keeper, Table, Drawn):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before relying on these loads: no proof, crowding, few contacts, yield.
+        """Reasons to doubt the loads: no certificate, crowding, few contacts, yield.
 
         >>> contact.warnings
         ()
@@ -111,12 +111,12 @@ class Contact(Keeper, Table, Drawn):
         yield from (("warning", each[:LINE]) for each in self.warnings)
 
     def proof(self, *, sheared: Sequence[Sheared] = (), announce: Announce | None = None) -> Proof:
-        """A proof that `convexrough check` and anybody's checker can judge: `.save(path)` it.
+        """A proof file for `convexrough check` and other checkers; `.save(path)` writes it.
 
-        sheared : friction states of this contact to prove, too, with the loss of their cycles
-        announce : told in a line how far long work has come
+        sheared : shear states of this contact to prove as well, with the losses of their cycles
+        announce : called with one line of progress during long work
 
-        Raises InputError for scenes too large for exact arithmetic, ProofError where nothing is
+        Raises InputError for scenes too large for exact arithmetic, and ProofError where nothing is
         proved.
         """
         from convexrough.proof import Near, prove, refuse_many  # it reads and writes: when asked
@@ -170,9 +170,9 @@ class Contact(Keeper, Table, Drawn):
         )
 
     def change(self, direction: Direction) -> ContactChange:
-        """How loads, gaps and the approach change, to first order, when the scene does.
+        """First-order changes of loads, gaps and approach for a change of the scene.
 
-        direction : of what, by how much
+        direction : the change of the scene
 
         Raises InputError and SolverError as `gradient`.
         """
@@ -200,13 +200,13 @@ def press(
     """Press the sphere on the asperities by an approach [length] or with a load [force].
 
     solver : default `solvers.Newton()`; or its name in a scene file, such as "conic"
-    start  : (n,) [force] loads to start from; in the convex range the answer is the same for all
-    influence : how to couple the asperities: "dense" (a matrix), "lattice" (transforms, where they
-        lie on a lattice), "scattered" (transforms on a mesh); None for the cheapest that is exact
-    announce : told in a line how far long work has come
+    start  : (n,) [force] initial loads; in the convex range the solution does not depend on them
+    influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
+        on a lattice), "scattered" (transforms on a mesh); None for the cheapest that is exact
+    announce : called with one line of progress during long work
 
-    Raises InputError for bad values and SolverError where the solver stops without an answer. An
-    answer without a certificate is returned: look at `contact.certificate.scope`.
+    Raises InputError for bad values and SolverError where the solver stops without a solution. A
+    solution without a certificate is returned: check `contact.certificate.scope`.
 
     >>> contact = cr.press(scene, approach=5e-5)
     >>> print(f"{contact.load:.4g}", (contact.status == "contact").sum(), contact.certificate.scope)
@@ -225,7 +225,7 @@ def solve(
     start: ArrayLike | None = None,
     announce: Announce | None = None,
 ) -> Contact:
-    """`press` for a problem already assembled; its arguments are as there."""
+    """`press` for an assembled problem; the other arguments are as for `press`."""
     return _contact(problem, solvers.named(solver), start, announce, time.perf_counter())
 
 
@@ -246,7 +246,8 @@ def levels_of(contact: Contact) -> Levels:
         top = Level.unproved(problem, state, total)
     else:
         top = Level.of(found, found.total if problem.load is None else problem.total)
-    solver = solvers.named(contact.solver)
+    named = {each().name: each for each in solvers.SOLVERS.values()}
+    solver: Solver = vars(contact).get("_by") or named.get(contact.solver, solvers.Newton)()
 
     def pressed(at_load: NormalProblem) -> Array:
         try:
@@ -254,7 +255,7 @@ def levels_of(contact: Contact) -> Levels:
         except SolverError:  # crowded contacts: begin at the loads that are known
             return solver.solve(at_load, state.loads.high).loads
 
-    return Levels(top, pressed)
+    return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 
 
 def _contact(
@@ -289,7 +290,7 @@ def _contact(
             certificate = certify_on(problem, loads)
         radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
         model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
-    return Contact(
+    contact = Contact(
         scene=scene,
         loads=loads,
         contact_radii=frozen(radii),
@@ -306,12 +307,14 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
+    contact.__dict__["_by"] = solver  # with its settings, which a copy knows by name alone
+    return contact
 
 
 def _solved(
     solver: Solver, problem: NormalProblem, start: Array | None, announce: Announce | None
 ) -> Solution:
-    """The solver's answer, if it is one; the last loads of an error in scene units and order."""
+    """The solver's solution, checked; an error gets its last loads in scene units and order."""
     try:
         solution = solver.solve(problem, start, announce)
     except SolverError as error:
@@ -326,7 +329,7 @@ def _solved(
 
 
 def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> tuple[float, float]:
-    """How far the point-force model is stretched: `model_error` and `crowding` of Contact.
+    """Measures of the validity of point forces: `model_error` and `crowding` of Contact.
 
     radii : (n,) [length] of the candidates
     """

@@ -1,4 +1,4 @@
-"""`result.plot()`: what draws is on a floor above, and is loaded when it is called."""
+"""`result.plot()`: the plotting modules are in a higher layer and are imported when called."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ if TYPE_CHECKING:
 
 
 class Drawn:
-    """A result with a picture of its own."""
+    """A result that can be plotted."""
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
-        """`convexrough.plots.plot` of this, which see: axes in, axes out."""
+        """Draw the main figure of the result, as `convexrough.plots.plot`; return the axes."""
         from convexrough.plots import plot  # it loads matplotlib: only when asked
 
         return plot(self, axes, **options)

@@ -1,4 +1,4 @@
-"""What can go wrong, in words a user can act on."""
+"""The errors of the package; each message says what is wrong and what is expected."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 class ConvexroughError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base class of all errors that this package raises."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickled as it is: its words are not composed anew, and it passes between processes."""
+        """Pickled with its message, so that it passes between processes unchanged."""
         return _again, (type(self), self.args), self.__dict__
 
 
@@ -23,12 +23,12 @@ def _again(kind: type[ConvexroughError], arguments: tuple[object, ...]) -> Conve
 
 
 class InputError(ConvexroughError, ValueError):
-    """A value the user gave is wrong.
+    """A value given by the user is wrong.
 
-    what     : the value, by the name the user knows it by
-    found    : what was given
-    expected : what is accepted, as a phrase ("a positive number")
-    where    : file, table, row or column, where known
+    what     : name of the value
+    found    : the value given
+    expected : a description of valid values ("a positive number")
+    where    : file, table, row or column, if known
     """
 
     def __init__(self, what: str, *, found: object, expected: str, where: str = "") -> None:
@@ -37,13 +37,13 @@ class InputError(ConvexroughError, ValueError):
         super().__init__(f"{place}{what}: found {found}, expected {expected}")
 
     def within(self, where: str) -> InputError:
-        """The same error, seen from further out (a file, say)."""
+        """The same error with the place `where` (a file, for example) in front."""
         place = f"{where}: {self.where}" if self.where else where
         return InputError(self.what, found=self.found, expected=self.expected, where=place)
 
 
 class MistakesError(InputError):
-    """Everything that is wrong in a file; the message has one line per mistake."""
+    """All mistakes of a file; the message has one line per mistake."""
 
     def __init__(self, path: str, mistakes: Sequence[str]) -> None:
         super().__init__("mistakes", found=len(mistakes), expected="none", where=path)
@@ -54,25 +54,24 @@ class MistakesError(InputError):
 
 
 class SceneFileError(MistakesError):
-    """Everything that is wrong in a scene file."""
+    """All mistakes of a scene file."""
 
 
 class TableError(MistakesError):
-    """Everything that is wrong in a file of numbers."""
+    """All mistakes of a file of numbers."""
 
 
 class FileError(ConvexroughError):
-    """A file or folder cannot be read, or may not be written."""
+    """A file or folder cannot be read or must not be overwritten."""
 
 
 class SolverError(ConvexroughError):
-    """A solver stopped without an answer.
+    """A solver stopped without a solution.
 
-    what    : what was wrong, with the number that was too large
-    solver  : its name
-    advice  : what to try; "" where nothing is known to help
-    iterate : the last loads (n,) or forces, (n,) or (n, 2), [force] in the scene's order; None
-        where there are none
+    what    : the reason, with the number that was too large
+    solver  : name of the solver
+    advice  : what to try, or ""
+    iterate : the last loads (n,) or forces, (n,) or (n, 2), [force] in the scene's order, or None
     """
 
     def __init__(
@@ -92,14 +91,14 @@ class ProofError(ConvexroughError):
     """Nothing could be proved; the message says why."""
 
 
-#: What extras hold, where that is not what they are called.
+#: Packages of extras with another name.
 PACKAGES = {"parquet": "pyarrow", "dask": "'dask[dataframe]' distributed"}
 
 
 class ExtraError(ConvexroughError, ImportError):
-    """A package that is not among the requirements is missing; the message says what to install.
+    """An optional package is missing; the message says what to install.
 
-    extra : the name of the extra that holds it
+    extra : the name of the extra that contains it
     """
 
     def __init__(self, extra: str) -> None:
@@ -109,4 +108,4 @@ class ExtraError(ConvexroughError, ImportError):
 
 
 class WorkerError(ConvexroughError):
-    """Those who should compute are gone, or are not the same program; what is done is kept."""
+    """The workers stopped or run another version; rows computed so far are kept."""

@@ -1,7 +1,7 @@
-"""The fields under the sphere, anywhere on the surface, from the states of its asperities.
+"""Pressure, traction and displacement at any points of the surface, from contacts and shear states.
 
-Pressure and traction are sums over the contact discs that hold a point; displacements, which reach
-everywhere, over all asperities. Shear is along x.
+Pressure and traction are sums over the contact discs that contain a point; displacements are sums
+over all asperities. Shear is along x.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
     points : (..., 2) [length]  places on the surface; the axis of the sphere is the origin
     result : (...) [force / length^2]  0 outside every contact disc
 
-    The discs lie about the contact points of the scene: the summits, or in the "closest"
-    geometry the places where the paraboloids touch first.
+    The centres of the discs are the contact points of the scene: the summits, or in the "closest"
+    geometry the points where the paraboloids first touch.
     """
     touching = np.flatnonzero(contact.loads)
     return superpose(
@@ -52,7 +52,7 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
     """Normal displacement of both surfaces, the far bodies at rest: (...) [length].
 
-    The sum of each asperity's own field, its pressure spread over its disc and not a point force.
+    The sum of the fields of all asperities, with pressures on discs and not point forces.
     """
     touching = np.flatnonzero(contact.loads)
     centres = contact.scene.contact_points[touching]

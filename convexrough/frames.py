@@ -22,7 +22,7 @@ DIRECTION = {"direction": ["x", "y"]}
 
 
 def dataframe(variables: Variables, attributes: dict[str, Any]) -> pandas.DataFrame:
-    """Those along the rows, and along rows and direction, as columns."""
+    """A data frame of the arrays along the rows, or along rows and direction."""
     rows, _ = next(iter(variables.values()))
     columns: dict[str, NDArray[Any]] = {}
     for name, (along, values) in variables.items():
@@ -37,7 +37,7 @@ def dataframe(variables: Variables, attributes: dict[str, Any]) -> pandas.DataFr
 
 
 def dataset(variables: Variables, attributes: dict[str, Any]) -> xarray.Dataset:
-    """All of them, copied: a data set may be written to, a result may not."""
+    """A data set of copies of all arrays, which may be changed; those of a result may not."""
     arrays = {name: (along, np.array(values)) for name, (along, values) in variables.items()}
     known = {"x", "y", "asperity"} & set(arrays)
     vectors = any("direction" in along for along, _ in arrays.values())

@@ -1,4 +1,4 @@
-"""What later stages make of an object, kept as long as the object is."""
+"""A cache on an object: derived objects are stored on it and freed with it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ Made = TypeVar("Made")
 
 
 class Keeper:
-    """Keeps what is made from it: each thing is made once, and freed with its maker."""
+    """Base class that caches objects derived from it; each is made once and freed with it."""
 
     def keep(self, make: Callable[[Self], Made]) -> Made:
-        """make(self), which must not hold self: then nothing waits for a garbage collector."""
+        """make(self), cached. The result must not refer to self, or memory is freed late."""
         kept: dict[Any, Any] = self.__dict__.setdefault("_kept", {})
         if make not in kept:
             kept[make] = make(self)

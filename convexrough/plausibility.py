@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from convexrough.contact import Contact
+from convexrough.tabular.units import UnitNames
 
 #: Fewer asperities in contact than this are no rough surface.
 FEW = 5
 
-#: Contact radius over radius from which the parabola that stands for a sphere is off by 1 %.
+#: Contact radius over radius from which the parabola differs from the sphere by 1 %.
 STEEP = 0.2
 
 
@@ -68,8 +69,8 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
         )
     if normal["steepness"] > STEEP:
         yield (
-            f"contact radius {normal['steepness']:.3g} of the tip radius: a tip is taken for a "
-            f"paraboloid, which is off by 1 % at {STEEP:g}"
+            f"contact radius is {normal['steepness']:.3g} of the tip radius: the paraboloid of a "
+            f"tip differs from a sphere by 1 % at {STEEP:g}"
         )
     if normal["crowding"] > 1:
         yield (
@@ -88,3 +89,11 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
             f"{normal['hardness']:.4g}{unit}, on {normal['beyond_hardness']} of "
             f"{normal['contact']} asperities: they would yield"
         )
+
+
+def described_modulus(modulus: float, units: UnitNames) -> str:
+    """A contact modulus, also in pascals where the units are named."""
+    unit = units.unit("pressure")
+    if unit is None:
+        return f"{modulus:.10g}"
+    return f"{modulus:.10g} {unit.name}  ({modulus * float(unit.size):.4g} Pa)"

@@ -1,4 +1,4 @@
-"""What every result can do: say itself on one screen, become a table, be pickled."""
+"""Base classes of results: printing on one screen, tables, pickles."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 #: Names of attributes by what their arrays are along.
 Along: TypeAlias = dict[tuple[str, ...], tuple[str, ...]]
+
+#: Counts, of which one is no other.
+COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
 
 #: How many values of an array are written out, and how many letters of a text.
 FEW, LINE = 4, 76
@@ -47,7 +50,7 @@ class Record:
         return f"<div style='{beside}'>{table}{picture}</div>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone: what is kept beside them is made again."""
+        """The fields without the cache, which is made again when needed."""
         return {each.name: getattr(self, each.name) for each in self._fields()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -76,17 +79,24 @@ class Record:
 
 
 class Table(Record):
-    """A record whose arrays are along asperities, steps or points."""
+    """A record whose arrays are along asperities, steps or points.
+
+    A column has the name of one of its values, in data frames as in files: `load` of `loads`.
+    """
 
     #: The first key is what the rows of a data frame are.
     _along: ClassVar[Along] = {}
 
+    def columns(self, *names: str) -> dict[str, NDArray[Any]]:
+        """These arrays, by what one value of each is called."""
+        return {singular(name): getattr(self, name) for name in names}
+
     def to_dataframe(self) -> pandas.DataFrame:
         """A data frame of pandas: a row for each asperity, step, point or solver.
 
-        Columns have the names of the attributes, those of vectors with _x and _y; numbers and words
-        of the whole are in `attrs`. What is along two things, such as the forces of asperities at
-        each step of a history, is in `to_xarray` alone.
+        Columns have the names of single values, `load` of `loads`, those of vectors with _x and _y;
+        numbers and words of the whole are in `attrs`. What is along two things, such as the forces
+        of asperities at each step of a history, is in `to_xarray` alone.
 
         Raises ExtraError where pandas is not installed.
         """
@@ -106,11 +116,13 @@ class Table(Record):
         if (scene := getattr(getattr(self, "contact", self), "scene", None)) is not None:
             x, y = scene.asperities.positions.T
             places = {"x": (("asperity",), x), "y": (("asperity",), y)}
-        arrays = {
-            name: (along, getattr(self, name))
-            for along, names in self._along.items()
-            for name in names
-        }
+        taken = {name for names in self._along.values() for name in names}
+        arrays = {}
+        for along, names in self._along.items():
+            for name in names:
+                one = singular(name)
+                column = f"asperity_{one}" if one != name and one in taken else one
+                arrays[column] = along, getattr(self, name)
         rows_first = next(iter(self._along)) == ("asperity",)
         return places | arrays if rows_first else arrays | places
 
@@ -118,6 +130,14 @@ class Table(Record):
         """The fields that are one number or word."""
         values = self.__getstate__()
         return {name: it for name, it in values.items() if isinstance(it, (str, int, float))}
+
+
+def singular(name: str) -> str:
+    """What one value of an array is called: load of loads, radius of radii, loss of losses."""
+    for ending, one in (("radii", "radius"), ("losses", "loss"), ("approaches", "approach")):
+        if name.endswith(ending):
+            return name.removesuffix(ending) + one
+    return name if name.endswith(("ss", "us")) or name in COUNTS else name.removesuffix("s")
 
 
 def in_words(value: Any) -> str:

@@ -31,13 +31,15 @@ def assert_certified(
     within: float | None = None,
     floor: float = 0.0,
 ) -> Certificate:
-    """The asperities that these loads claim to touch are proved to, and only they; the proof.
+    """Check that exactly the asperities with a load touch; return the certificate of the loads.
 
-    loads  : (n,) [force] from anywhere, in the order of the scene's asperities
-    approach [length] or load [force] : what is prescribed, exactly one; it is that of the loads
-    within : also, no load is further from the solution than this part of the largest load. Without
-        it the loads need only be good enough for the words
+    loads  : (n,) [force] from any source, in the order of the scene's asperities
+    approach [length] or load [force] : the prescribed quantity, exactly one
+    within : also check that the error of every load is below this fraction of the largest load.
+        Without it the loads only need to be accurate enough to prove every status
     floor  : [force] a load up to this claims that its asperity is open
+
+    Raises AssertionError with the asperities concerned.
     """
     __tracebackhide__ = True
     verdict = verify(scene, loads, approach=approach, load=load, within=within, floor=floor)
@@ -55,12 +57,14 @@ def assert_shear_certified(
     within: float | None = None,
     sliding: ArrayLike | None = None,
 ) -> ShearCertificate:
-    """The asperities that these forces claim to slide are proved to, and only they; the proof.
+    """Check that exactly the asperities claimed to slide do; return the certificate of the forces.
 
-    forces  : (n,) [force] of first loading, along the shear force, from anywhere
-    force   : [force] the shear force that they carry
-    within  : also, no force is further from the solution than this part of the largest
-    sliding : (n,) who is claimed to slide; default: those whose force is f P to 1e-4 of it
+    forces  : (n,) [force] of first loading, along the shear force, from any source
+    force   : [force] their prescribed sum
+    within  : also check that the error of every force is below this fraction of the largest
+    sliding : (n,) bool, the claim; default: asperities whose force is f P to 1e-4 of it
+
+    Raises AssertionError with the asperities concerned.
     """
     __tracebackhide__ = True
     verdict = verify_shear(contact, forces, force=force, within=within, sliding=sliding)
@@ -77,15 +81,17 @@ def assert_agree(
     load: float | None = None,
     within: float | None = None,
 ) -> None:
-    """Two answers to one problem are both proved, and do not exclude each other.
+    """Check that two results of one problem are certified and do not contradict each other.
 
     first, second : contacts, or loads (n,) [force] in the order of the scene's asperities
-    scene, approach or load : what loads that come without a contact answer
-    within : also, no two loads differ by more than this part of the largest. Without it two poor
-        answers agree as long as their bounds allow
+    scene, approach or load : the problem, required for loads without a contact
+    within : also check that no two loads differ by more than this fraction of the largest. Without
+        it two inaccurate results agree as long as their bounds allow
 
-    They exclude each other where loads, gaps or approaches are further apart than the sum of their
+    They contradict each other where loads, gaps or approaches differ by more than the sum of their
     proved bounds, or where one proves that an asperity touches and the other that it is open.
+
+    Raises AssertionError with the asperities concerned.
     """
     __tracebackhide__ = True
     answers = [
@@ -159,7 +165,8 @@ def _wrong(claim: Claim, name: str, scene: Scene) -> str:
     if len(wrong := claim.wrongly_claimed):
         first = claim.suspects[np.isin(claim.suspects, wrong)]
         named = np.append(first, np.setdiff1d(wrong, first))
-        kinds = ", ".join(f"{len(who)} {what}" for what, who in claim.wrong.items() if len(who))
+        counts = {what: len(which) for what, which in claim.wrong.items() if len(which)}
+        kinds = ", ".join(f"{count} {what}" for what, count in counts.items())
         return f"{kinds}: {described(named)}"
     if len(doubtful := claim.undecided):
         count = f"{len(doubtful)} of {len(scene)} asperities are undecided"
@@ -167,13 +174,13 @@ def _wrong(claim: Claim, name: str, scene: Scene) -> str:
     if not claim.near_enough:
         worst = claim.suspects if len(claim.suspects) else claim.off
         bound = f"{name}s are proved to {claim.error:.2g} of the largest"
-        needed = "enough for every word" if claim.within is None else f"{claim.within:g}"
+        needed = "enough for all statuses" if claim.within is None else f"{claim.within:g}"
         return f"{bound}, expected {needed}: {described(worst)}"
     return f"{name}s add up to {claim.total_given:.17g}, expected {claim.total_prescribed:.17g}"
 
 
 def _described(claim: Claim, name: str, scene: Scene, which: Indices) -> str:
-    """The asperities with what is claimed of them, how far that may be off, and their words."""
+    """The asperities with the claimed value, its error bound, and the proved status."""
     points, nearby = scene.asperities.positions, claim.nearby()
 
     def solved(i: int) -> str:

@@ -1,17 +1,26 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and JSON without infinities."""
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import re
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from convexrough.errors import FileError
 
 #: What is left of a file by a process that was killed while it wrote: its name, and the process.
 _UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<process>\d+)\.unfinished", re.DOTALL)
+
+
+def unfinished(path: Path) -> Path:
+    """A name beside `path` for what is not whole yet."""
+    return path.with_name(f".{path.name}.{os.getpid()}.unfinished")
 
 
 @contextmanager
@@ -20,7 +29,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Raises FileError where it cannot be written. A process that is killed leaves the file beside it.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
+    temporary = unfinished(path)
     try:
         yield temporary
         os.replace(temporary, path)
@@ -31,11 +40,37 @@ def replacing(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+def write_text(path: Path, text: str | bytes) -> Path:
+    """Write a file; the path."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def to_json(contents: Any) -> str:
+    """Valid JSON: infinities, and what is no number, are null."""
+    return json.dumps(_finite(contents), indent=2, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
 def remove_unfinished(folder: Path) -> None:
     """Remove what killed processes left in a folder; of one that still runs, nothing."""
     for path in folder.iterdir():
         found = _UNFINISHED.fullmatch(path.name)
-        if found and path.is_file() and not path.is_symlink() and not _runs(int(found["process"])):
+        if not found or path.is_symlink() or _runs(int(found["process"])):
+            continue
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        elif path.is_file():
             path.unlink(missing_ok=True)
 
 

@@ -11,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from docstrings import literal_docstring
 from sphinx.application import Sphinx
+from sphinx.util.inspect import TypeAliasForwardRef
 
 from convexrough import __version__
 
@@ -40,6 +41,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
 autodoc_type_aliases = {"Array": "Array", "ArrayLike": "ArrayLike", "Kind": "Kind"}
+TypeAliasForwardRef.__repr__ = lambda alias: alias.name
 python_maximum_signature_line_length = 80
 
 # Course

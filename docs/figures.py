@@ -11,7 +11,9 @@ from runpy import run_path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch
 
+from convexrough import press, shear
 from convexrough.paper import example
 from convexrough.paper.figures import paper_figures
 
@@ -45,12 +47,48 @@ def once_differentiable() -> Figure:
     return figure
 
 
+def stick_zone() -> Figure:
+    """Two pressings and the sheared contact that is their difference: of theory/states.md."""
+    contact = press(example.scene(), approach=example.APPROACH)
+    scene, load = contact.scene, contact.load
+    assert scene.friction is not None
+    share = 0.7
+    smaller = press(scene, load=(1 - share) * load)
+    stick = shear(contact, force=share * scene.friction * load).stick_radii
+    unit = float(np.abs(scene.contact_points).max())
+    points = scene.contact_points / unit
+    figure = Figure(figsize=(7.0, 2.75), layout="constrained")
+    titles = ("pressed with $P$", f"pressed with $L = {1 - share:.1f}\\,P$",
+              f"sheared with $Q = {share:.1f}\\,f P$")  # fmt: skip
+    layers = (
+        ((contact.contact_radii, "#7f9cb8"),),
+        ((smaller.contact_radii, "#b9d0e5"),),
+        ((contact.contact_radii, "#e0842a"), (stick, "#b9d0e5")),
+    )
+    for axes, title, discs in zip(figure.subplots(1, 3, sharey=True), titles, layers, strict=True):
+        axes.plot(*points[contact.loads == 0].T, ".", color="0.6", ms=2)
+        for radii, colour in discs:
+            for point, radius in zip(points, radii / unit, strict=True):
+                axes.add_patch(Circle(tuple(point), radius, color=colour, lw=0))
+        axes.set(title=title, aspect="equal", xlim=(-1.1, 1.1), ylim=(-1.1, 1.1))
+        axes.set(xticks=[], yticks=[])
+    slides = (contact.loads > 0) & (stick == 0)
+    for point, radius in zip(points[slides], contact.contact_radii[slides] / unit, strict=True):
+        figure.axes[2].add_patch(Circle(tuple(point), radius, color="#701c05", lw=0))
+    figure.axes[1].plot(*points[slides].T, ".", color="0.6", ms=2)
+    keys = {"touches": "#7f9cb8", "stick disc": "#b9d0e5", "slip": "#e0842a", "slides": "#701c05"}
+    handles = [Patch(color=colour, label=name) for name, colour in keys.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
 def drawings() -> dict[str, Callable[[Path], object]]:
     """What draws each file, by its name: given the path to write."""
-    paper = cache(lambda: paper_figures(example.findings().contact))
+    paper = cache(lambda: paper_figures(example.results()[0].contact))
     design = cache(lambda: run_path(str(EXAMPLES / "design_a_damper.py"))["draw"])
     return {f"{name}.png": partial(_save, paper, stem) for name, stem in PAPER.items()} | {
         "once-differentiable.png": lambda path: once_differentiable().savefig(path, dpi=150),
+        "stick-zone.png": lambda path: stick_zone().savefig(path, dpi=150),
         "design.png": lambda path: design()(str(path)),
         "design-fine.png": lambda path: design()(str(path), 4),
     }

@@ -25,9 +25,9 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 import convexrough as cr
+from convexrough.surface.boundary_elements import HalfSpace, touch
 
 Array = NDArray[np.float64]
 Owner = NDArray[np.intp]  # which contact a pixel belongs to
@@ -38,69 +38,6 @@ SPHERE_RADIUS, APPROACH, CONTACT_MODULUS = 1.0, 5e-5, 1.0
 #: Outside this circle the sphere stays above a plane through the tips, so nothing can touch.
 HALF_WIDTH = np.sqrt(2 * SPHERE_RADIUS * APPROACH)
 RINGS = "FEDCBA"  # the paper's names, from the axis outwards
-
-
-class HalfSpace:
-    """Pressures on a square of pixels to displacements at their centres, both bodies together.
-
-    A pixel of uniform unit pressure displaces the surface by (1 / (pi E*)) times the integral of
-    1/r over it, which Love (1929) has in closed form. The product with all pixels is a convolution:
-    one Fourier transform on a square twice as wide, so that nothing wraps around.
-    """
-
-    def __init__(self, pixels: int, pixel_size: float, contact_modulus: float) -> None:
-        self.pixels = pixels
-        self.padded = fft.next_fast_len(2 * pixels - 1, real=True)
-        steps = np.arange(self.padded)
-        steps = np.minimum(steps, self.padded - steps)
-        edges = (np.arange(steps.max() + 2) - 0.5) * pixel_size
-        x, y = edges[:, None], edges[None, :]
-        corner = x * np.arcsinh(y / abs(x)) + y * np.arcsinh(x / abs(y))  # d2/dxdy of it is 1/r
-        influence = np.diff(np.diff(corner, axis=0), axis=1) / (np.pi * contact_modulus)
-        # An even kernel has a real transform.
-        self.symbol = fft.rfft2(influence[np.ix_(steps, steps)], workers=1).real.copy()
-
-    def displacement(self, pressure: Array) -> Array:
-        """K p; rows known to be zero, or not wanted, are not transformed."""
-        n, padded = self.pixels, self.padded
-        rows = fft.rfft(pressure, padded, axis=1, workers=1)
-        waves = fft.fft(rows, padded, axis=0, workers=1)
-        waves *= self.symbol
-        rows = fft.ifft(waves, axis=0, overwrite_x=True, workers=1)[:n]
-        return np.asarray(fft.irfft(rows, padded, axis=1, workers=1)[:, :n], dtype=np.float64)
-
-
-def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float = 1e-6) -> Array:
-    """The pressure that solves the contact law, by conjugate gradients on the touching pixels.
-
-    Polonsky and Keer (Wear 231, 1999) at a given approach: step, cut negative pressures to zero,
-    and let pixels back in where the bodies overlap; the directions start afresh when one comes in.
-    Stops when |g| <= accuracy * max h where p > 0 and g >= -accuracy * max h where p = 0 < h.
-    """
-    allowed = overlap > 0
-    pressure = np.where(allowed, start, 0.0)
-    gap = half_space.displacement(pressure) - overlap
-    direction = np.zeros_like(gap)
-    previous = np.inf
-    for _ in range(2000):
-        touching = pressure > 0
-        if np.where(touching, abs(gap), -gap)[allowed].max() <= accuracy * overlap.max():
-            return pressure
-        gradient = np.where(touching, gap, 0.0)
-        square = float(np.vdot(gradient, gradient))
-        direction = np.where(touching, gradient + square / previous * direction, 0.0)
-        change = half_space.displacement(direction)
-        step = float(np.vdot(gradient, direction) / np.vdot(change, direction))
-        trial = pressure - step * direction
-        pressure = np.maximum(trial, 0.0)
-        entering = allowed & (pressure == 0) & (gap < 0)
-        pressure[entering] = -step * gap[entering]
-        previous = np.inf if entering.any() else square
-        if entering.any() or trial.min() < 0:
-            gap = half_space.displacement(pressure) - overlap
-        else:
-            gap -= step * change
-    raise RuntimeError(f"pixel pressures not found to {accuracy:g} of the overlap in 2000 steps")
 
 
 def smooth_sphere(x: Array, y: Array, x0: float = 0.0, y0: float = 0.0) -> tuple[Array, Owner]:
@@ -138,7 +75,7 @@ def loads_by_level(shape: Shape, contacts: int, levels: list[int]) -> Array:
         overlap, owner = shape(centres, centres)
         coarse = pressure.repeat(2, axis=0).repeat(2, axis=1)
         start = coarse if loads else CONTACT_MODULUS * overlap / HALF_WIDTH
-        pressure = touch(HalfSpace(n, size, CONTACT_MODULUS), overlap, start)
+        pressure = touch(HalfSpace((n, n), (size, size), CONTACT_MODULUS), overlap, start, 1e-6)
         forces = np.bincount(owner.ravel(), pressure.ravel() * size**2, contacts)
         loads.append(forces.astype(np.float64))
     return np.array(loads)

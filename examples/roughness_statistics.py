@@ -55,7 +55,7 @@ def sweep_tables(surfaces: int) -> dict[str, Any]:
         "cycle": {"maximum": list(AMPLITUDES)},
         "sweep": {
             "seeds": max(1, surfaces // (len(SPREADS) * len(TIPS))),
-            "measure": ["contacts", "loss", "loss_over_smooth"],
+            "measure": ["loss", "loss_over_smooth"],
             "over": {
                 "asperities.tip_radius_cv": list(TIPS),
                 "asperities.height_std": list(SPREADS),

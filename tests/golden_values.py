@@ -8,6 +8,7 @@ one (`source`), else from the package; and the bounds that the package proves fo
 
 import json
 from collections import Counter
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -37,9 +38,18 @@ def _many(within: float, scattered: bool) -> cr.Scene:
     return cr.Scene(1.0, asperities, MATERIAL, FRICTION, geometry="summit")
 
 
+def _everywhere(name: str) -> tuple[cr.Scene, float]:
+    """The scene with rounded radii and heights: a logarithm's last bit depends on the machine."""
+    scene, approach = SCENES[name]
+    made = scene.asperities
+    asperities = cr.Asperities(made.positions, made.tip_radii.round(9), made.heights.round(15))
+    return replace(scene, asperities=asperities), approach
+
+
 #: name -> (scene, approach, influence)
 GOLDEN: dict[str, tuple[cr.Scene, float, Any]] = {
-    **{name: (*SCENES[name], "dense") for name in ("paper", "rough", "rough, closest", "steel")},
+    **{name: (*SCENES[name], "dense") for name in ("paper", "steel")},
+    **{name: (*_everywhere(name), "dense") for name in ("rough", "rough, closest")},
     "dense": (*SCENES["dense"], "dense"),
     "lattice": (_many(0.0102, scattered=False), 5e-5, "lattice"),
     "scattered": (_many(0.0075, scattered=True), 2.5e-5, "scattered"),

@@ -1,10 +1,13 @@
 """Sweeps that several tests compute, and what it means that two tables are the same."""
 
 import json
+import logging
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +15,9 @@ from typing import Any
 import numpy as np
 
 import convexrough as cr
-from convexrough.sweeps.sources import Press, Tables
+from convexrough.progress import LOGGER
+from convexrough.sweeps.measures import Stages
+from convexrough.sweeps.scenes import Press, Tables
 
 SMALL: dict[str, Any] = {
     "sphere": {"radius": 1.0},
@@ -26,7 +31,7 @@ SMALL: dict[str, Any] = {
     "cycle": {"maximum": [0.37]},
     "sweep": {
         "seeds": 4,
-        "measure": ["contacts", "load", "loss"],
+        "measure": ["contact", "load", "loss"],
         "over": {"asperities.height_std": [0.0, 1e-6], "normal.load": [1e-7, 3e-7]},
     },
 }  # fmt: skip
@@ -45,7 +50,7 @@ def tables(**changed: Any) -> dict[str, Any]:
 
 def sweeping(**keys: Any) -> dict[str, Any]:
     """SMALL with this table [sweep] alone."""
-    return {**tables(), "sweep": {"measure": ["contacts"], **keys}}
+    return {**tables(), "sweep": {"measure": ["contact"], **keys}}
 
 
 def toml(contents: dict[str, Any]) -> str:
@@ -80,6 +85,24 @@ def _equal(one: Any, other: Any) -> bool:
     return one.dtype == other.dtype and one.tobytes() == other.tobytes()
 
 
+@contextmanager
+def told(call: Callable[[str], None]) -> Iterator[None]:
+    """Call with all that is said while work goes on, as it is said."""
+
+    class Handler(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            call(record.getMessage())
+
+    handler, level = Handler(), LOGGER.level
+    LOGGER.addHandler(handler)
+    LOGGER.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        LOGGER.removeHandler(handler)
+        LOGGER.setLevel(level)
+
+
 def started(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
     """The command line as a process of its own, in a folder."""
     return subprocess.Popen(
@@ -103,7 +126,7 @@ class Deadly(Tables):
     def opened(self) -> Press:
         press = super().opened()
 
-        def press_one(number: int) -> cr.Contact:
+        def press_one(number: int) -> tuple[cr.Contact, Stages]:
             if number == self.worst:
                 os.kill(os.getpid(), signal.SIGKILL)
             return press(number)

@@ -23,10 +23,8 @@ def test_the_import_alone_imports_nothing() -> None:
 
 def test_every_public_name_is_there() -> None:
     assert all(hasattr(cr, name) for name in cr.__all__)
-    assert {*cr.__all__, "plots", "testing", "compare", "fields", "gallery", "surface"} == set(
-        dir(cr)
-    )
-    with pytest.raises(AttributeError, match="no attribute 'pres'"):
+    assert set(cr.__all__) == set(dir(cr))
+    with pytest.raises(AttributeError, match="pres"):
         _ = cr.pres
 
 
@@ -52,7 +50,7 @@ def wrong(call: str) -> Any:
     [
         (
             "cr.press(scene.asperities, approach=5e-5)",
-            "scene: found something of Asperities, expected a Scene",
+            "scene: found type Asperities, expected a Scene",
         ),
         ("cr.press(cr.Scene, approach=5e-5)", "scene: found the class Scene, expected a Scene"),
         ("cr.press(scene, approach='5e-5')", "approach: found '5e-5', expected a finite number"),
@@ -64,7 +62,7 @@ def wrong(call: str) -> Any:
         ("cr.Scene(1.0, scene.asperities, cr.Material)", "found the class Material, expected a M"),
         ("cr.Scene('1', scene.asperities, scene.material)", "sphere_radius: found '1'"),
         ("cr.Asperities([['0', '0']], 1.0)", "positions: .*expected numbers"),
-        ("cr.shear(scene, force=0.0)", "contact: found something of Scene, expected a Contact"),
+        ("cr.shear(scene, force=0.0)", "contact: found type Scene, expected a Contact"),
         ("cr.cycle(scene, maximum=0.0)", "expected a Contact"),
         ("cr.history(cr.Contact, forces=[0.0])", "found the class Contact"),
         ("cr.onset_of_sliding(scene)", "expected a Contact"),

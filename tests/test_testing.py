@@ -12,7 +12,7 @@ from scenes import PAPER_APPROACH, paper, scattered, twins
 import convexrough as cr
 from convexrough.testing import assert_agree, assert_certified, assert_shear_certified
 
-PAGE = Path(__file__).parent.parent / "docs" / "testing.md"
+PAGE = Path(__file__).parent.parent / "docs" / "how-to" / "test-your-solver.md"
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +27,10 @@ def failure(call: Any, *arguments: Any, **options: Any) -> str:
     return str(caught.value)
 
 
-def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    blocks = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.M | re.S)
-    assert len(blocks) == 4
-    exec("\n".join(blocks), {})
+def test_the_page_shows_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    """The message of a failed check; test_documents.py runs the other blocks."""
+    first, second = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.M | re.S)[:2]
+    exec(first + second, {})
     printed = capsys.readouterr().out.strip()
     assert printed in PAGE.read_text()
     assert printed.startswith("1 claimed open, proved to touch: 36 at (")

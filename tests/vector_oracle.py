@@ -6,9 +6,10 @@ over c_t f, with bias = nu / (2 - nu) and d the unit vector between two asperiti
     F = ( eta_i + sum_j A_ij [(1 - bias) I + 2 bias d d'] q_j - X,    sum_j q_j - T ) = 0,
 
 where q_i is along eta_i and of the length P_i [1 - (1 - min(|eta_i| / kappa_i, 1))^(3/2)]: what an
-asperity must take up, its slip included, is eta (docs/theory/friction.md, "Newton's method").
-Newton finds the point; an interval Newton step proves it, as in `multiprecision`, which this
-shares the arithmetic of. It is the only one where the energy is convex, which is not tested here.
+asperity must take up, its slip included, is eta
+(docs/theory/vector-friction.md, "Newton's method"). Newton finds the point; an interval Newton step
+proves it, as in `multiprecision`, which this shares the arithmetic of. It is the only one where the
+energy is convex, which is not tested here.
 """
 
 from dataclasses import dataclass

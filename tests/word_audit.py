@@ -1,6 +1,6 @@
 """The word audit: every word and bound of random and hostile scenes against ball arithmetic.
 
-    PYTHONPATH=tests python tests/word_audit.py 3000        prints the tables of docs/reliability.md
+    PYTHONPATH=tests python tests/word_audit.py 3000        prints the tables of docs/tests.md
 
 Each scene is drawn from a seed of its own, pressed through one operator under one control, sheared,
 cycled and sheared with vectors, and all that is said of it is compared with proved 60-digit states:

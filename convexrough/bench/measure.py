@@ -160,7 +160,7 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
         "normal": {"load": 3.6e-7},
         "friction": {"coefficient": 0.5},
         "cycle": {"maximum": [0.37]},
-        "sweep": {"seeds": scenes, "measure": ["contacts", "loss"]},
+        "sweep": {"seeds": scenes, "measure": ["contact", "loss"]},
     }
     began = time.perf_counter()
     words = sweep(file, workers=workers).read(["status"])["status"]

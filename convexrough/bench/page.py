@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 from convexrough.bench.measure import TASKS
 from convexrough.bench.rows import Bench, Row, frontier
 from convexrough.errors import FileError
-from convexrough.run.columns import aligned, markdown
-from convexrough.run.results import beside, write_figures, write_tables
-from convexrough.run.summary import to_json
+from convexrough.run.results import write_figures, write_json, write_tables
+from convexrough.tabular.columns import aligned, markdown
 from convexrough.version import __version__
+from convexrough.whole import replacing, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -103,8 +103,7 @@ def write_bench(folder: Path, bench: Bench, *, figures: bool, page: Path | None)
     )
     if figures:
         written += write_figures(folder, _drawn(bench))
-    with beside(path := folder / "bench.json") as temporary:
-        temporary.write_text(to_json(bench.summary()) + "\n", encoding="utf-8")
+    path = write_json(folder / "bench.json", bench.summary())
     if page is not None:
         written += _renew(page, bench)
     return [path, *written]
@@ -125,13 +124,11 @@ def _renew(page: Path, bench: Bench) -> list[Path]:
     except OSError as error:
         raise FileError(f"{folder}: cannot be made: {error.strerror or error}") from error
     for stem, figure in _drawn(bench).items():
-        with beside(path := folder / f"{stem}.png") as temporary:
+        with replacing(path := folder / f"{stem}.png") as temporary:
             figure.savefig(temporary, format="png", dpi=200)
         written.append(path)
-    with beside(page) as temporary:
-        block = [before + BEGIN, "", *page_block(bench), "", END + after]
-        temporary.write_text("\n".join(block), encoding="utf-8")
-    return [*written, page]
+    block = [before + BEGIN, "", *page_block(bench), "", END + after]
+    return [*written, write_text(page, "\n".join(block))]
 
 
 def split_page(page: Path) -> tuple[str, str]:

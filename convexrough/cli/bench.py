@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from convexrough.cli.options import PATH, output_options
-from convexrough.cli.speech import DONE, progress, written
+from convexrough.cli.speech import DONE, echo, progress, written
 
 
 @click.command()
@@ -24,18 +24,13 @@ def bench(
     """
     from convexrough.bench import page as pages
     from convexrough.bench import suite
-    from convexrough.run.results import claim_folder
-    from convexrough.run.summary import to_json
+    from convexrough.run.results import results_folder
 
     if page is not None:
         pages.split_page(page)  # a page without markers is refused before anything is computed
     folder = out or Path("bench-results")
-    claim_folder(folder, force=force)
-    with progress("measuring") as show:
+    with results_folder(folder, force=force) as new, progress("measuring") as show:
         found = suite.run(quick=quick, announce=show)
-        files = pages.write_bench(folder, found, figures=not no_figures, page=page)
-    if as_json:
-        click.echo(to_json(found.summary()))
-    else:
-        click.echo("\n".join([*pages.describe(found), *written(folder, files)]))
+        files = pages.write_bench(new, found, figures=not no_figures, page=page)
+    echo(found.summary(), [*pages.describe(found), *written(folder, files)], as_json)
     return DONE

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.options import PATH, json_option
+from convexrough.cli.options import PATH, json_option, solver_option
 from convexrough.cli.speech import (
     DONE,
     NOT_CERTIFIED,
     SOLVER_FAILED,
     blamed_on,
+    echo,
     progress,
     say_aside,
 )
@@ -19,36 +20,37 @@ from convexrough.cli.speech import (
 
 @click.command()
 @click.argument("scene", type=PATH)
+@solver_option
 @json_option
-def compare(scene: Path, as_json: bool) -> int:
+def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
     """Run every formulation and solver on one scene: agreement, certificate, time.
 
-    The cone program also goes through SCS and QOCO, where they are installed.
+    The cone program also goes through SCS and QOCO, where they are installed. With --solver, those
+    named run beside Newton's method.
 
     Exit status 3 also where a solver refuses the scene, or where two certified answers exclude each
     other: that would be a mistake in the mathematics.
     """
     from convexrough.compare import compare as compare_solvers
-    from convexrough.run.report import comparison_warnings, describe_comparison
+    from convexrough.compare import solver_named
+    from convexrough.progress import tell
+    from convexrough.run import comparison as report
     from convexrough.run.scene_file import read_scene
-    from convexrough.run.summary import comparison_summary, to_json
 
+    rivals = [solver_named(name) for name in solvers] or None
     file = read_scene(scene)
-    with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities") as show:
+    with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities"):
         comparison = compare_solvers(
             file.scene,
             approach=file.approach,
             load=file.load,
             influence=file.influence,
-            announce=lambda name: show(f"pressing on {len(file.scene)} asperities: {name}"),
+            solvers=rivals,
+            announce=tell,
         )
-    summary = comparison_summary(comparison)
-    if as_json:
-        click.echo(to_json(summary))
-    else:
-        length, force = file.units
-        click.echo("\n".join(describe_comparison(summary, length_unit=length, force_unit=force)))
-    for warning in comparison_warnings(summary):
+    summary = report.comparison_summary(comparison)
+    echo(summary, report.describe_comparison(summary, file.units), as_json)
+    for warning in report.comparison_warnings(summary):
         say_aside("warning", warning)
     outcomes = {entry.outcome for entry in comparison.entries}
     if "failed" in outcomes and not comparison.contradictions:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.options import PATH, json_option
-from convexrough.cli.speech import DONE, progress
+from convexrough.cli.options import PATH, json_option, solver_option
+from convexrough.cli.speech import DONE, echo, progress
 
 
 @click.command()
@@ -15,24 +15,44 @@ from convexrough.cli.speech import DONE, progress
     "--list", "listed", is_flag=True, help="List the cases: what is done without options."
 )
 @click.option("--export", metavar="DIR", type=PATH, help="Folder for programs and answers.")
-@click.option("--force", is_flag=True, help="Replace results in a folder in use.")
+@click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
+@click.option("--profile", is_flag=True, help="Time every solver and check its solutions.")
+@solver_option
 @click.argument("names", nargs=-1)
 @json_option
 def gallery(
-    listed: bool, export: Path | None, force: bool, names: tuple[str, ...], as_json: bool
+    listed: bool,
+    export: Path | None,
+    force: bool,
+    profile: bool,
+    solvers: tuple[str, ...],
+    names: tuple[str, ...],
+    as_json: bool,
 ) -> int:
     """Hard scenes with answers to 50 digits, for the developers of solvers.
 
     NAMES are of cases or of families; all, if none is given. --export writes each as a quadratic
     program (.npz of qpsolvers) and as a cone program (JSON of Clarabel, and CBF), with an index.
+    --profile is a performance profile, of all our solvers or of those that --solver names.
     """
     from convexrough import gallery as wing
-    from convexrough.run.columns import aligned
-    from convexrough.run.gallery_files import write_gallery
-    from convexrough.run.results import claim_folder
-    from convexrough.run.summary import to_json
+    from convexrough.compare import solver_named
+    from convexrough.gallery.export import exported
+    from convexrough.progress import tell
+    from convexrough.run.results import results_folder
+    from convexrough.tabular.columns import aligned
+    from convexrough.whole import write_text
 
     wanted = wing.names(*names)
+    if profile or solvers:
+        rivals = [solver_named(each) for each in solvers]
+        from convexrough.bench.profile import profile_of
+
+        with progress("timing"):
+            table = profile_of(rivals or None, cases=wanted, announce=tell).rows()
+        found = [dict(zip(table[0], row, strict=True)) for row in table[1:]]
+        echo({"profile": found}, aligned(table, left=1), as_json)
+        return DONE
     cases = [wing.case(name) for name in wanted]
     lines = []
     if listed or export is None:
@@ -44,9 +64,8 @@ def gallery(
         lines = aligned([heading, *rows], left=3)
     summary = {case.name: {"family": case.family, "why": case.why} for case in cases}
     if export is not None:
-        claim_folder(export, force=force)
-        with progress("writing") as show:
-            files = write_gallery(export, wanted, lambda name: show(f"writing: {name}"))
+        with results_folder(export, force=force) as new, progress("writing"):
+            files = [write_text(new / name, text) for name, text in exported(wanted)]
         lines += [f"{len(wanted)} cases, {len(files)} files, written to {export}"]
-    click.echo(to_json({"cases": summary}) if as_json else "\n".join(lines))
+    echo({"cases": summary}, lines, as_json)
     return DONE

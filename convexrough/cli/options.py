@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,22 +11,33 @@ import click
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 PATH = click.Path(path_type=Path)
-proof_option = click.option("--proof", is_flag=True, help="Write proof.json, for anybody to check.")
-html_option = click.option(
-    "--html", is_flag=True, help="Write slider.html: a page to move the force."
+proof_option = click.option(
+    "--proof", is_flag=True, help="Write proof.json, which `convexrough check` verifies."
 )
+solver_option = click.option(
+    "--solver", "solvers", metavar="NAME", multiple=True, callback=lambda *given: _from_here(given),
+    help="A solver of the package, or your package.Class; may be repeated.",
+)  # fmt: skip
+html_option = click.option("--html", is_flag=True, help="Write slider.html, an interactive page.")
 json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print one JSON object, no text."
+    "--json", "as_json", is_flag=True, help="Print one JSON object instead of text."
 )
+
+
+def _from_here(given: tuple[Any, ...]) -> Any:
+    """What was given for --solver; modules of this folder can then be imported."""
+    if given[-1] and "" not in sys.path:
+        sys.path.insert(0, "")
+    return given[-1]
 
 
 def output_options(command: Command) -> Command:
     """The options of every command that writes a folder of results."""
     for option in (
         json_option,
-        click.option("--force", is_flag=True, help="Replace results in a folder in use."),
-        click.option("--no-figures", is_flag=True, help="Write no PNG and SVG."),
-        click.option("--out", metavar="DIR", type=PATH, help="Folder for results."),
+        click.option("--force", is_flag=True, help="Overwrite the results of an earlier run."),
+        click.option("--no-figures", is_flag=True, help="Do not write figures."),
+        click.option("--out", metavar="DIR", type=PATH, help="Folder for the results."),
     ):
         command = option(command)
     return command

@@ -17,20 +17,32 @@ def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool, html: 
     """Reproduce the source paper's example (Dini and Hills 2009)."""
     from convexrough.paper import example
     from convexrough.paper.figure_data import figure_data
-    from convexrough.run import results
-    from convexrough.run.summary import summarise
+    from convexrough.run.results import (
+        results_folder,
+        slider_page,
+        write_figures,
+        write_results,
+        write_tables,
+    )
+    from convexrough.tabular.units import UnitNames
+    from convexrough.whole import write_text
 
     folder = out or Path("paper-results")
-    results.claim_folder(folder, force=force)
-    with progress("reproducing the paper"):
-        found = example.findings()
+    with results_folder(folder, force=force) as new, progress("reproducing the paper"):
+        found = example.results()
+        for result in found:
+            result.prepare(figures=False)
+        contact = found[0].contact
         comparison = example.compare(found)
-        summary = summarise(found) | {"paper": comparison}
-        files = results.write_tables(folder, figure_data(found.contact))
+        files = write_tables(new, figure_data(contact))
         if not no_figures:
             from convexrough.paper.figures import paper_figures
 
-            files += results.write_figures(folder, paper_figures(found.contact))
-        files += results.write_results(folder, found, summary, figures=False, html=html)
+            files += write_figures(new, paper_figures(contact))
+        if html:
+            page = slider_page(found[0], UnitNames())
+            files.append(write_text(new / "slider.html", page))
+        more = {"paper": comparison}
+        files += write_results(new, found, figures=False, more=more)
     lines = ["", *example.table(comparison), *written(folder, files)]
-    return say(summary, as_json, lines)
+    return say(found, as_json, lines, more=more)

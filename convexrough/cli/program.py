@@ -19,6 +19,7 @@ from click.shell_completion import shell_complete
 
 from convexrough.cli.bench import bench
 from convexrough.cli.compare import compare
+from convexrough.cli.export import export
 from convexrough.cli.gallery import gallery
 from convexrough.cli.paper import paper
 from convexrough.cli.proof import check
@@ -51,7 +52,7 @@ def program() -> None:
     """
 
 
-for command in (run, verify, check, compare, sweep, new, summits, paper, bench, gallery):
+for command in (run, verify, check, compare, export, sweep, new, summits, paper, bench, gallery):
     program.add_command(command)
 
 

@@ -1,4 +1,4 @@
-"""`check`, and how `run` and `verify` write what it checks."""
+"""`check`, and how `run` and `verify` prove what it checks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from convexrough.cli.options import PATH
-from convexrough.cli.speech import DONE, NOT_CERTIFIED, progress, say_aside
+from convexrough.cli.speech import progress, say_aside
 from convexrough.errors import ProofError
 
 if TYPE_CHECKING:
@@ -29,17 +29,11 @@ def check(proof: Path) -> int:
     return checker.main([str(proof)])
 
 
-def write_proof(path: Path, work: Callable[[Callable[[str], object]], Proof], as_json: bool) -> int:
-    """Write a proof; NOT_CERTIFIED where there is none."""
+def proved(work: Callable[[], Proof]) -> Proof | None:
+    """A proof, or why there is none."""
     try:
-        with progress("proving") as show:
-            proof = work(lambda news: show(f"proving: {news}"))
+        with progress("proving"):
+            return work()
     except ProofError as error:
         say_aside("warning", str(error))
-        return NOT_CERTIFIED
-    from convexrough.run.results import listed
-
-    proof.save(path)
-    listed(path)
-    click.echo(f"{proof.proved}\nwritten  {path}", err=as_json)
-    return DONE
+        return None

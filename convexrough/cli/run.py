@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from convexrough.cli.options import PATH, html_option, output_options, proof_option
-from convexrough.cli.proof import write_proof
-from convexrough.cli.speech import DONE, blamed_on, progress, say, say_aside, written
+from convexrough.cli.proof import proved
+from convexrough.cli.speech import DONE, NOT_CERTIFIED, blamed_on, progress, say, written
 from convexrough.errors import FileError
-from convexrough.whole import replacing
+from convexrough.whole import replacing, write_text
+
+if TYPE_CHECKING:
+    from convexrough.proof import Proof
+    from convexrough.run.stage import Result
 
 
 @click.command()
@@ -30,55 +35,63 @@ def run(
 ) -> int:
     """Press and shear the scene of a TOML file; write tables, certificate and figures.
 
-    Results go to the folder SCENE-results unless --out names another.
+    Results go to the folder SCENE-results unless --out names another. A file with [sweep] is
+    computed as `convexrough sweep` does.
     """
     from convexrough import checks
-    from convexrough.contact import solve
-    from convexrough.run.results import claim_folder, write_results
-    from convexrough.run.scene_file import read_scene
-    from convexrough.run.stages import compute
-    from convexrough.run.summary import summarise
+    from convexrough.run.results import origin, results_folder, slider_page, write_results
+    from convexrough.run.scene_file import has_sweep, read_scene
 
+    if has_sweep(scene):
+        return _swept(scene, out, force, as_json, given=html or proof)
     file = read_scene(scene)
-    if html:
-        with blamed_on(scene):
+    with blamed_on(scene):
+        if html:
             checks.friction(file.scene.friction)
-    if proof:
-        from convexrough.proof import refuse_many
+        if proof:
+            from convexrough.proof import refuse_many
 
-        with blamed_on(scene):
             refuse_many(file.scene)
     folder = out or Path(f"{scene.stem}-results")
-    stale = claim_folder(folder, force=force)
-    pressing = f"pressing {len(file.scene):,} asperities"
-    with blamed_on(scene), progress(pressing) as show:
-        contact = solve(
-            file.problem(), file.solver, announce=lambda news: show(f"{pressing}: {news}")
-        )
-    with blamed_on(scene), progress("shearing") as show:
-        found = compute(contact, file, announce=lambda news: show(f"shearing: {news}"))
-    with progress("writing results") as show:
-        summary = summarise(found)
-        files = write_results(
-            folder,
-            found,
-            summary,
-            figures=not no_figures,
-            html=html,
-            units=file.units,
-            source=file,
-            announce=lambda news: show(f"writing results: {news}"),
-        )
-    for path in stale:
-        if path not in files:
-            say_aside("warning", f"{path}: of an earlier run, left as it was changed since")
-    status = say(summary, as_json, written(folder, files), file.units)
-    if not proof:
-        return status
-    from convexrough.run.proving import prove_findings
+    with results_folder(folder, force=force, **origin(file)) as new:
+        with blamed_on(scene), progress(f"pressing {len(file.scene):,} asperities"):
+            contact = file.press()
+        with blamed_on(scene), progress("computing"):
+            results = file.compute(contact)
+            for result in results:
+                result.prepare(figures=not no_figures)
+            page = slider_page(results[0], file.units) if html else ""
+        evidence = _proved(results) if proof else None
+        with progress("writing results"):
+            files = write_results(new, results, figures=not no_figures, units=file.units)
+            files.append(write_text(new / "scene.toml", file.text))
+            if html:
+                files.append(write_text(new / "slider.html", page))
+            if evidence is not None:
+                evidence.save(new / "proof.json")
+    status = say(results, as_json, written(folder, files), file.units)
+    if evidence is not None:
+        click.echo(f"{evidence.proved}\nwritten  {folder / 'proof.json'}", err=as_json)
+    return NOT_CERTIFIED if proof and evidence is None else status
 
-    work = partial(prove_findings, found)
-    return write_proof(folder / "proof.json", lambda show: work(announce=show), as_json) or status
+
+def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: bool) -> int:
+    """What `convexrough sweep` does with this file."""
+    from convexrough.cli.sweep import sweep as command
+
+    if given:
+        raise click.UsageError("--proof and --html are of one scene, not of a sweep.")
+    options: dict[str, Any] = dict(sweep=sweep, out=out, as_json=as_json)
+    if any(each.name == "force" for each in command.params):
+        options["force"] = force
+    status: int = click.get_current_context().invoke(command, **options)
+    return status
+
+
+def _proved(results: list[Result]) -> Proof | None:
+    from convexrough.run.proving import prove_results
+
+    return proved(partial(prove_results, results))
 
 
 @click.command()
@@ -89,7 +102,7 @@ def new(scene: Path) -> int:
 
     template = files("convexrough.run").joinpath("new_scene.toml").read_text(encoding="utf-8")
     if scene.exists() or scene.is_symlink():
-        raise FileError(f"{scene}: is there already; nothing is overwritten")
+        raise FileError(f"{scene}: is there already, and stays as it is; name another file")
     with replacing(scene) as temporary:
         temporary.write_text(template, encoding="utf-8")
     click.echo(f"written  {scene}")

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from convexrough.errors import InputError
 
 if TYPE_CHECKING:
-    from convexrough.run.summary import Summary
+    from convexrough.run.stage import Result
     from convexrough.tabular.units import UnitNames
 
 DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2, 3, 4, 130
@@ -25,21 +25,29 @@ def written(folder: Path, files: Sequence[Path]) -> list[str]:
 
 
 def say(
-    summary: Summary, as_json: bool, lines: Sequence[str] = (), units: UnitNames | None = None
+    results: Iterable[Result],
+    as_json: bool,
+    lines: Sequence[str] = (),
+    units: UnitNames | None = None,
+    more: dict[str, Any] | None = None,
 ) -> int:
-    """Print the summary, then `lines`, and return the exit status that it deserves."""
-    from convexrough.run.report import describe, warnings
-    from convexrough.run.summary import proved, to_json
+    """Print the summary with `more`, or results and `lines`; the exit status that they deserve."""
+    from convexrough.run.summary import describe, summarise, warnings
+    from convexrough.tabular.units import UnitNames
 
-    length, force = units or ("", "")
-    if as_json:
-        click.echo(to_json(summary))
-    else:
-        described = describe(summary, length_unit=length, force_unit=force)
-        click.echo("\n".join([*described, *lines]))
-    for warning in warnings(summary, length_unit=length, force_unit=force):
+    results, named = list(results), units or UnitNames()
+    said = describe(results, named)
+    echo(summarise(results) | (more or {}), [*said, *lines], as_json)
+    for warning in warnings(results, named):
         say_aside("warning", warning)
-    return DONE if proved(summary) else NOT_CERTIFIED
+    return DONE if all(result.certified for result in results) else NOT_CERTIFIED
+
+
+def echo(summary: dict[str, Any], lines: Iterable[str], as_json: bool) -> None:
+    """Print one object of JSON, or lines."""
+    from convexrough.run.summary import to_json
+
+    click.echo(to_json(summary) if as_json else "\n".join(lines))
 
 
 def say_aside(*parts: str) -> None:
@@ -59,12 +67,27 @@ def blamed_on(path: Path) -> Iterator[None]:
 def progress(message: str) -> Iterator[Callable[[str], object]]:
     """A moving line on standard error while the body runs, if that is a terminal.
 
-    Yields what changes the message.
+    It shows what is said to the logger `convexrough`. Yields what changes the message.
     """
     if not sys.stderr.isatty():
         yield lambda message: None
         return
+    import logging
+
     from rich.console import Console
 
+    from convexrough.progress import LOGGER
+
+    class Shown(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            status.update(f"{message}: {record.getMessage()}")
+
+    handler, level = Shown(), LOGGER.level
     with Console(stderr=True).status(message) as status:
-        yield status.update
+        LOGGER.addHandler(handler)
+        LOGGER.setLevel(logging.INFO)
+        try:
+            yield status.update
+        finally:
+            LOGGER.removeHandler(handler)
+            LOGGER.setLevel(level)

@@ -10,15 +10,23 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from convexrough.cli.options import PATH, Command, json_option
-from convexrough.cli.speech import DONE, NOT_CERTIFIED, blamed_on, progress, say_aside, written
-from convexrough.errors import InputError, SolverError
+from convexrough.cli.speech import (
+    DONE,
+    NOT_CERTIFIED,
+    blamed_on,
+    echo,
+    progress,
+    say_aside,
+    written,
+)
+from convexrough.errors import FileError, InputError, SolverError
 
 if TYPE_CHECKING:
     from convexrough.contact import Contact
     from convexrough.run.scene_file import SceneFile
-    from convexrough.run.surface_report import Scanned
     from convexrough.scene.asperities import Asperities
     from convexrough.surface import Surface
+    from convexrough.surface.report import Scanned
 
 
 def map_options(command: Command) -> Command:
@@ -56,16 +64,19 @@ def press_options(command: Command) -> Command:
               help="Pixels across a paraboloid.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
               help="Least prominence of a hill, in parts of Sz.")  # fmt: skip
+@click.option("--whole", is_flag=True,
+              help="Press the map itself, too, by boundary elements.")  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,
               help="Table for a scene file; figures go beside it.")  # fmt: skip
-@click.option("--no-figures", is_flag=True, help="Write no PNG and SVG.")
-@click.option("--force", is_flag=True, help="Replace a table that is there.")
+@click.option("--no-figures", is_flag=True, help="Do not write figures.")
+@click.option("--force", is_flag=True, help="Overwrite a table of an earlier run.")
 @json_option
 def summits(
     surface: Path,
     out: Path,
     prune: float,
     fit: int,
+    whole: bool,
     no_figures: bool,
     force: bool,
     as_json: bool,
@@ -75,34 +86,68 @@ def summits(
 
     SURFACE is .npy, .npz, .mat, a matrix or x, y, height in text, or an instrument's file. Pressed
     by a sphere about the middle of the map (--scene, or --radius with --approach or --load),
-    contacts, proof, crowding and model error are held against the pruning.
+    contacts, proof, crowding and model error are held against the pruning. With --whole every pixel
+    is pressed, at the same approach, and the asperities are held against that.
 
     Exit status: 3 where the contact at the chosen pruning is not certified.
     """
-    from convexrough.run import surface_files, surface_report
-    from convexrough.run.summary import to_json
+    from convexrough.surface import report
 
     how = {name: options.pop(name) for name in ("scene", "radius", "approach", "load", "modulus")}
     _check_pressing(**how)
-    surface_files.claim_table(out, force=force)
+    if whole and how["scene"] is None and how["radius"] is None:
+        raise click.UsageError("--whole needs --scene or --radius: how to press.")
+    _claim(out, force)
     with progress(f"reading {surface}") as show:
         scan = _read(surface, **options)
         show("finding summits")
         with blamed_on(surface):
-            scanned = _scan(scan, prune, fit, how, show)
-    summary = surface_report.surface_summary(scanned)
+            scanned = _scan(scan, prune, fit, how)
+            if whole and scanned.contact is not None:
+                from convexrough.surface import press_whole
+
+                show("pressing the map whole")
+                scanned = replace(scanned, whole=press_whole(scanned.surface, scanned.contact))
     with progress("writing"):
-        files = surface_files.write_summits(out, scanned, figures=not no_figures)
-    if as_json:
-        click.echo(to_json(summary))
-    else:
-        lines = [*surface_report.describe_surface(scanned), *written(out.parent, files)]
-        click.echo("\n".join(lines))
-    for doubt in surface_report.doubts_of_surface(scanned):
+        files = _written(out, scanned, figures=not no_figures)
+    lines = [*report.describe_surface(scanned), *written(out.parent, files)]
+    echo(report.surface_summary(scanned), lines, as_json)
+    for doubt in report.doubts_of_surface(scanned):
         say_aside("warning", doubt)
     if scanned.curve is None:
         say_aside("hint", "--scene or --radius presses on them: how strong must the pruning be?")
     return DONE if scanned.certified else NOT_CERTIFIED
+
+
+def _claim(path: Path, force: bool) -> None:
+    """Refuse to replace a table unasked, before anything is computed."""
+    if path.suffix.lower() != ".csv":
+        raise FileError(f"{path}: found {path.suffix or 'no ending'}, expected .csv")
+    if path.exists() and not force:
+        raise FileError(f"{path}: is there already; --force replaces it, --out names another")
+    if not path.parent.is_dir():
+        raise FileError(f"{path}: no folder {path.parent}")
+
+
+def _written(path: Path, scanned: Scanned, *, figures: bool) -> list[Path]:
+    """The table that a scene file reads, the curve and the figures beside it."""
+    from convexrough.run.results import write_figures, write_tables
+    from convexrough.surface.report import curve_rows, summit_columns
+
+    tables = {path.stem: summit_columns(scanned.summits)}
+    if scanned.curve is not None:
+        rows = curve_rows(scanned.curve)
+        tables[f"{path.stem}-provability"] = {key: [row[key] for row in rows] for key in rows[0]}
+    files = write_tables(path.parent, tables)
+    if figures:
+        from convexrough.plots.surface import surface_figures  # matplotlib: only when it draws
+
+        drawn = surface_figures(
+            scanned.surface, scanned.maxima, scanned.summits, scanned.curve, scanned.contact
+        )
+        named = {f"{path.stem}-{stem}": figure for stem, figure in drawn.items()}
+        files += write_figures(path.parent, named)
+    return files
 
 
 def _check_pressing(
@@ -137,17 +182,12 @@ def _read(path: Path, *, pixel: str | None, detrend: str, **options: Any) -> Sur
     return read(path, pixel=size, detrend=trend, **options)
 
 
-def _scan(
-    surface: Surface,
-    prune: float,
-    fit: int,
-    how: dict[str, Any],
-    show: Callable[[str], object],
-) -> Scanned:
+def _scan(surface: Surface, prune: float, fit: int, how: dict[str, Any]) -> Scanned:
     """All of it; in the unit of the scene, if that names one."""
-    from convexrough.run.surface_report import Scanned
+    from convexrough.progress import tell
     from convexrough.surface import provability
     from convexrough.surface.provability import LEVELS
+    from convexrough.surface.report import Scanned
 
     chosen = surface.summits(prune, fit)
     file: SceneFile | None = None
@@ -165,7 +205,7 @@ def _scan(
     if file is None and how["radius"] is None:
         return Scanned(surface, maxima, chosen)
     press = _pressing(file, **how)
-    curve = provability(maxima, press, levels=[*LEVELS, prune], announce=show)
+    curve = provability(maxima, press, levels=[*LEVELS, prune], announce=tell)
     try:
         contact = press(chosen)
     except SolverError:

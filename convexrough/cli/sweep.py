@@ -11,17 +11,19 @@ import click
 from convexrough.cli.options import PATH, json_option
 from convexrough.cli.speech import (
     DONE,
+    INTERRUPTED,
     NOT_CERTIFIED,
     SOLVER_FAILED,
+    echo,
     progress,
     say_aside,
     written,
 )
 
 if TYPE_CHECKING:
-    from convexrough.run.summary import Summary
-    from convexrough.sweeps.engines import Engine
-    from convexrough.sweeps.table import SweepTable
+    from concurrent.futures import Executor
+
+    from convexrough.run.stage import Summary
 
 
 def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | None:
@@ -38,6 +40,7 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 @click.argument("sweep", type=PATH, required=False)
 @json_option
 @click.option("--part", metavar="K/N", callback=_part, help="The K-th of N parts of the sweep.")
+@click.option("--force", is_flag=True, help="Overwrite results in a folder in use.")
 @click.option("--resume", is_flag=True, help="Compute what is not in the folder yet.")
 @click.option("--scheduler", metavar="ADDRESS", help='Of Dask: tcp://..., a file, or "local".')
 @click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes; default: all.")
@@ -50,6 +53,7 @@ def sweep(
     workers: int | None,
     scheduler: str | None,
     resume: bool,
+    force: bool,
     part: tuple[int, int] | None,
     as_json: bool,
 ) -> int:
@@ -59,58 +63,64 @@ def sweep(
     written once and whole. With --summary: quantiles of what is in a folder; with --out, too, a
     table of them and figures.
 
-    Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or no
-    worker is left. What was computed until then is kept, and --resume goes on.
+    Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or a
+    worker died; 130 interrupted. What was computed until then is kept, and --resume goes on.
     """
     if (sweep is None) == (summary is None):
         raise click.UsageError("Either SWEEP, or --summary DIR.")
     if summary is not None:
-        return _say_summary(summary, out, as_json)
+        return _say_summary(summary, out, as_json, overwrite=force)
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other.")
-    from convexrough.sweeps.report import describe, failures, summarise, with_work
-    from convexrough.sweeps.running import run
-    from convexrough.sweeps.sweep_file import read_sweep
+    if resume and force:
+        raise click.UsageError("--resume and --force exclude each other.")
+    from convexrough.errors import WorkerError
+    from convexrough.sweeps.file import read_sweep
+    from convexrough.sweeps.report import describe, failures, kept, summarise
+    from convexrough.sweeps.sweep import run
 
     assert sweep is not None  # one of the two
-    plan = read_sweep(sweep)
     folder = out or Path(f"{sweep.stem}-sweep")
-    with progress("starting") as show, _engine(workers, scheduler) as engine:
-        done = run(plan, engine, out=folder, resume=resume, part=part, announce=show)
-    said = with_work(summarise(done.table), done)
-    _say(said, describe(said), as_json)
+    with progress("reading the first scene"):
+        plan = read_sweep(sweep)
+    try:
+        with progress(str(sweep)), _executor(workers, scheduler) as executor:
+            done = run(plan, executor, out=folder, resume=resume, overwrite=force, part=part)
+    except KeyboardInterrupt:
+        say_aside("interrupted", kept(folder, plan))
+        return INTERRUPTED
+    except WorkerError as error:
+        say_aside("error", str(error), kept(folder, plan))
+        return SOLVER_FAILED
+    said = summarise(done.table, done)
+    echo(said, describe(said), as_json)
     for failed in failures(done.table):
         say_aside("warning", failed)
     return _status(said)
 
 
-def _engine(workers: int | None, scheduler: str | None) -> AbstractContextManager[Engine]:
-    from convexrough.sweeps.engines import dask, processes
+def _executor(workers: int | None, scheduler: str | None) -> AbstractContextManager[Executor]:
+    from convexrough.sweeps.pool import Processes, dask
 
-    return processes(workers) if scheduler is None else dask(scheduler)
+    return Processes(workers) if scheduler is None else dask(scheduler)
 
 
-def _say_summary(folder: Path, out: Path | None, as_json: bool) -> int:
+def _say_summary(folder: Path, out: Path | None, as_json: bool, *, overwrite: bool) -> int:
     from convexrough.sweeps import report
-    from convexrough.sweeps.statistics import quantiles
     from convexrough.sweeps.table import open_sweep
 
-    table: SweepTable = open_sweep(folder)
+    table = open_sweep(folder)
     with progress(f"reading {folder}"):
         said = report.summarise(table)
-        found = quantiles(table, at=report.AT)
+        found = table.quantiles(at=report.AT)
     lines = [*report.describe(said), "", *report.describe_quantiles(found)]
     if out is not None:
         with progress("writing results"):
-            lines += written(out, report.write_summary(out, table, found))
-    _say(report.with_quantiles(said, found), lines, as_json)
+            lines += written(out, report.write_summary(out, table, found, overwrite=overwrite))
+    rows = zip(*(values.tolist() for values in found.values()), strict=True)
+    quantiles = [dict(zip(found, row, strict=True)) for row in rows]
+    echo({**said, "quantiles": quantiles}, lines, as_json)
     return _status(said)
-
-
-def _say(summary: Summary, lines: list[str], as_json: bool) -> None:
-    from convexrough.run.summary import to_json
-
-    click.echo(to_json(summary) if as_json else "\n".join(lines))
 
 
 def _status(summary: Summary) -> int:

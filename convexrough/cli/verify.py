@@ -1,8 +1,10 @@
-"""`verify`: what a file of loads claims, held against what is proved."""
+"""`verify`: check contact loads from another code."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,12 +12,25 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from convexrough.cli.options import PATH, Command, json_option, proof_option
-from convexrough.cli.proof import write_proof
-from convexrough.cli.speech import DONE, NOT_CERTIFIED, blamed_on, progress, say_aside, written
+from convexrough.cli.proof import proved
+from convexrough.cli.speech import (
+    DONE,
+    NOT_CERTIFIED,
+    blamed_on,
+    echo,
+    progress,
+    say_aside,
+    written,
+)
 from convexrough.errors import FileError, InputError
+from convexrough.whole import write_text
 
 if TYPE_CHECKING:
-    from convexrough.run.claims import Manner
+    from convexrough.proof import Proof
+    from convexrough.run.scene_file import SceneFile
+    from convexrough.tabular.units import UnitNames
+    from convexrough.verdict.claims import Manner
+    from convexrough.verdict.files import Verified
 
 
 def claim_options(command: Command) -> Command:
@@ -23,9 +38,10 @@ def claim_options(command: Command) -> Command:
     called = "The column of load, x, y, ...: its header, or its number from 1."
     for option in (
         click.option("--junit", metavar="FILE", type=PATH, help="Write the findings for CI."),
-        click.option("--out", metavar="DIR", type=PATH, help="New folder: table, JSON, figure."),
-        click.option("--explain", is_flag=True, help="Only say how the files are read."),
-        click.option("--force", metavar="Q", type=float, help="The shear force they carry."),
+        click.option("--force", is_flag=True, help="Overwrite the results of an earlier run."),
+        click.option("--out", metavar="DIR", type=PATH, help="Folder for table, JSON, figure."),
+        click.option("--explain", is_flag=True, help="Report how the files are read, and stop."),
+        click.option("--shear-force", metavar="Q", type=float, help="Total shear force of FORCES."),
         click.option("--shear", metavar="FORCES", type=PATH, help="A file of shear forces, too."),
         click.option("--nodes", is_flag=True, help="Rows are nodes: sum them at asperities."),
         click.option("--missing-open", is_flag=True, help="Asperities without a row are open."),
@@ -35,11 +51,12 @@ def claim_options(command: Command) -> Command:
                      help="Multiply the numbers of a column."),
         click.option("--column", metavar="NAME=COLUMN", multiple=True, help=called),
         click.option("--tolerance", metavar="X", type=float,
-                     help="How far positions may be off; default 1 % of the least spacing."),
+                     help="Largest distance of a position from its asperity; "
+                          "default 1 % of the smallest spacing."),
         click.option("--floor", metavar="X", type=float, default=0.0,
                      help="A load up to X claims that its asperity is open."),
         click.option("--within", metavar="PART", type=float,
-                     help="Loads must be proved to this part of the largest."),
+                     help="Largest error allowed, as a fraction of the largest load."),
     ):  # fmt: skip
         command = option(command)
     return command
@@ -48,8 +65,8 @@ def claim_options(command: Command) -> Command:
 def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: Any) -> Manner:
     """How the options say that files are read."""
     from convexrough.checks import finite
-    from convexrough.run.claims import Manner
     from convexrough.tabular.table import KINDS, named_columns
+    from convexrough.verdict.claims import Manner
 
     names = ("load", "pressure", "area", "x", "y", "force", "status")
     factors = {}
@@ -82,15 +99,16 @@ def verify(
     within: float | None,
     floor: float,
     shear: Path | None,
-    force: float | None,
+    shear_force: float | None,
     explain: bool,
     out: Path | None,
+    force: bool,
     junit: Path | None,
     as_json: bool,
     proof: bool,
     **how: Any,
 ) -> int:
-    """Hold loads that came from anywhere against what is proved.
+    """Check contact loads from another code.
 
     LOADS is a file of numbers with a column load, and x and y or an index unless in the scene's
     order: CSV and its kin, .xlsx, .mat, .npy, .npz or Parquet. It claims that asperities with a
@@ -100,54 +118,77 @@ def verify(
     prescribed total agrees, and the like of shear forces; 2 wrong input; 3 otherwise; 4 no shear
     state was found to compare with.
     """
-    from convexrough.run import verdict_report
-    from convexrough.run.report import describe
-    from convexrough.run.results import claim_folder
+    from convexrough.run.results import results_folder
     from convexrough.run.scene_file import read_scene
-    from convexrough.run.summary import to_json
-    from convexrough.run.verification import Question, read_files, verify_files
+    from convexrough.run.stages.normal import describe, judged_loads
+    from convexrough.run.summary import headed
+    from convexrough.verdict import report
+    from convexrough.verdict.files import Question, read_files, verify_files
 
-    if (shear is None) != (force is None):
-        raise click.UsageError("--shear and --force go together.")
-    target = (out or Path()) / "proof.json"
-    for new in (*((target,) if proof else ()), *((junit,) if junit else ())):
-        if new.exists():
-            raise FileError(f"{new}: is there already; nothing is overwritten")
-    question = Question(within=within, floor=floor, how=_manner(**how), shear=shear, force=force)
+    if (shear is None) != (shear_force is None):
+        raise click.UsageError("--shear and --shear-force go together.")
+    alone = [Path("proof.json")] if proof and out is None else []
+    for each in [*alone, *([junit] if junit else [])]:
+        if each.exists() and not force:
+            raise FileError(f"{each}: is there already; --force replaces it")
+    question = Question(
+        within=within, floor=floor, how=_manner(**how), shear=shear, force=shear_force
+    )
     file = read_scene(scene)
+    question = replace(question, how=replace(question.how, units=file.units, convert=file.convert))
     if explain:
-        read = [each for each in read_files(file, loads, question) if each is not None]
+        read = [each for each in read_files(file.scene, loads, question) if each is not None]
         lines = [line for each in read for line in (each.note, *each.explained, "")]
-        lines += verdict_report.describe_scene(file.scene, file.units)
-        click.echo(to_json({"read": lines}) if as_json else "\n".join(lines))
+        lines += report.describe_scene(file.scene, file.units)
+        echo({"read": lines}, lines, as_json)
         return DONE
-    if out is not None:
-        if out.is_dir() and any(out.iterdir()):
-            raise FileError(f"{out}: not empty; --out takes another")
-        claim_folder(out, force=False)
-    with progress(f"judging the loads of {len(file.scene):,} asperities"):
-        found = verify_files(file, loads, question)
-    summary = verdict_report.verdict_summary(found)
-    lines = verdict_report.describe_verdict(found, file.units)
-    lines += [
-        "",
-        "the loads as given, by themselves",
-        *describe(summary, length_unit=file.units.length, force_unit=file.units.force),
-    ]
-    if out is not None:
-        with progress("writing results"):
-            files = verdict_report.write_verdict(out, summary, found, file.units)
-        lines += written(out, files)
-    click.echo(to_json(summary) if as_json else "\n".join(lines))
+    with ExitStack() as stack:
+        new = stack.enter_context(results_folder(out, force=force)) if out is not None else None
+        with progress(f"judging the loads of {len(file.scene):,} asperities"):
+            with blamed_on(scene):
+                problem = file.problem()
+            found = verify_files(problem, loads, question)
+        normal = judged_loads(found.verdict.certificate, found.verdict.loads)
+        summary = headed(normal=normal) | report.verdict_summary(found)
+        evidence = proved(partial(_proof, file, found, scene)) if proof else None
+        files = [] if new is None else _written(new, summary, found, file.units)
+        if evidence is not None:
+            evidence.save((new or Path()) / "proof.json")
     if junit is not None:
-        verdict_report.write_junit(junit, found)
+        write_text(junit, report.junit(found))
+    lines = report.describe_verdict(found, file.units)
+    lines += ["", "certificate of the given loads", *describe(normal, file.units)]
+    lines += written(out, files) if out is not None else []
+    echo(summary, lines, as_json)
     for hint in found.verdict.hints(file.units.force or "N"):
         say_aside("hint", hint)
     if not found.holds:
-        say_aside("warning", f"not certified: {verdict_report.reason(found)}")
-    status = DONE if found.holds else NOT_CERTIFIED
-    if not proof:
-        return status
+        say_aside("warning", f"not certified: {report.reason(found)}")
+    if evidence is not None:
+        place = (out or Path()) / "proof.json"
+        click.echo(f"{evidence.proved}\nwritten  {place}", err=as_json)
+    return DONE if found.holds and (evidence is not None or not proof) else NOT_CERTIFIED
+
+
+def _written(
+    folder: Path, summary: dict[str, Any], found: Verified, units: UnitNames
+) -> list[Path]:
+    """verdict.json, verdict.csv, and a figure."""
+    from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
+    from convexrough.run.results import write_figures, write_json, write_tables
+    from convexrough.verdict.report import asperity_columns
+
+    figures = verdict_figures(found.verdict, found.sheared, length_unit=units.length)
+    return [
+        write_json(folder / "verdict.json", summary),
+        *write_tables(folder, {"verdict": asperity_columns(found)}),
+        *write_figures(folder, figures),
+    ]
+
+
+def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
+    """Of the loads that are claimed to touch."""
+    from convexrough.progress import tell
     from convexrough.proof import prove
 
     verdict = found.verdict
@@ -156,6 +197,5 @@ def verify(
         for load, touches in zip(verdict.loads, verdict.claimed, strict=True)
     ]
     control: Any = {"approach": file.approach, "load": file.load}
-    work = partial(prove, file.scene, claimed, **control)
     with blamed_on(scene):
-        return write_proof(target, lambda show: work(announce=show), as_json) or status
+        return prove(file.scene, claimed, **control, announce=tell)

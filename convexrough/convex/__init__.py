@@ -1,1 +1,1 @@
-"""Mathematics that knows no contact: Newton steps on normal maps, cones, solver libraries."""
+"""Mathematics without contact mechanics: Newton steps on normal maps, cones, solver libraries."""

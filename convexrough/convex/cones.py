@@ -14,7 +14,7 @@ For t in [0, 1] a *lift* stands for the powers of t by linear variables
 
 Over them, min (3/5 - S/3) y5 + (S/3) z at fixed y3 = t^3 is (3/5) t^5 - (S/3) t^6 exactly: for
 0 <= S <= 21/25 with four cones, for 0 <= S <= 1 with five.
-docs/theory/exact-cones-proof.md, "Why it is exact".
+docs/theory/exact-cones.md, "Why it is exact".
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ right side is a matrix of rank one and norm g / (1 - g) trace C, and R'R >= 0. S
 
     C >= -(n + 2) u trace C    where 2 (n + 1) (n + 2) u <= 1: for all n that fit in a memory.
 
-Let C be M off the diagonal and 1 - mu - s on it, and let each entry of M, as computed, be off by e
-of itself at most: by a matrix whose norm is at most its largest row sum. With trace C <= n,
+Let C be M off the diagonal and 1 - mu - s on it, and let each entry of M, as computed, have a
+relative error of at most e: a matrix whose norm is at most its largest row sum. With trace C <= n,
 
     s >= e max_i sum_j |M_ij| + (n + 2) n u    proves    I + M >= mu I.
 

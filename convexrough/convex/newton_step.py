@@ -152,7 +152,7 @@ class _Smoothed:
     """The smoother M; where balanced, on the plane sum W y = 0.
 
     (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376.) The residual is kept on the
-    plane, too, so that single precision does not lose it beside the shift, the sum of what is off.
+    plane, too, so that single precision does not lose it beside the shift, the sum of deviations.
     """
 
     def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:

@@ -44,6 +44,11 @@ class Piece(NamedTuple):
     load_before: Fraction
     load_after: Fraction
 
+    @property
+    def held(self) -> bool:
+        """The load stays."""
+        return self.load_before == self.load_after
+
 
 @dataclass(frozen=True, repr=False)
 class MemoryCurve(Table, Drawn):

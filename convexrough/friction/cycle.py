@@ -24,7 +24,7 @@ from convexrough.contact import Contact
 from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.frames import Variables
-from convexrough.friction.curve import MemoryCurve
+from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.general_step import followed
 from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.loss import losses, shared, trapezoid_loss
@@ -146,23 +146,36 @@ class Cycle(Table, Drawn):
     def asperity_losses(self) -> Array:
         """(n,) [force length] lost at each asperity per cycle; to about 0.1 % where P varies.
 
-        Takes two normal solutions for each of 64 cells there. nan where order fails.
+        There their bounds are some per cent. Takes two normal solutions for each of 64 cells there.
+        nan where order fails.
         """
         return frozen(self.partial_slip_losses + self.sliding_losses)
 
+    @property
+    def asperity_loss_errors(self) -> Array:
+        """(n,) [force length] proved bounds; infinite where order is not proved."""
+        return self._shares[2]
+
     @cached_property
-    def _shares(self) -> tuple[Array, Array]:
+    def _shares(self) -> tuple[Array, Array, Array]:
         n = len(self.scene)
         if self.contact.load == 0.0:
-            return frozen(np.zeros(n)), frozen(np.zeros(n))
+            return (frozen(np.zeros(n)),) * 3
         levels = self.contact.keep(FrictionLevels)
         if self.order == "fails" and levels.proved:
-            return frozen(np.full(n, np.nan)), frozen(np.full(n, np.nan))
-        points = [
-            point_at(Fraction(load), force, self.scene)
-            for load, force in zip(self.loads.tolist(), self.forces.tolist(), strict=True)
-        ]
-        return shared(levels, _Closed(MemoryCurve(), points).later, CELLS)
+            unknown = frozen(np.full(n, np.nan))
+            return unknown, unknown, frozen(np.full(n, np.inf))
+        slip, slide = shared(levels, self._later, CELLS)
+        partial, gross = (frozen(levels.to_scene(each.value)) for each in (slip, slide))
+        doubt = 0.0 if self.order == "proved" else np.inf
+        return partial, gross, frozen(levels.to_scene(slip.error + slide.error) + doubt)
+
+    @cached_property
+    def _later(self) -> list[Piece]:
+        """What the front runs through each time but the first."""
+        pairs = zip(self.loads.tolist(), self.forces.tolist(), strict=True)
+        points = [point_at(Fraction(load), force, self.scene) for load, force in pairs]
+        return _Closed(MemoryCurve(), points).later
 
     @property
     def force_amplitude(self) -> float:
@@ -447,8 +460,7 @@ def _cycle(
         order=order,
         presses=levels.presses,
     )
-    if constant and order != "fails":
-        found.__dict__["_shares"] = shared(levels, closed.later, 1)
+    found.__dict__["_later"] = closed.later
     return found
 
 

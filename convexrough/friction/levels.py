@@ -9,7 +9,7 @@ the names. A load of 0 is 0.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
@@ -23,8 +23,9 @@ from convexrough.contact import Contact, levels_of
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level
-from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair
+from convexrough.normal.stack import Rows
+from convexrough.numbers.balls import TINY, Ball
+from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: Roundoffs of f P that a shear force may be off f P, and still be it: gross sliding.
@@ -101,8 +102,28 @@ class FrictionLevels:
         if load == self.load:
             return self.top
         if load not in self._named:
-            self._named[load] = self._levels.at(self._ball(load))
+            ball = self._balls([load])[0] if load else Ball.exact(0.0)
+            self._named[load] = self._levels.at(ball)
         return self._named[load]
+
+    def prepare(self, loads: Iterable[Fraction]) -> None:
+        """Find the levels of these loads together, where that is cheaper than one by one."""
+        new = sorted({x for x in loads if x not in self._named and 0 < x < self.load})
+        if len(new) > 1:
+            found = zip(new, self._levels.prepare(self._balls(new)), strict=True)
+            self._named |= {load: level for load, level in found if level is not None}
+
+    def rows(self, loads: Sequence[Fraction]) -> Rows:
+        """Levels, a row for each."""
+        levels = [self.at(load) for load in loads]
+        return Rows(
+            Ball.stacked([level.load for level in levels]),
+            Ball.stacked([level.approach for level in levels]),
+            Ball.stacked([level.loads for level in levels]),
+            Ball.stacked([level.indentation for level in levels]),
+            np.array([level.touching for level in levels]),
+            np.array([level.open for level in levels]),
+        )
 
     def displaced(self, displacement: float) -> Fraction:
         """The load of the level whose approach is D0(P) - X / (c_t f), X >= 0 [length]."""
@@ -189,13 +210,11 @@ class FrictionLevels:
         """(..., N) values of the candidates, among zeros for all others of the scene."""
         return among_zeros(values, self.candidates, len(self.scene), axis=-1)
 
-    def _ball(self, load: Fraction) -> Ball:
-        unit = Fraction(self.units.force)
-        if load == 0:
-            return Ball.exact(0.0)
+    def _balls(self, loads: Sequence[Fraction]) -> Ball:
+        """(k,) loads in own units; 0 is 0."""
         if self.by_load:
-            return Ball.exact(load / unit)
-        return self.top.load - Ball.exact((self.load - load) / unit)
+            return exactly(loads).scaled(1.0 / self.units.force)
+        return self.top.load - exactly([self.load - x for x in loads]).scaled(1 / self.units.force)
 
 
 class Snapshot(NamedTuple):
@@ -210,6 +229,13 @@ class Snapshot(NamedTuple):
     indentations: Array
     touching: NDArray[np.bool_]
     open: NDArray[np.bool_]
+
+
+def exactly(values: Sequence[Fraction]) -> Ball:
+    """(k,) rational numbers as balls."""
+    pairs = [Pair.nearest(value) for value in values]
+    high, low = (np.array([pair[part] for pair in pairs]) for part in (0, 1))
+    return Ball.around(Pair(high, low), PAIR_ROUNDOFF * np.abs(high) + TINY)
 
 
 def rounded(ball: Ball) -> tuple[Array, Array]:

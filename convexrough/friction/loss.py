@@ -13,42 +13,40 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array
 from convexrough.friction.curve import Piece
-from convexrough.friction.levels import FrictionLevels
-from convexrough.normal.level import Level
+from convexrough.friction.levels import FrictionLevels, exactly
+from convexrough.normal.level import Level, energies
+from convexrough.normal.stack import NUMBERS, Rows, joined, of_rows
 from convexrough.numbers.balls import Ball, where
+from convexrough.roundoff import SAFETY
 from convexrough.sphere import annulus
 
-
-def asperity_losses(levels: FrictionLevels, load: Fraction, front: Fraction) -> tuple[Ball, Ball]:
-    """(n,) the parts of B in partial slip and in sliding."""
-    return levels.keep((asperity_losses, load, front), lambda: _parts(levels, load, front))
+#: Two loads of a path [force].
+Pair: TypeAlias = tuple[Fraction, Fraction]
 
 
-def _parts(levels: FrictionLevels, load: Fraction, front: Fraction) -> tuple[Ball, Ball]:
-    high, low = levels.at(load), levels.at(front)
-    nothing = Ball.exact(np.zeros(len(high.loads)))
-    if load == front:
-        return nothing, nothing
+def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
+    """(k, n) the parts of B in partial slip and in sliding, of levels P and L in rows."""
+    nothing = Ball.exact(np.zeros(high.loads.shape))
     loaded = high.loads.value > 0
-    P = where(loaded, high.loads, Ball.exact(np.ones(len(loaded))))
+    P = where(loaded, high.loads, 1.0 + nothing)
     own, gaps = high.indentation.positive_part(), (-low.indentation).positive_part()
     s = (low.loads / P).cbrt()
     x = (P - low.loads) / P / (1.0 + s + s * s)
     slip, slide = P * own * annulus.loss(x) * Fraction(6, 5), P * gaps
     doubtful = ~high.touching & ~high.open & np.isfinite(high.loads.upper)
     if doubtful.any():
-        most = Ball.between(np.zeros(len(loaded)), high.loads.upper)
-        slip, slide = (
-            where(doubtful, most * own * Fraction(1, 5), slip),
-            where(doubtful, most * gaps, slide),
-        )
-        loaded = loaded | doubtful
-    return where(loaded, slip, nothing), where(loaded, slide, nothing)
+        most = Ball.between(nothing.value, high.loads.upper)
+        slip = where(doubtful, most * own * Fraction(1, 5), slip)
+        slide = where(doubtful, most * gaps, slide)
+    moved = (loaded | doubtful) & ((high.load - low.load).size > 0)[:, None]
+    return where(moved, slip, nothing), where(moved, slide, nothing)
 
 
 def trapezoid_loss(high: Level, low: Level) -> Ball:
@@ -59,27 +57,39 @@ def trapezoid_loss(high: Level, low: Level) -> Ball:
 
 def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
     """(m,) what the pieces of each of m segments cost."""
-    found = []
-    for pieces in costs:
-        total = Ball.exact(0.0)
-        for piece in pieces:
-            weight = Ball.exact(1 - piece.sign * piece.slope)
-            total = total + weight * _integral(levels, piece)
-        found.append(total)
-    return Ball.stacked(found)
+    pieces = [piece for each in costs for piece in each]
+    found = exactly([1 - p.sign * p.slope for p in pieces]) * _integrals(levels, pieces)
+    ends = np.cumsum([0, *map(len, costs)]).tolist()
+    return Ball.stacked([found[start:stop].sum() for start, stop in pairwise(ends)])
 
 
-def _integral(levels: FrictionLevels, piece: Piece) -> Ball:
-    """Of -dB/dL along a piece."""
-    if piece.load_before != piece.load_after:
-        return front_integral(levels, piece)
-    ends = (asperity_losses(levels, piece.load_after, L) for L in (piece.bottom, piece.top))
-    lost, before = ((slip + slide).sum() for slip, slide in ends)
-    return lost - before
+def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
+    """(k,) of -dB/dL along each piece."""
+    levels.prepare(load for piece in pieces for load in piece[2:])
+    held = np.array([piece.held for piece in pieces], dtype=bool)
+    at, found = [(p.load_after, end) for p in pieces if p.held for end in p[2:4]], list[Ball]()
+    known = list(dict.fromkeys(at))
+    for start in range(0, len(known), some := max(1, NUMBERS // len(levels.candidates))):
+        slip, slide = _of_pairs(levels, known[start : start + some])
+        found.append((slip + slide).sum())
+    place = {pair: k for k, pair in enumerate(known)}
+    total = joined([*found, Ball.exact(np.zeros(0))])
+    before, lost = (total[[place[pair] for pair in at[end::2]]] for end in (0, 1))
+    moving = front_integrals(levels, [piece for piece in pieces if not piece.held])
+    back = np.argsort(np.argsort(~held, kind="stable"))
+    return joined([lost - before, moving])[back]
 
 
-def front_integral(levels: FrictionLevels, piece: Piece) -> Ball:
-    """The integral of -dB/dL along a front from L0 down to L1, the load going from P0 to P1.
+def _of_pairs(levels: FrictionLevels, pairs: Sequence[Pair]) -> tuple[Ball, Ball]:
+    """(k, n) `asperity_losses` of loads P and L."""
+    loads = sorted({load for pair in pairs for load in pair})
+    rows, place = levels.rows(loads), {load: k for k, load in enumerate(loads)}
+    high, low = (np.array([place[pair[end]] for pair in pairs]) for end in (0, 1))
+    return asperity_losses(rows.at(high), rows.at(low))
+
+
+def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
+    """(k,) integrals of -dB/dL along fronts from L0 down to L1, the load going from P0 to P1.
 
     With run = L0 - L1, D = D0(L0) - D0(L1), and the means m of D0 on [L1, L0] and M on [P1, P0],
     both less D0(L1), it is
@@ -90,38 +100,43 @@ def front_integral(levels: FrictionLevels, piece: Piece) -> Ball:
     [0, run / (2 E* a(L1))]: of each the smaller enclosure counts, so that fronts that hardly run
     keep their digits.
     """
-    unit = Fraction(levels.units.force)
+    if not pieces:
+        return Ball.exact(np.zeros(0))
+    each = [(p.top, p.bottom, p.load_before, p.load_after) for p in pieces]
+    ends = list(zip(*each, strict=True))  # L0, L1, P0, P1
     over, run, fall = (
-        Ball.exact(value / unit)
-        for value in (
-            piece.load_before - piece.top,
-            piece.top - piece.bottom,
-            piece.load_before - piece.load_after,
+        exactly([a - b for a, b in zip(ends[i], ends[j], strict=True)]).scaled(
+            1.0 / levels.units.force
         )
+        for i, j in ((2, 0), (0, 1), (2, 3))
     )
-    top, bottom = levels.at(piece.top), levels.at(piece.bottom)
-    D = _sharper(top.approach - bottom.approach, _rise(bottom, run))
-    m = _sharper(_mean(top, bottom, run), _hull(D * 0.5, D))
-    before, after = levels.at(piece.load_before), levels.at(piece.load_after)
-    last, first = after.approach - bottom.approach, before.approach - bottom.approach
-    M = _sharper(_mean(before, after, fall) + last, _hull((first + last) * 0.5, first))
+    loads = sorted({load for end in ends for load in end})
+    known, place = [levels.at(load) for load in loads], {x: k for k, x in enumerate(loads)}
+    every, approach = energies(known), Ball.stacked([level.approach for level in known])
+    which = [[place[load] for load in end] for end in ends]
+    (V0, V1, V2, V3), (D0, D1, D2, D3) = ([x[k] for k in which] for x in (every, approach))
+    softest = np.array([_softest(known[k]) for k in which[1]])
+    D = _sharper(D0 - D1, Ball.between(np.zeros(len(run)), _over(run.upper, softest)))
+    m = _sharper((V0 - V1) / run - D1, _hull(D * 0.5, D))
+    first, last = D2 - D1, D3 - D1
+    M = _sharper((V2 - V3) / fall - D3 + last, _hull((first + last) * 0.5, first))
     found = over * D - fall * m + run * (m * 2.0 - M)
-    if not levels.proved or float(found.lower) >= 0.0:
+    if not levels.proved:
         return found
-    return _sharper(found, Ball.between(np.zeros(()), np.maximum(found.upper, 0.0)))
+    least = Ball.between(np.zeros(len(run)), np.maximum(found.upper, 0.0))
+    return where(found.lower >= 0.0, found, _sharper(found, least))
 
 
-def _mean(high: Level, low: Level, run: Ball) -> Ball:
-    """The mean of D0 between two levels, less D0 of the lower."""
-    return (high.energy - low.energy) / run - low.approach
+def _softest(level: Level) -> float:
+    """At most 2 E* a of the largest asperity: D0 is concave, and rises no faster than 1 / that."""
+    k = level.problem.exact.coefficients.upper
+    softness = 1.5 * np.cbrt(np.maximum(level.loads.lower, 0.0)) / k
+    return float(softness.max(initial=0.0)) * (1 - SAFETY)
 
 
-def _rise(bottom: Level, run: Ball) -> Ball:
-    """From 0 to run / (2 E* a) of the largest asperity, for which D0 is concave."""
-    softness = bottom.loads.cbrt() * 1.5 / bottom.problem.exact.coefficients  # 2 E* a
-    softest = float(softness.lower.max(initial=0.0))
-    most = Ball.exact(run.upper) / softest if softest > 0 else Ball.around(0.0, np.inf)
-    return Ball.between(np.zeros(()), np.asarray(most.upper))
+@np.errstate(divide="ignore")
+def _over(size: Array, divisor: Array) -> Array:
+    return np.asarray(size / divisor * (1 + SAFETY))
 
 
 def _hull(a: Ball, b: Ball) -> Ball:
@@ -129,36 +144,46 @@ def _hull(a: Ball, b: Ball) -> Ball:
 
 
 def _sharper(a: Ball, b: Ball) -> Ball:
-    """Of two enclosures of one number, that with the smaller radius."""
-    return a if float(a.radius) <= float(b.radius) else b
+    """Of two enclosures of the same numbers, that with the smaller radius."""
+    return where(a.radius <= b.radius, a, b)
 
 
-def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple[Array, Array]:
+def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple[Ball, Ball]:
     """(N,) what pieces cost at each asperity in partial slip and in sliding [force length].
 
-    Exact at constant load. Else by the rule of the middle: each piece is cut into cells, by its
-    part of what all fronts run through, and the load is held at its value in the middle of each.
-    The error falls as cells^-2; no closed form is known.
+    With n = n_i(L), N = n_i(P) and p the local law P_i = p(n), the rates along a front are
+
+        p(N) - p(n) - p'(n) (N - n)  and, where open at L,  p(N),    times  dn/dL,
+
+    and neither falls with P where order holds. So a piece on which the load varies is cut into
+    cells, by its part of what all fronts run through, and of each the losses at the load of either
+    end enclose that between: the middle is off by about cells^-2, and the bound is some 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
-    n = len(levels.candidates)
-    totals = [Ball.exact(np.zeros(n)), Ball.exact(np.zeros(n))]
+    parts = list[tuple[Fraction, Pair, Pair]]()  # weight, loads and fronts at both ends
     for piece in pieces:
-        cut = 1
-        if piece.load_before != piece.load_after:
-            cut = max(1, round(cells * float((piece.top - piece.bottom) / run)))
-        for k in range(cut):
-            load = _along(piece.load_before, piece.load_after, Fraction(2 * k + 1, 2 * cut))
-            ends = [_along(piece.top, piece.bottom, Fraction(part, cut)) for part in (k, k + 1)]
-            before, after = (asperity_losses(levels, load, each) for each in ends)
-            weight = Ball.exact(1 - piece.sign * piece.slope)
-            totals = [
-                total + weight * (lost - spent)
-                for total, spent, lost in zip(totals, before, after, strict=True)
-            ]
-    slip, slide = (levels.to_scene((each * levels.loss_unit).value) for each in totals)
-    return frozen(slip), frozen(slide)
-
-
-def _along(start: Fraction, end: Fraction, part: Fraction) -> Fraction:
-    return start + part * (end - start)
+        cut = 1 if piece.held else max(1, round(cells * float((piece.top - piece.bottom) / run)))
+        steps = [Fraction(k, cut) for k in range(cut + 1)]
+        edges = [
+            (
+                piece.load_before + part * (piece.load_after - piece.load_before),
+                piece.top + part * (piece.bottom - piece.top),
+            )
+            for part in steps
+        ]
+        weight = 1 - piece.sign * piece.slope
+        parts += [(weight, (P, R), (L, M)) for (P, L), (R, M) in pairwise(edges)]
+    levels.prepare(load for _, *both in parts for pair in both for load in pair)
+    totals = [Ball.exact(np.zeros(len(levels.candidates)))] * 2
+    some = max(1, NUMBERS // (4 * len(levels.candidates)))
+    for start in range(0, len(parts), some):
+        here = parts[start : start + some]
+        pairs = [(P, L) for _, loads, fronts in here for P in loads for L in fronts]
+        weights = exactly([weight for weight, _, _ in here])
+        for k, values in enumerate(_of_pairs(levels, pairs)):
+            one, other = values[1::4] - values[0::4], values[3::4] - values[2::4]
+            same = np.array([P == R for _, (P, R), _ in here])[:, None]
+            lost = weights[:, None] * where(same, one, _hull(one, other))
+            totals[k] = totals[k] + of_rows(np.transpose, lost).sum()
+    slip, slide = (each * levels.loss_unit for each in totals)
+    return slip, slide

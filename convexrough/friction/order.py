@@ -42,7 +42,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,7 @@ from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.normal.level import Level
 from convexrough.normal.proved import Proved
+from convexrough.normal.stack import Boxes, Rows, Stack
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: "proved" for all loads between the levels in use; "proved for one step", where no load falls
@@ -137,6 +138,72 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
         return False
     rates[left] = np.maximum(rates[left], inverse.elsewhere(span, left, m))
     return not len(span.unsettled(rates, rising))
+
+
+@np.errstate(all="ignore")
+def proved_in_rows(rows: Stack, boxes: Boxes, high: Rows, low: Rows) -> NDArray[np.bool_]:
+    """(m,) `proved_between` of rows of levels, all of whose upper ones are the highest of a path.
+
+    False, too, where more has to be known of open asperities than row sums say.
+    """
+    n, k = high.loads.shape[1], rows.coefficients
+    support = ~high.open
+    c = np.where(support, 1.5 * np.cbrt(high.loads.upper) / k.lower * (1 + SAFETY), 0.0)
+    least = np.minimum(LEAST * c.max(axis=1, keepdims=True), 1.0 / boxes.stiffness)
+    c = np.where(support, np.maximum(c, least) * (1 + SAFETY), 0.0)
+    stiffest = np.where(support, c * boxes.stiffness, 0.0).max(axis=1, keepdims=True)
+    beyond = np.maximum(stiffest - 1.0, 0.0)
+    mu = 1.0 - boxes.number - beyond * (1 + SAFETY) - SAFETY
+    drop = (high.approach - low.approach).upper[:, None]
+    count = max(1, int(support.sum(axis=1).max()))
+    order = np.argsort(~support, axis=1, kind="stable")[:, :count]
+    inside, c_in, depth = (
+        np.take_along_axis(values, order, axis=1) for values in (support, c, high.indentation.lower)
+    )
+    steep = np.broadcast_to(k.upper, c.shape)
+    steep = np.take_along_axis(steep, order, axis=1) ** 1.5
+    w, entry_error, matrix = np.sqrt(c_in), np.zeros((len(c), 1)), np.empty((len(c), count, count))
+    for some, problem in rows.coupled:
+        entry_error[some] = problem.influence.entry_error
+        which = order[some]
+        matrix[some] = problem.influence.matrix[which[:, :, None], which[:, None, :]]
+    matrix *= w[:, :, None] * w[:, None, :]
+    diagonal = np.arange(count)
+    matrix[:, diagonal, diagonal] = 1.0
+    X = np.linalg.inv(matrix)
+    v = (X @ w[:, :, None])[:, :, 0]
+    lost = 1.01 * (entry_error + (count + 8) * ROUNDOFF)
+    lost = lost * np.abs(matrix).sum(axis=2).max(axis=1)[:, None]
+    left, rest = np.eye(count) - matrix @ X, w - (matrix @ v[:, :, None])[:, :, 0]
+    errors = (_norms(left) + lost * _norms(X)) / mu * (1 + SAFETY)
+    error = (_norms(rest[:, :, None]) + lost * _norms(v[:, :, None])) / mu * (1 + SAFETY)
+    up, down = np.maximum(X + errors[:, None, :], 0.0), np.maximum(errors[:, None, :] - X, 0.0)
+    up[:, diagonal, diagonal] = down[:, diagonal, diagonal] = 0.0
+    root = np.where(w > 0, w, 1.0)
+
+    def change(m: Array) -> Array:
+        low_end = np.maximum(depth - m * drop * (1 + SAFETY), 0.0)
+        slopes = 1.5 * np.sqrt(low_end) / steep * (1 - SAFETY)
+        delta = np.clip(c_in - slopes + SAFETY * c_in, 0.0, c_in)
+        return np.asarray(delta * m / root)
+
+    m = np.ones(w.shape)
+    for _ in range(IMPROVEMENTS):
+        above = (v + error + (down @ change(m)[:, :, None])[:, :, 0]) / root * (1 + SAFETY)
+        m = np.minimum(m, np.maximum(above, 0.0))
+    falls = (error + (up @ change(m)[:, :, None])[:, :, 0]) * (1 + SAFETY)
+    below = (v - falls) / root - SAFETY * np.abs(v / root)
+    most, felt = np.ones(c.shape), np.zeros(c.shape)
+    np.put_along_axis(most, order, np.where(inside, m, 1.0), axis=1)
+    felt = rows.apply(c * most) * (1.0 + 1.01 * (entry_error + (n + 2) * ROUNDOFF))
+    rates = 1.0 - felt * (1 + SAFETY) - SAFETY
+    stays = (rates > 0) | (-high.indentation.upper > drop * -rates * (1 + SAFETY))
+    rising = np.where(inside, below > 0, True).all(axis=1) & (support | stays).all(axis=1)
+    return np.asarray(rising & (mu[:, 0] > 0))
+
+
+def _norms(columns: NDArray[Any]) -> Array:
+    return np.asarray(np.sqrt((columns * columns).sum(axis=1)))
 
 
 class _Span(NamedTuple):

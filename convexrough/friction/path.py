@@ -26,9 +26,11 @@ from convexrough.friction.order import Order
 from convexrough.friction.shear import limited
 from convexrough.friction.state import States, states_of, used_by, words
 from convexrough.influence import Kind
-from convexrough.numbers.balls import Ball
+from convexrough.numbers.balls import TINY, UP, Ball
+from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
+from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -299,7 +301,9 @@ def _followed(
     levels = contact.keep(FrictionLevels)
     curves, costs = follow(start, points)
     pieces = [piece for each in costs for piece in each]
-    order = levels.order(levels_needed(curves, pieces))
+    needed = levels_needed(curves, pieces)
+    levels.prepare([*needed, *(load for load, _ in points)])
+    order = levels.order(needed)
     found: States
     if steps is None and (order != "fails" or not levels.proved):
         found = states_of(levels, curves)
@@ -340,11 +344,15 @@ def _followed(
 
 def _cumulated(each: Ball) -> Ball:
     """(m,) the sums of the first, the first two, ..."""
-    total, sums = Ball.exact(0.0), []
-    for k in range(len(each)):
-        total = total + each[k]
-        sums.append(total)
-    return Ball.stacked(sums)
+    total, error, sums = Pair(0.0, 0.0), 0.0, []
+    for high, low, radius in zip(
+        *(part.tolist() for part in (*each.mid, each.radius)), strict=True
+    ):
+        total = total + Pair(high, low)
+        error += radius + PAIR_ROUNDOFF * abs(total.high) + TINY
+        sums.append((*total, error * UP))
+    found = np.array(sums).reshape(-1, 3).T
+    return Ball(Pair(found[0], found[1]), found[2] * (1 + SAFETY))
 
 
 def _nothing(contact: Contact, forces: Array) -> dict[str, Any]:

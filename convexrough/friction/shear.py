@@ -360,6 +360,7 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     >>> cr.certify_shear(contact, state.forces, force=force).holds
     True
     """
+    checks.instance("contact", contact, Contact)
     given = checks.array("forces", forces, length=len(contact.scene))
     return against(shear(contact, force=checks.finite("force", force)), given)
 

@@ -102,6 +102,7 @@ def states_of(
 ) -> States:
     """The states of these curves; of some asperities alone, in this order, or of all."""
     sums, some = Sums.of(curves), slice(None) if which is None else which
+    levels.prepare(sums.used)
     solved = [levels.at(load) for load in sums.used]
     loads = Ball.stacked([levels.loads(level)[some] for level in solved])
     moved = Ball.stacked([levels.indentations(level)[some] for level in solved])

@@ -1,4 +1,4 @@
-"""A hard case: a scene, what is prescribed, and the answer, against which anybody's can be held."""
+"""A hard case: a scene, the prescribed quantity, and the answer to compare results with."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ REVERSALS = 100_000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Judged(Record):
-    """Somebody's numbers against the answer. Indices are those of the scene's asperities.
+    """Comparison of loads or forces with the answer. Indices are those of the scene's asperities.
 
-    wrongly_open   : (m,) given nothing, and touching (of shear forces: loaded)
-    wrongly_loaded : (m,) given a load, and open
-    error          : largest distance from the answer, over the largest number of the answer
-    within         : how large that may be
+    wrongly_open   : (m,) without a given load, and touching (for shear forces: loaded)
+    wrongly_loaded : (m,) with a given load, and open
+    error          : largest error, over the largest number of the answer
+    within         : the largest error allowed
     """
 
     wrongly_open: Indices
@@ -50,7 +50,7 @@ class Judged(Record):
 
     @property
     def right(self) -> bool:
-        """The set is right, and all numbers are near enough."""
+        """True if the set is correct and all errors are at most `within`."""
         wrong = len(self.wrongly_open) + len(self.wrongly_loaded)
         return wrong == 0 and self.error <= self.within
 
@@ -63,8 +63,8 @@ class HardCase(Record):
     that of the scene whose data are the given float64 numbers. It exists and is the only one near
     it, by an interval Newton step; that there is no other anywhere, `cr.certify` says.
 
-    family, why : what is hard about it
-    approach [length], load [force] : what is prescribed, the other one is None
+    family, why : the difficulty
+    approach [length], load [force] : the prescribed one; the other one is None
     loads, gaps : (n,) digits [force], [length]
     exact_approach, exact_load : digits [length], [force]
     shear_force : [force] that the contact is sheared by, once
@@ -108,9 +108,9 @@ class HardCase(Record):
         return frozen(np.array([digits != "0" for digits in self.loads]))
 
     def judge(self, loads: ArrayLike, *, within: float = 1e-6, floor: float = 0.0) -> Judged:
-        """Loads (n,) [force] from anywhere against the answer.
+        """Compare loads (n,) [force] with the answer.
 
-        within : how far from it they may be, over the largest load
+        within : largest error allowed, over the largest load
         floor  : [force] a load up to this claims that its asperity is open
         """
         given = checks.array("loads", loads, length=len(self))

@@ -9,13 +9,9 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.errors import ConvexroughError
 from convexrough.gallery.cases import HardCase
-from convexrough.gallery.formats import cbf, clarabel_json, qpsolvers_npz
 from convexrough.normal.certificate import certify
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.bristles import LARGEST_S, BristleProgram
-from convexrough.solvers.cone_boxes import Boxes, TooDenseError
-from convexrough.solvers.conic import LiftedProgram
-from convexrough.solvers.programs import ConeProgram
+from convexrough.programs.program import WRITERS, Form, scaled_eigenvalues, stated
 
 #: Bristles of each asperity; fewer where a program would have more variables than this, as its file
 #: is dense. Heuristics, for files that are read in no time.
@@ -48,92 +44,22 @@ def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
         "programs": {},
         "left_out": {},
     }
+    bristles = int(np.clip(VARIABLES // len(problem) - 1, FEWEST_BRISTLES, BRISTLES))
     files: dict[str, bytes] = {}
-    for kind, make in (("cones", _cones), ("bristles", _bristles)):
+    kinds: dict[Form, list[str]] = {"cones": ["json"], "bristles": ["npz"]}
+    for form, endings in kinds.items():
         try:
-            described, made = make(case, problem, own)
+            program = stated(problem, own, form, bristles)
         except ConvexroughError as error:
-            about["left_out"][kind] = str(error)
+            about["left_out"][form] = str(error)
             continue
-        about["programs"] |= described
-        files |= made
+        if form == "cones" and len(program.asperities) <= SMALL:
+            endings.append("cbf")
+        for ending in endings:
+            name = f"{case.name}.{ending if ending == 'cbf' else f'{form}.{ending}'}"
+            about["programs"][name] = program.about()
+            files[name] = WRITERS[form][ending](program.data)
     return about, files
-
-
-def _cones(case: HardCase, problem: NormalProblem, own: Array) -> tuple[About, dict[str, bytes]]:
-    """Four cones an asperity where the answer is in their boxes, else five."""
-    theta = problem.shells / problem.stiffness(own)
-    boxes = Boxes.choose(problem)
-    if (beyond := boxes.cut & (own[boxes.members] >= boxes.loads)).any():
-        boxes = Boxes.choose(problem, five=True)
-        beyond = boxes.cut & (own[boxes.members] >= boxes.loads)
-    if beyond.any():
-        raise boxes.too_dense(problem, "cones", np.where(beyond, theta[boxes.members], 0.0))
-    program = LiftedProgram.accept(problem, boxes).apply()
-    about = {
-        "form": f"second-order cones, {5 if boxes.five else 4} an asperity",
-        **_sizes(program.linear, program.constant, program.quadratic, program.constraints),
-        **_way_back(problem, boxes.members),
-        "objective": _objective(program, boxes, own),
-    }
-    files = {f"{case.name}.cones.json": clarabel_json(program)}
-    if len(boxes.members) <= SMALL:
-        files[f"{case.name}.cbf"] = cbf(program)
-    return dict.fromkeys(files, about), files
-
-
-def _bristles(case: HardCase, problem: NormalProblem, own: Array) -> tuple[About, dict[str, bytes]]:
-    m = int(np.clip(VARIABLES // len(problem) - 1, FEWEST_BRISTLES, BRISTLES))
-    reduction = BristleProgram.accept(problem, m, "bristles")
-    if len(beyond := np.flatnonzero(reduction.cut & (own >= reduction.box))):
-        ratios = problem.shells[beyond] / problem.stiffness(own[beyond], beyond)
-        raise TooDenseError("bristles", problem.candidates[beyond], ratios, LARGEST_S)
-    program = reduction.apply()
-    about = {
-        "form": f"quadratic, {m} bristles an asperity",
-        **_sizes(program.linear, program.lower, program.quadratic, program.constraints),
-        **_way_back(problem, np.arange(len(problem))),
-        "off": _bristle_error(reduction, own),
-    }
-    name = f"{case.name}.bristles.npz"
-    return {name: about}, {name: qpsolvers_npz(program)}
-
-
-def _bristle_error(reduction: BristleProgram, own: Array) -> float:
-    """About how far an exact solution is from the contact's, over the largest load.
-
-    A row of m bristles is off by 0.375 B / m^2 at worst, B the load of its box; the others answer
-    to that, by no more than one over the least eigenvalue of the scaled Hessian.
-    """
-    row = 0.375 * float(reduction.box.max() / own.max()) / reduction.m**2
-    return row / float(_scaled_eigenvalues(reduction.problem, own)[0])
-
-
-def _sizes(linear: Array, constant: Array, quadratic: Any, constraints: Any) -> About:
-    return {
-        "variables": len(linear),
-        "constraints": len(constant),
-        "nonzeros": int(quadratic.nnz + constraints.nnz),
-    }
-
-
-def _way_back(problem: NormalProblem, members: Any) -> About:
-    """Loads are force_unit times the first variables, of these asperities; others have none."""
-    return {
-        "force_unit": problem.units.force,
-        "asperities": problem.candidates[members].tolist(),
-    }
-
-
-def _objective(program: ConeProgram, boxes: Boxes, own: Array) -> float:
-    """The least objective: that of the powers of the answer's contact radii."""
-    p = own[boxes.members]
-    t = np.cbrt(p / boxes.loads)
-    powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]
-    x = np.concatenate((p, *powers[0 if boxes.five else 1 :]))
-    upper = program.quadratic
-    square = x @ (upper @ x) - 0.5 * x @ (upper.diagonal() * x)
-    return float(square + program.linear @ x)
 
 
 def _hardness(problem: NormalProblem, own: Array) -> About:
@@ -142,7 +68,7 @@ def _hardness(problem: NormalProblem, own: Array) -> About:
     condition : of the energy's Hessian over the touching ones, scaled to a diagonal of 1
     spread    : smallest over largest load
     """
-    eigenvalues = _scaled_eigenvalues(problem, own)
+    eigenvalues = scaled_eigenvalues(problem, own)
     positive = eigenvalues[0] > 0
     return {
         "asperities": len(problem.scene),
@@ -150,15 +76,6 @@ def _hardness(problem: NormalProblem, own: Array) -> About:
         "condition": float(eigenvalues[-1] / eigenvalues[0]) if positive else None,
         "spread": float(own[own > 0].min() / own.max()),
     }
-
-
-def _scaled_eigenvalues(problem: NormalProblem, own: Array) -> Array:
-    """Of the energy's Hessian over the touching ones, scaled to a diagonal of 1; least first."""
-    touching = np.flatnonzero(own)
-    root = np.sqrt(1.0 / problem.stiffness(own[touching], touching))
-    scaled = problem.influence.matrix[np.ix_(touching, touching)] * root * root[:, None]
-    np.fill_diagonal(scaled, 1.0)
-    return np.asarray(np.linalg.eigvalsh(scaled))
 
 
 def _proved(case: HardCase, loads: Array) -> About:

@@ -1,4 +1,4 @@
-"""The result: derivatives with respect to everything in a scene, each with a proved bound.
+"""The result: derivatives with respect to all parameters of a scene, each with a proved bound.
 
 Every number that can be differentiated is a sum over load levels of weights on V, D0, loads and
 indentations there (`gradients.pulled`), whose levels follow the loads, the forces and friction.
@@ -91,7 +91,7 @@ class Number(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Gradient(Table, Drawn):
-    """Derivatives of one number with respect to a scene and to what is prescribed.
+    """Derivatives of one number with respect to a scene and the prescribed quantities.
 
     Units are those of the number over those of the parameter. Arrays are (n,), in the scene's
     order; screened asperities, and open ones unless their gap is asked for, have 0 everywhere. Each
@@ -108,7 +108,7 @@ class Gradient(Table, Drawn):
     sliding, has the error 0.
 
     value           : the number itself
-    holding         : "load" or "approach": which of the two is held
+    holding         : "load" or "approach", the one that is kept constant
     heights, tip_radii : (n,);  positions : (n, 2) of x and y of each summit
     sphere_radius   : None of other bases than a sphere
     contact_modulus : of E* at fixed Poisson's ratio;  poisson_ratio : at fixed E*
@@ -117,8 +117,8 @@ class Gradient(Table, Drawn):
     force           : the shear force of a friction state;  maximum, minimum : those of a cycle
     forces, loads   : (m,) those of a history or path, nan where the two sides differ, as at a
         point that is repeated;  force_sides, load_sides : (m, 2) from below and from above
-    balance_defect  : how far the modulus by its own sum is from what scaling all forces says,
-        over the largest term of both
+    balance_defect  : difference of two ways to the derivative with respect to the modulus, a sum
+        and a scaling law, over the largest term of both
 
     >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
     >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.maximum:.4g}")

@@ -1,4 +1,4 @@
-"""A number of a scene as a function of its parameters: what optimisers and frameworks call."""
+"""A number of a scene as a function of its parameters, for optimisers and frameworks."""
 
 from __future__ import annotations
 
@@ -34,18 +34,19 @@ ELASTIC, PRESCRIBED = ("contact_modulus", "poisson_ratio"), ("load", "approach",
 class Objective(Record):
     """A number of a scene as a function of a vector of parameters, and its gradient.
 
-    scene : what is not varied is as there
+    scene : values of all parameters that are not varied
     of    : "loss" of the symmetric cycle of this force, "displacement" under it, "approach" under
         a load, "load" at an approach
-    by    : what the vector holds, in this order: "heights", "tip_radii", "positions" (x and y of
+    by    : contents of the vector, in this order: "heights", "tip_radii", "positions" (x and y of
         the first asperity, ...), "sphere_radius", "contact_modulus", "poisson_ratio", "friction",
         "load", "approach", "force"
-    load or approach : what is prescribed, and held;  force : [force] half the range of the cycle
-    influence : how to couple, as in `press`
+    load or approach : the prescribed quantity, kept constant;  force : [force] half the range of
+        the cycle
+    influence : compliance operator, as in `press`
 
-    `objective(x)` is (value, gradient): what `scipy.optimize.minimize(..., jac=True)` calls. Divide
-    by the number you start from: the tolerances of scipy are absolute, and a loss may be 1e-13.
-    `to_jax`, `to_torch` and `to_autograd` give functions of those packages.
+    `objective(x)` returns (value, gradient), as `scipy.optimize.minimize(..., jac=True)` requires.
+    Divide by the initial value: the tolerances of scipy are absolute, and a loss may be 1e-13.
+    `to_jax`, `to_torch` and `to_autograd` return functions for those packages.
 
     >>> loss = cr.Objective(scene=scene, of="loss", by=["heights"], load=3.6e-7, force=9e-8)
     >>> value, slopes = loss(loss.start)
@@ -106,7 +107,7 @@ class Objective(Record):
 
     @property
     def start(self) -> Array:
-        """The vector of the scene itself, and of what is prescribed."""
+        """The vector of the given scene and the prescribed quantities."""
         return np.concatenate([np.ravel(self._own(name)) for name in self.by]).astype(np.float64)
 
     def __call__(self, parameters: ArrayLike) -> tuple[float, Array]:
@@ -119,7 +120,7 @@ class Objective(Record):
         return gradient.value, np.concatenate(slopes)
 
     def gradient(self, parameters: ArrayLike) -> Gradient:
-        """Everything about the number at these parameters."""
+        """The `Gradient` of the number at these parameters."""
         given = dict(self._split(parameters))
         scene, control = self._scene(given), {}
         for name in PRESCRIBED:

@@ -81,8 +81,8 @@ class Geometry:
     def slopes(self, loads: Ball, which: Indices) -> Ball:
         """(m, 2) [1 / length] -scale sum_j (c_i - c_j) P_j / r_ij^3 among some, loads (m,) P.
 
-        Of many asperities in float64: a stored matrix' sums of m terms are off by some m roundoffs
-        of the sum of magnitudes, and what transforms lose is not known.
+        Of many asperities in float64: the error of a sum of m terms of a stored matrix is about m
+        roundoffs of the sum of magnitudes; that of transforms is not known.
         """
         if len(which) <= PAIRWISE:
             return self._pair_by_pair(loads, which)

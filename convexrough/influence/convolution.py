@@ -16,7 +16,7 @@ from convexrough.arrays import Array, Indices
 #: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.5 for the
 #: twiddle factors and the products with them, and sqrt(p) ((p - 1) / 2 + 4) for the sums of p terms
 #: (1 for p = 2). Radices 4 and 8 cost less than two and three passes of radix 2. "One pass" of
-#: docs/theory/operators-lattice.md, "On a lattice: Fourier transforms".
+#: docs/theory/operators-lattice.md, "Rounding".
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
 #: Columns are transformed some at a time: so many bytes of each row, what a cache holds.
@@ -207,7 +207,7 @@ class Box:
     def bound(self, kernel: Kernel, roundoff: float) -> float:
         """Bound on the 2-norm of the error of `convolve`, relative to that of the field.
 
-        (1) of docs/theory/operators-lattice.md, "On a lattice: Fourier transforms".
+        (1) of docs/theory/operators-lattice.md, "Rounding".
         """
         size = float(np.sqrt(float(self.padded[0]) * self.padded[1]))
         spectral = self.loss * size * kernel.norm

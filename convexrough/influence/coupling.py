@@ -32,8 +32,8 @@ Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
 class Rounding(NamedTuple):
     """How far a computed product A P can be from the true one, for loads of either sign.
 
-    Component i is off by at most  relative * (A |P|)_i + r_i,  |r_i| <= each,  ||r||_2 <= norm:
-    eta, rho_inf and rho_2 of docs/theory/operators.md. And (A |P|)_i <= most.
+    The error of component i is at most  relative * (A |P|)_i + r_i  with |r_i| <= each  and
+    ||r||_2 <= norm: eta, rho_inf and rho_2 of docs/theory/operators.md. And (A |P|)_i <= most.
     """
 
     relative: float
@@ -63,7 +63,7 @@ class Coupling(Protocol):
         ...
 
     def rounding(self, loads: Array) -> Rounding:
-        """How far `apply` of these float64 loads can be off."""
+        """Bound on the error of `apply` for these float64 loads."""
         ...
 
     def falloff(self, strengths: Array, power: int) -> Array:

@@ -24,6 +24,9 @@ from convexrough.influence.coupling import (
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
+#: Numbers of a coupling elsewhere that are kept: few, as it is made anew as fast as many are read.
+KEPT = 2**16
+
 
 def fits_densely(count: int) -> None:
     """Refuse what the matrix of all pairs, and the copies that a solution needs, cannot hold."""
@@ -41,7 +44,8 @@ def dense_matrix(points: Array, scale: float) -> Array:
 def entry_error(point_error: float, nearest: float) -> float:
     """Relative error of a computed scale / r, for r at least `nearest`.
 
-    Each end may be off by sqrt(2) point_error, the distance by x r: 1/r by up to x / (1 - x).
+    Each end has an error of at most sqrt(2) point_error, so the distance has an error of at most
+    x r and 1/r a relative one of at most x / (1 - x).
     """
     x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
     moved = x / (1.0 - x) if x < 1 else np.inf
@@ -118,7 +122,7 @@ class DenseInfluence:
         return total
 
     def rounding(self, loads: Array) -> Rounding:
-        """A sum of m terms in any order is off by at most m roundoffs of the sum of magnitudes.
+        """The error of a sum of m terms in any order is at most m roundoffs of their magnitudes.
 
         (Higham, Accuracy and Stability of Numerical Algorithms, section 4.2.)
         """
@@ -206,8 +210,15 @@ class DenseCoupling:
         loss = (len(self.points) + 3) * ROUNDOFF + power * self._entry_error
         return total * (1.0 + 1.01 * loss)
 
+    @cached_property
+    def _whole(self) -> Array:
+        return inverse_distances(self.targets, self.points)
+
     def _rows(self) -> Iterator[tuple[slice, Array]]:
-        """1 / r in blocks of rows."""
+        """1 / r in blocks of rows; kept where it is all one small block."""
+        if len(self.points) * len(self.targets) <= KEPT:
+            yield slice(None), self._whole
+            return
         rows = max(1, 2**22 // max(1, len(self.points)))
         for start in range(0, len(self.targets), rows):
             block = slice(start, min(start + rows, len(self.targets)))

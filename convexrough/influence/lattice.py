@@ -3,7 +3,7 @@
 Free space: the smallest box of sites that holds the asperities is padded with zeros to twice its
 size, so that no asperity feels a periodic image of another. Heights and radii of the asperities
 play no part in it. The rounding of the transforms is bounded in
-docs/theory/operators-lattice.md, "On a lattice: Fourier transforms".
+docs/theory/operators-lattice.md, "Rounding".
 """
 
 from __future__ import annotations
@@ -263,14 +263,17 @@ class LatticeInfluence(LatticeCoupling):
             yield self.spacing * (on_sites - self.blur) * (1.0 - 8 * ROUNDOFF), i, j
 
     def semidefinite_with(self, radius: float) -> bool:
-        """By the least of the lattice's symbol, and by how far points are off their sites."""
+        """By the minimum of the lattice's symbol, and the distances of points from their sites."""
         if radius * LEAST_NEGATIVE > self.spacing:
             return False
         least = self.lattice.keep(_least_symbol) - self._displaced
         return -least * radius * (1.0 + SAFETY) <= self.spacing
 
     def sums(self, loads: Pair, slices: int = SLICES) -> Ball:
-        """slices : of loads and of the kernel, of 10 to 18 bits each: docs/theory/sliced.md."""
+        """By docs/theory/operators-lattice.md, "Slices".
+
+        slices : of loads and of the kernel, of 10 to 18 bits each
+        """
         off_sites = self._off_sites(np.asarray(loads.high))
         sliced = self._kept(slices, lambda: self._slice(slices))
         return sliced.sums(loads, self._padded[0], *off_sites)
@@ -294,12 +297,12 @@ class LatticeInfluence(LatticeCoupling):
         return Sliced.of(self.box, distances, norm, unit, count)
 
     def _off_sites(self, loads: Array) -> tuple[Array, float]:
-        """What points off their sites change in sum_j P_j / r_ij, and how far that is off at most.
+        """Change of sum_j P_j / r_ij by points off their sites, and a bound on its error.
 
-        With eps_i how far a point is off, and eta no less than any |eps_i - eps_j|,
+        With eps_i the distance of a point from its site, and eta >= |eps_i - eps_j| for all i, j,
 
             1 / |d + eps_i - eps_j|  =  1 / |d| - (eps_i - eps_j) d / |d|^3,  but for
-            eta^2 / (|d| - eta)^3:  docs/theory/sliced-points.md, "Points off their sites".
+            eta^2 / (|d| - eta)^3:  docs/theory/operators-lattice.md, "Points off their sites".
         """
         x, y, unknown = self.layout.keep(off_sites)
         shrunk = float(self.lattice.shrink)
@@ -354,7 +357,7 @@ def _largest_sum(field: Array, i: int, j: int) -> float:
 
 
 def off_sites(layout: Layout) -> tuple[Array, Array, float]:
-    """(N,) and (N,) [length] how far points are off, but for a common shift; and its error.
+    """(N,) and (N,) [length] x and y distances of points from sites, up to a shift; their error.
 
     x - o - i b1 - j b2: sums and products are exact, but for what is left of them.
     """

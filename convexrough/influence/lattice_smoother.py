@@ -11,7 +11,7 @@ with the median for d and A by Fourier transforms, cut to those that touch: on l
 definite as  w G^2 w  is not above 1. All of it on blocks of m x m sites, m at least 2, small beside
 the Gaussian, with A the mean over pairs of blocks.
 (docs/theory/newton.md, "Many".) The constants are heuristics: conjugate gradients take more steps
-where they are off, and end at the same answer.
+where they are wrong, and end at the same answer.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""How negative the coupling of the points of a lattice can be: docs/theory/lattice-symbol.md.
+"""How negative the coupling of the points of a lattice can be.
 
-Loads v on some sites of a lattice have  sum_{i != j} v_i v_j / r_ij >= min f  sum v_i^2,  with the
-symbol f(k) of all sites, k a wave. Split at any alpha (Ewald), with E(q) = erfc(q / 2 alpha) / q,
+docs/theory/operators-lattice.md, "The symbol". Loads v on some sites of a lattice have
+sum_{i != j} v_i v_j / r_ij >= min f  sum v_i^2,  with the symbol f(k) of all sites, k a wave vector
+(sigma(q) on that page). Split at any alpha (Ewald), with E(q) = erfc(q / 2 alpha) / q,
 
     f(k) = sum_d cos(k d) erfc(alpha |d|) / |d| + (2 pi / V) sum_G E(|k + G|) - 2 alpha / sqrt(pi)
 

@@ -1,6 +1,6 @@
 """A square mesh of nodes with the softened kernel on it, and interpolation from it to points.
 
-Derived in docs/theory/operators-mesh.md, "Anywhere: a mesh and near pairs".
+Derived in docs/theory/operators-mesh.md, "A mesh and near pairs".
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ from convexrough.roundoff import ROUNDOFF
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """P -> sum_j P_j / r_ij^q, and how far it is off."""
+    """P -> sum_j P_j / r_ij^q, and a bound on its error."""
 
     splitting: Splitting
     order: Order
@@ -107,7 +107,7 @@ class Product:
     def _rounding(self) -> tuple[float, float]:
         """Of everything but transforms and interpolation nearby, relative and in the 2-norm.
 
-        docs/theory/operators-mesh.md, "Anywhere: a mesh and near pairs", "Rounding".
+        docs/theory/operators-mesh.md, "Errors", "Rounding".
         """
         kernel = self.splitting.kernel
         relative = (self.near.terms + kernel.beyond_roundoffs + kernel.roundoffs + 10) * ROUNDOFF

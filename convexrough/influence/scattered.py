@@ -1,7 +1,7 @@
 """The coupling among asperities anywhere: by a mesh and a sparse matrix, with proved errors.
 
 What happens on the mesh, and the bounds, are in `pair_sums`, `mesh`, `near_pairs`, `splitting` and
-`softened`; docs/theory/operators-mesh.md, "Anywhere: a mesh and near pairs", derives them.
+`softened`; docs/theory/operators-mesh.md, "A mesh and near pairs", derives them.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ class ScatteredInfluence:
         found = self._sums(loads)
         if isinstance(self._sums, MatrixSums) or self._unknown == 0.0:
             return found
-        # Distances are off by this at most, and 1 / r by so much over r^2.
+        # Distances have at most this error, and 1 / r this error over r^2.
         moved = 2.0 * math.sqrt(2.0) * self._unknown
         off = 1.01 * moved * self.falloff(np.abs(loads.high), 2)
         return Ball.around(found.mid, found.radius + off)

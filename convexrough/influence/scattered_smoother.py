@@ -1,6 +1,6 @@
 """An approximate inverse of I + W A W for asperities anywhere, for conjugate gradients.
 
-Derived in docs/theory/operators-mesh-errors.md, "Approximate inverse".
+Derived in docs/theory/operators-mesh.md, "Approximate inverse".
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from convexrough.influence.coupling import Smoother
 from convexrough.influence.dense import dense_matrix
 
 #: Nodes of the coarse mesh that a smoother solves on, about; and too few touching points for one.
-#: Heuristics: conjugate gradients take more steps where they are off, to the same answer.
+#: Heuristics: conjugate gradients take more steps where they are wrong, to the same answer.
 COARSE, FEW_TOUCHING = 1000, 200
 
 

@@ -1,4 +1,4 @@
-"""Near pairs to more digits: docs/theory/sharp-mesh.md, "Near pairs"."""
+"""Near pairs to more digits: docs/theory/operators-mesh.md, "Near pairs to more digits"."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """The sums of `pair_sums` to more digits, for the one product of a certificate.
 
-docs/theory/sharp-mesh.md. What goes to the mesh, through it and back is multiplied in slices: first
-ones of so few bits that their products are exact, and small rests. What is left is interpolation.
+docs/theory/operators-mesh.md. What goes to the mesh, through it and back is multiplied in slices:
+first ones of so few bits that their products are exact, and small rests. What is left is
+interpolation.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Products on a box of sites to as many digits as are asked for, by exact convolutions.
 
-docs/theory/sliced.md. Loads and kernel are cut into slices: whole numbers of units that shrink by
-the same power of two from one slice to the next, and a small rest. The products of all slices that
-share a unit are a level; the transforms' sum of a level is off by less than a half, so that
-rounding makes it exact. What is left beside these levels is small, and so is its error.
+docs/theory/operators-lattice.md. Loads and kernel are cut into slices: whole numbers of units that
+shrink by the same power of two from one slice to the next, and a small rest. The products of all
+slices that share a unit are a level; the error of a level computed by transforms is below a half,
+so rounding makes it exact. The rest beside these levels is small, and so is its error.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from convexrough.numbers.balls import TINY, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_sum
 from convexrough.roundoff import ROUNDOFF
 
-#: A level may be off by at most this, to be rounded to what it is.
+#: The error of a level may be at most this, so that rounding makes it exact.
 SURE = 0.45
 
 #: Slices unless more are asked for.

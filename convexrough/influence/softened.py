@@ -4,7 +4,7 @@ Beyond the reach a it is 1 / r^q itself. Within, the series of 1 / r^q in t = 1 
 after t^p: a polynomial in r^2 with p continuous derivatives across the reach. (For q = 1 it is the
 potential of a charge spread over a ball of radius a as (1 - (r/a)^2)^(p-1), so that Newton's
 theorem holds.) All terms of the series are positive, so nothing cancels. Derived in
-docs/theory/operators-mesh.md, "Anywhere: a mesh and near pairs": "The smooth part", "How steep it
+docs/theory/operators-mesh.md, "A mesh and near pairs": "The smooth part", "How steep it
 is", "Interpolation".
 """
 
@@ -69,8 +69,8 @@ class Softened:
         """Roundoffs of one computed L, relative.
 
         Term k of the series: 2 k + 1 by Horner's rule, one of its coefficient and k of t's own
-        rounding, k on average at most as at r = 0. Distances squared and over a^2 are off by 7 at
-        most, and L by q / 2 of that: (k + 1) c_(k+1) = (k + q/2) c_k.
+        rounding, k on average at most as at r = 0. Distances squared and over a^2 have at most 7,
+        and L q / 2 of that: (k + 1) c_(k+1) = (k + q/2) c_k.
         """
         mean = self._slope / float(_series(self.order, self.power).sum())
         return 3.0 * mean + 4.0 + 4.5 * self.power
@@ -81,7 +81,7 @@ class Softened:
         return 8.0 * self.power + 2.0
 
     def moved(self, shift: float) -> float:
-        """How far L is off, relative to 1 / r^q, where a distance is off by `shift` [length].
+        """Error of L, relative to 1 / r^q, where a distance has the error `shift` [length].
 
         Its slope is at most q / r^(q + 1), that of 1 / r^q, of which it has some of the terms, and
         at most 2 D r / a^(q + 2), D = sum k c_k. Times r^q, the lesser is largest where they meet.

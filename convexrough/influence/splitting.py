@@ -1,6 +1,6 @@
 """How to split 1 / r^q, and where to interpolate its smooth part: the cheapest that is accurate.
 
-docs/theory/operators-mesh-errors.md, "Choice of p, h and a". All numbers here are heuristics: what
+docs/theory/operators-mesh.md, "Choice of p, h and a". All numbers here are heuristics: what
 they choose costs more or less, and its error, a little more or less than the tolerance, is bounded
 anyway.
 """
@@ -110,7 +110,7 @@ class _Sums(NamedTuple):
 
 
 def _spacing(kernel: Softened, sums: _Sums, tolerance: float) -> float:
-    """[length] h at which (3) of docs/theory/operators-mesh.md leaves just the tolerance."""
+    """[length] h at which (1) of docs/theory/operators-mesh.md leaves just the tolerance."""
     spacing = kernel.reach / (2.0 * kernel.order)
     for _ in range(4):
         counted = 1.8 * sums.around(kernel.reach + kernel.sway(spacing))

@@ -8,8 +8,8 @@ and for slips s_iv with sum_v s_iv = x the same for all i, any such lambda is at
 
     [sum P_i |s_iv| - x . t0] / sum s_iv . q_i(v).
 
-Both are evaluated here for what a solver found, so it need not be trusted, and with what shares and
-loads can be off by: docs/theory/shakedown.md, "Melan's program".
+Both are evaluated here for the solver's result, which need not be correct, and with bounds on the
+errors of shares and loads: docs/theory/shakedown.md, "Melan's program".
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _inwards(limits: Array, state: Array, mean: Array) -> Array:
 def _lower(shares: Shares, rest: Array, mean: Array, elastic: Array, errors: Array) -> float:
     """The largest lambda that the state is sure to admit.
 
-    What it misses of the total is counted at every asperity, as no matter who is given it.
+    What it misses of the total is counted at every asperity, whichever of them gets it.
     """
     missing = float(np.hypot(*(rest.sum(axis=0) - mean)))
     missing += 4 * len(rest) * ROUNDOFF * float(np.abs(rest).sum())

@@ -28,7 +28,7 @@ from convexrough.roundoff import ROUNDOFF
 Scope = Literal["global", "local", "none"]
 
 #: Convexity number of the loads themselves from which shells fitted to them are tried. A heuristic:
-#: if it is off, work is wasted, or a bound is less sharp than it could be.
+#: if it is wrong, work is wasted, or a bound is less sharp than it could be.
 FIT_FROM = 0.8
 
 #: Margins mu that Cholesky's factorisation is tried with, the best first. Any will do, as the

@@ -1,4 +1,4 @@
-"""The certificate: what is proved of given loads, for whoever reads it.
+"""The certificate: what is proved about given loads, in the units of the scene.
 
 Every bound holds for the exact solution of the scene whose data are the given float64 numbers. The
 way there: the contact law on balls (`refine`), a box and the theorem (`proved`), and here how far
@@ -36,11 +36,11 @@ WORDS = np.array(["undecided", "contact", "open"])
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(Table):
-    """What is proved of given loads. Arrays are (n,), in the caller's order.
+    """What is proved about given loads. Arrays are (n,), in the caller's order.
 
-    scope : "global": the scene has one solution, and the bounds are on the distance to it;
-        "local": it has a solution, the only one with contacts of about these sizes (`meaning` says
-        what others there could be), and the bounds are on the distance to that;
+    scope : "global": the scene has exactly one solution, and the bounds are on the distance to it;
+        "local": it has exactly one solution with contact radii near these (`meaning` describes the
+        others that are possible), and the bounds are on the distance to that one;
         "none": nothing is proved, every bound is infinite and every asperity undecided
     convexity_number : where below 1, the energy is strictly convex on the box used: the smallest
         eigenvalue of its Hessian, scaled by its local part, is at least 1 - convexity_number
@@ -51,19 +51,18 @@ class Certificate(Table):
     gap_errors : [length] bounds on |gap - solution|
     approach : [length] prescribed, or the one that fits the loads best
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
-    duality_gap : [force length] bound on the energy of these loads above that of the solution, by
-        a dual point made from the loads alone, or by the slope of a convex energy; 0 to rounding
-        at a solution, infinite where nothing is proved. Under load control of the loads as they
-        are judged: scaled, and none on asperities that cannot touch
+    duality_gap : [force length] bound on the excess energy of these loads over the minimum, from
+        a dual point or the slope of the convex energy; 0 up to rounding at a solution,
+        infinite where nothing is proved. Under load control it is that of the scaled loads
 
-    held : how many asperities had to be taken as open, which in this solution they are; 0 unless
-        contacts are crowded. The solution is then the only one near it with these open
+    held : number of asperities fixed open for the proof, and proved to be open; 0 unless contacts
+        are crowded. The solution is then the only one near it with these open
     rival_crowding : any other solution has a larger crowding, the largest (a_i + a_j) / r_ij over
         all asperities that could touch, open ones with a = 0; infinite where there is no other, 0
         where nothing is known
-    rival_covers : any other solution has a disc that covers its nearest neighbour's summit
-    in_the_way : (m,) asperities that no proof can pass; none where there is one
-    obstacle : in words, what is wrong with them
+    rival_covers : in any other solution a disc covers the summit of its nearest neighbour
+    in_the_way : (m,) asperities that prevent a proof; empty where there is one
+    obstacle : the reason, as a sentence
 
     >>> judged = contact.certificate
     >>> judged.scope, judged.holds, judged.load_error < 1e-12 * contact.load
@@ -90,7 +89,7 @@ class Certificate(Table):
 
     @property
     def meaning(self) -> str:
-        """The scope in words: what other solutions there could be.
+        """The scope as a sentence: which other solutions are possible.
 
         >>> contact.certificate.meaning
         'the only solution'
@@ -112,7 +111,7 @@ class Certificate(Table):
 
     @property
     def holds(self) -> bool:
-        """Every asperity is proved to touch or proved to be open."""
+        """True if every asperity is proved to touch or proved to be open."""
         return self.scope != "none" and not bool((self.status == "undecided").any())
 
     @property
@@ -134,12 +133,12 @@ def certify(
     load: float | None = None,
     influence: Kind | None = None,
 ) -> Certificate:
-    """Judge loads that came from anywhere.
+    """The certificate of loads from any source.
 
     loads : (n,) [force], not negative, in the order of the scene's asperities
-    approach [length] or load [force] : what is prescribed, exactly one. Under load control the
-        loads are judged after scaling them to the prescribed total; the bounds include that.
-    influence : how to couple the asperities: "dense", "lattice", "scattered"; None for the cheapest
+    approach [length] or load [force] : the prescribed quantity, exactly one. Loads are scaled to a
+        prescribed total; the bounds include that.
+    influence : compliance operator: "dense", "lattice", "scattered"; None for the cheapest
 
     Raises InputError for loads of the wrong length, negative or not finite.
 
@@ -154,14 +153,14 @@ def certify(
 
 
 def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
-    """`certify` for a problem already assembled; loads (n,) [force] of the whole scene."""
+    """`certify` for an assembled problem; loads (n,) [force] of the whole scene."""
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
         expected = "a load on some asperity that could touch, as the total is prescribed"
         raise InputError("loads", found="none", expected=expected)
-    pair = completed(problem, Pair.exact(given))
+    pair, missing = completed(problem, Pair.exact(given))
     product = problem.product(pair) if refines(problem) else problem.plain_product(pair)
-    start = trial(problem, pair, product)
+    start = trial(problem, pair, missing, product)
     found = proved(problem, start)
     if refines(problem) and len(problem):
         better = proved(problem, refined(problem, start))
@@ -172,37 +171,38 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
 def certificate_of(
     problem: NormalProblem, loads: Array, start: Trial, found: Proved | Obstacle
 ) -> Certificate:
-    """What is proved of loads (n,) [force] of the whole scene, from a solution proved near them.
+    """The certificate of loads (n,) [force] of the whole scene, from a solution proved near them.
 
     start : these loads among the candidates, scaled to a prescribed total
     """
     length, force = problem.units.length, problem.units.force
     screened = _screened(problem, start)
-    indentation = problem.to_scene(start.indentation.value)
+    here = isinstance(found, Proved) and start is found.trial
+    known = found.indentation if isinstance(found, Proved) and here else start.indentation
+    indentation = problem.to_scene(known.value)
     indentation[screened.which] = screened.indentation
     if isinstance(found, Obstacle):
         return _unproved(problem, start, indentation, found)
     given = loads[problem.candidates]
-    same = start is found.trial and np.array_equal(given / force, found.loads.value)
-    if same:  # the solution was proved from these loads
+    if here and np.array_equal(given / force, found.loads.value):  # proved from these loads
         off = found.loads.error
         moved = off + np.abs(start.loads.low)
-        known, shift = found.indentation.error, float(found.approach.error)
+        errors, shift = found.indentation.error, float(found.approach.error)
     else:
         off = (Ball.exact(given / force) - found.loads).size
         moved = (Ball.exact(start.loads) - found.loads).size
-        known = (found.indentation - start.indentation.value).size
+        errors = (found.indentation - known.value).size
         shift = float((found.approach - start.approach.value).size)
     # Asperities that cannot touch carry nothing; loads too small for own units are lost there.
     load_errors = loads.copy()
     load_errors[problem.candidates] = off * force + np.abs(given - given / force * force)
-    errors = problem.to_scene(known)
+    errors = problem.to_scene(errors)
     errors[screened.which] = screened.rounding + shift
     if screened.coupling is not None:
         felt = screened.coupling.apply(moved)
         errors[screened.which] += felt + screened.coupling.rounding(moved).of(felt)
     errors *= 1 + SAFETY
-    words = np.where(indentation < -errors, np.int8(2), np.int8(0))
+    words = 2 * (indentation < -errors)
     words[problem.candidates[found.touching]] = 1
     words[problem.candidates[found.open]] = 2
     rivals = NO_RIVALS
@@ -290,7 +290,7 @@ def _screened_energy(
 def _unproved(
     problem: NormalProblem, start: Trial, indentation: Array, obstacle: Obstacle
 ) -> Certificate:
-    """Nothing is proved, and it is said what is in the way."""
+    """A certificate of scope "none", with the obstacle."""
     n, length = len(indentation), problem.units.length
     return Certificate(
         scope="none",

@@ -1,4 +1,4 @@
-"""A claim held against what is proved: what verdicts on loads and on shear forces share."""
+"""Comparison of a claim with the proof: the common part of verdicts on loads and shear forces."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.roundoff import SAFETY
 
-#: How far a sum may be off the prescribed total, relatively, unless `within` says so.
+#: Largest relative error of a total, where `within` is not given.
 TOTAL_WITHIN = 1e-6
 
-#: A suspect is off by at least this part of what the worst one is off by.
+#: A suspect has at least this part of the largest error.
 SUSPICIOUS = 1e-3
 
 
 class Claim(ABC):
-    """Forces that somebody claims, one per asperity, and words that they imply.
+    """Claimed forces, one per asperity, and the statuses that they imply.
 
-    within : the forces must be proved this near, in parts of the largest; None: near enough for
-        every word to follow from the forces alone
+    within : largest error allowed, as a fraction of the largest force; None: as accurate as needed
+        to prove every status from the forces alone
     total_prescribed : [force] None where it is not prescribed
     certificate : of the forces as given
-    solution    : one nearby with its own words; None where none was needed or found
+    solution    : a solution with its own statuses; None where it is not needed or not found
     """
 
     within: float | None
@@ -47,23 +47,23 @@ class Claim(ABC):
     @property
     @abstractmethod
     def wrong(self) -> dict[str, Indices]:
-        """Who is claimed to be what they are proved not to be, by what is wrong about them."""
+        """Indices of asperities whose claimed status is proved wrong, by kind of claim."""
 
     @abstractmethod
     def nearby(self) -> tuple[Array, Array] | None:
-        """(n,) [force] a solution nearby, and its bounds; None where none was needed or found."""
+        """(n,) [force] forces of a solution, and their bounds; None without a solution."""
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
-        """(n,) the proved words, of the forces or else of the solution; "undecided" without one."""
-        words: NDArray[np.str_] = self.certificate.status
+        """(n,) proved from the forces or else from the solution; "undecided" without one."""
+        status: NDArray[np.str_] = self.certificate.status
         if self.solution is None:
-            return words
-        return frozen(np.where(words == "undecided", self.solution.status, words))
+            return status
+        return frozen(np.where(status == "undecided", self.solution.status, status))
 
     @property
     def decided_alone(self) -> bool:
-        """Every word follows from the given forces alone."""
+        """All statuses are proved from the given forces alone."""
         return bool(self.certificate.holds)
 
     @cached_property
@@ -88,7 +88,7 @@ class Claim(ABC):
 
     @cached_property
     def undecided(self) -> Indices:
-        """(m,) without a proved word."""
+        """(m,) indices of asperities without a proved status."""
         return frozen(np.flatnonzero(self.status == "undecided"))
 
     @property

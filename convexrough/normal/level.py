@@ -11,7 +11,7 @@ with c = dP/dn = (3/2) P^(1/3) / k.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -22,17 +22,23 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.convex.newton_step import correct
-from convexrough.convex.theorem import distance
+from convexrough.convex.theorem import distance, excess
 from convexrough.errors import ProofError, SolverError
+from convexrough.normal import stack
+from convexrough.normal.boxes import Box
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import Obstacle, Proved, proved
 from convexrough.normal.refine import CORRECTIONS, REDUCTION, Trial, refined_loads
 from convexrough.numbers.balls import Ball, where
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
+from convexrough.sphere import hertz
 
 #: A residual that refinement cannot bring below this part of its first size is no rounding.
 SOLVED = 1e-6
+
+#: Candidates of levels that are found together, at most: more gain nothing.
+MOST = 512
 
 #: Loads of the candidates (own units) at a total load, from any solver.
 Press = Callable[[NormalProblem], Array]
@@ -126,16 +132,7 @@ class Level:
     @cached_property
     def energy(self) -> Ball:
         """V(L)."""
-        state, offsets = self.trial, self.problem.exact.offsets
-        if state is None:
-            return Ball.exact(0.0)
-        local = state.gap + state.indentation
-        per_load = local * Fraction(3, 5) + state.product * 0.5 - offsets
-        found = Ball.exact(state.loads).dot(per_load)
-        # The trial loads cost at most e'|P - P*| more than the least, at their own total.
-        above = float(state.excess @ (self.loads.error + np.abs(state.loads.low))) * (1 + SAFETY)
-        load = float(state.missing.size + self.load.radius) * float(self.approach.size)
-        return Ball.around(found.mid, found.radius + above + load * (1 + SAFETY))
+        return energies([self])[0]
 
     @cached_property
     def tangent(self) -> Response:
@@ -278,10 +275,11 @@ class Levels:
     """The normal solutions of one scene at total loads up to that of the first, each found once.
 
     top : the level with the highest load: of a pressed contact
+    together : several at once may be solved by Newton's method, in rows of a stack
     """
 
-    def __init__(self, top: Level, press: Press) -> None:
-        self.top, self.problem, self._press = top, top.problem, press
+    def __init__(self, top: Level, press: Press, *, together: bool = False) -> None:
+        self.top, self.problem, self._press, self._together = top, top.problem, press, together
         self._known: dict[tuple[float, float, float], Level] = {}
 
     @property
@@ -295,8 +293,7 @@ class Levels:
 
     def at(self, load: Ball) -> Level:
         """The level at a total load in own units; raises ProofError where nothing is proved."""
-        high, low = float(load.mid.high), float(load.mid.low)
-        key = (high, low, float(load.radius))
+        key = _key(load)
         if key not in self._known:
             self._known[key] = self._level(load)
         return self._known[key]
@@ -307,6 +304,18 @@ class Levels:
                 return Level.unloaded(self.problem)
             raise ProofError(f"the load of a level may be 0 or less: {float(load.value):.3g}")
         return self._solved(self.problem.at_load(load), load)
+
+    def prepare(self, loads: Ball) -> list[Level | None]:
+        """Levels of positive loads (k,), found together; None of those that are better alone."""
+        found, problem = self.top.solution, self.problem
+        able = self._together and problem.influence.at_hand and len(problem) <= MOST
+        if not able or found is None or found.box.held.any():
+            return [None] * len(loads)
+        rows, levels = max(1, stack.NUMBERS // len(problem)), list[Level | None]()
+        for start in range(0, len(loads), rows):
+            levels += _together(problem, found.box.closed, loads[start : start + rows])
+        self._known |= {_key(level.load): level for level in levels if level is not None}
+        return levels
 
     def at_approach(self, approach: Ball) -> Level:
         """The level at a prescribed approach in own units, above that of the first touch."""
@@ -320,3 +329,58 @@ class Levels:
             total = Ball.exact(state.loads).sum() if load is None else load
             return Level.unproved(problem, state, total)
         return Level.of(found, found.total if load is None else load)
+
+
+def _key(load: Ball) -> tuple[float, float, float]:
+    return float(load.mid.high), float(load.mid.low), float(load.radius)
+
+
+def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | None]:
+    """The levels of these loads, in one box; None of those that are not proved there."""
+    scene, exact, m, total = problem.scene, problem.exact, len(loads), loads[:, None]
+    rows = stack.Stack(
+        [(slice(0, m), problem)], exact.coefficients, exact.offsets, problem.shells, total, None
+    )
+    force, modulus = total.value * problem.units.force, scene.material.contact_modulus
+    reach = hertz.contact_radius(force, modulus, scene.mean_radius) ** 2
+    squares = scene.asperities.distances[problem.candidates] ** 2
+    guess = stack.guessed(rows, problem.offsets, squares, reach)
+    state = stack.refined(rows, stack.pressed(rows, guess))
+    number = np.asarray(box.convexity_number)
+    boxes = stack.Boxes(box.loads, box.stiffness, box.faces, number, box.problem.shells)
+    found = stack.proved(rows, state, boxes)
+
+    def level(k: int) -> Level:
+        it = found.row(k, problem.at_load(loads[k]), box)
+        known = it.approach, it.loads, it.indentation, found.rows.touching[k], found.rows.open[k]
+        return Level(it.problem, loads[k], *known, it, it.trial)
+
+    return [level(k) if found.good[k] else None for k in range(m)]
+
+
+def energies(levels: Sequence[Level]) -> Ball:
+    """(k,) V(L) of levels of one scene."""
+    high, low, radius = np.zeros((3, len(levels)))
+    which = [k for k, level in enumerate(levels) if level.trial is not None]
+    if which:
+        loaded = [levels[k] for k in which]
+        states = [level.trial for level in loaded if level.trial is not None]
+        gap, product, missing = (
+            Ball.stacked([getattr(state, name) for state in states])
+            for name in ("gap", "product", "missing")
+        )
+        trial = Pair(*(np.stack(part) for part in zip(*(s.loads for s in states), strict=True)))
+        data = loaded[0].problem.exact
+        local = data.coefficients * Ball.exact(trial).two_thirds()
+        per_load = local * Fraction(3, 5) + product * 0.5 - data.offsets
+        found = Ball.exact(trial).dot(per_load)
+        # The trial loads cost at most e'|P - P*| more than the least, at their own total.
+        loads = Ball.stacked([level.loads for level in loaded])
+        off = loads.error + np.abs(loads.mid.low)
+        above = (excess(gap, trial.high > 0) * off).sum(axis=-1) * (1 + SAFETY)
+        doubt = np.array([float(level.load.radius) for level in loaded])
+        rise = np.array([float(level.approach.size) for level in loaded])
+        error = found.radius + above + (missing.size + doubt) * rise * (1 + SAFETY)
+        known = Ball.around(found.mid, error)
+        high[which], low[which], radius[which] = *known.mid, known.radius
+    return Ball(Pair(high, low), radius)

@@ -10,6 +10,7 @@ import numpy as np
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
+from convexrough.influence.choice import FEW_ASPERITIES
 from convexrough.influence.coupling import Coupling
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along
@@ -20,6 +21,10 @@ from convexrough.sphere import hertz
 #: to reach, the approach is bounded on one so many times wider.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
+#: A shift that changes by less than this part of itself has come to all its digits: a heuristic,
+#: as it is solved for again where a load is judged.
+STRAIGHT = 1e-11
+
 
 def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Array:
     """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
@@ -29,21 +34,23 @@ def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Arr
     in few steps, as it is nearly straight. The shift is counted from the highest, so that loads of
     any size come out to all digits.
     """
-    highest = float(indentation.max())
+    first = int(indentation.argmax())
+    highest = float(indentation[first])
     indentation = indentation - highest
-    alone = hertz.indentation(load, coefficients)  # one asperity alone would carry it all
-    most = float((alone - indentation).min())
-    shift = min(most, max(highest, 1e-9 * most))
+    most = float(hertz.indentation(load, coefficients[first]))  # alone it would carry it all
+    shift, softness = min(most, max(highest, 1e-9 * most)), 1.0 / coefficients
     for steps in range(200):
-        ratio = np.maximum(indentation + shift, 0.0) / coefficients
+        ratio = np.maximum(indentation + shift, 0.0) * softness
         root = np.sqrt(ratio)
-        total = float((ratio * root).sum())
+        total = float(ratio @ root)
         # (total^(2/3) - load^(2/3)) over its slope, without cancellation
         excess = -math.expm1(2 / 3 * math.log1p((load - total) / total)) * total
-        step = excess / float((root / coefficients).sum())
+        step = excess / float(root @ softness)
         if steps > 0 and not step > 4 * ROUNDOFF * shift:
             break
         shift -= step
+        if abs(step) < STRAIGHT * shift:
+            break
     return indentation + shift
 
 
@@ -60,19 +67,21 @@ def approach_bound(
     """
     total = float(weights.sum())
     q, c = weights / total, displacement / total
-    alpha = q * coefficients
-    active = alpha**3 > 0  # others count for nothing
-    cubes, c_active = alpha[active] ** 3, c[active]
-    # The best lambda solves (8/27) sum alpha^3 / (lambda - c)^3 = L; Newton from the left.
-    height = float((c_active + np.cbrt(8.0 * cubes / (27.0 * load))).max()) * (1 + SAFETY)
+    cubes = (q * coefficients) ** 3
+    c_active, cubes = c[cubes > 0], cubes[cubes > 0]  # others count for nothing
+    # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L: Newton's method for
+    # S^(-1/3), which is concave and nearly straight, from the left.
+    highest, wanted = float(c_active.max()), 27.0 * load / 8.0
+    height = float((c_active + np.cbrt(cubes / wanted)).max()) * (1 + SAFETY)
     for _ in range(100):
-        excess = cubes / (height - c_active) ** 3
-        slope = float(3.0 * (excess / (height - c_active)).sum())
+        nearer = 1.0 / (height - c_active)
+        parts = cubes * (nearer * nearer * nearer)
+        excess, slope = float(parts.sum()), float(parts @ nearer)
         if not slope > 0:
             break  # nothing is left of the sum in float64: the height is high enough
-        step = (float(excess.sum()) - 27.0 * load / 8.0) / slope
+        step = (math.cbrt(excess / wanted) - 1.0) * excess / slope
         height += max(step, 0.0)
-        if step <= 1e-3 * (height - float(c_active.max())):
+        if step <= 1e-3 * (height - highest):
             break  # any height gives a bound; this one is close to the best
     height = max(height, float(c.max()))
     terms = (
@@ -91,14 +100,18 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     """
     modulus = scene.material.contact_modulus
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-    weights = smooth_loads(scene, load)
+    weights, scale = smooth_loads(scene, load), 1.0 / (np.pi * modulus)
     touching = np.flatnonzero(weights)
-    sources = couple(scene, touching, 1.0 / (np.pi * modulus), influence)
+    few = len(scene) <= FEW_ASPERITIES
+    which = np.arange(len(scene)) if few else touching
+    sources = couple(scene, which, scale, influence)
     displacement = np.empty(len(scene))
     others = np.flatnonzero(weights == 0)
-    pressing = weights[touching]
+    pressing = weights[which]
     couplings: list[tuple[Indices | slice, Coupling]]
-    if sources.name == "lattice":  # one box for all
+    if few:
+        couplings = [(which, sources)]
+    elif sources.name == "lattice":  # one box for all
         couplings = [(slice(None), sources.onto(scene.contact_points))]
     else:
         couplings = [(touching, sources), (others, sources.onto(scene.contact_points[others]))]

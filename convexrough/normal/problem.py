@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +35,7 @@ from convexrough.normal.units import Units
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair, in_parts, square_sum, two_sum
 from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
@@ -102,23 +103,20 @@ class NormalProblem:
     def exact(self) -> Data:
         """The scene's data to thirty digits."""
         scene, units = self.scene, self.units
-        modulus = scene.material.contact_modulus
+        constants = (
+            scene.sphere_radius,
+            scene.material.contact_modulus,
+            units.local,
+            units.force / units.length,
+        )
         tips = taken(scene.asperities.tip_radii, self.candidates)
-        tips = tips[:1] if tips.strides == (0,) else tips
-        if len(tips) and (tips == tips[0]).all():
-            tips = tips[:1]
-        curvature = 1.0 / Ball.exact(tips)
-        for radius, axes in scene.curved:  # the mean curvature of the base
-            curvature = curvature + len(np.arange(2)[axes]) / 2.0 / Ball.exact(radius)
-        inverse = 1.0 / Ball.exact(modulus)
-        cubed = curvature * (inverse * inverse * 0.5625)
-        for _ in range(3):  # before the root: numpy's is rounded by the sign of the exponent, too
-            cubed = cubed.scaled(units.local)
-        k = cubed.cbrt()
+        if len(tips) and (tips.strides == (0,) or (tips == tips[:1]).all()):
+            k = _even_coefficient(float(tips[0]), *constants)
+        else:
+            k = _exact_coefficients(tips, *constants)
         offsets = self.twofold_offsets()
         sizes = np.abs(offsets.high) + self.offset_errors / ROUNDOFF
-        scale = (inverse * INVERSE_PI).scaled(units.force / units.length)
-        return Data(k, Ball.around(offsets, 2.0**-98 * sizes), scale)
+        return Data(k, Ball.around(offsets, 2.0**-98 * sizes), _constants(*constants)[2])
 
     def at_load(self, load: Ball) -> NormalProblem:
         """The same asperities under a prescribed total load, up to that of the ceiling."""
@@ -146,6 +144,11 @@ class NormalProblem:
         """The prescribed approach: a float64 number unless it is known as a ball."""
         assert self.approach is not None
         return Ball.exact(self.approach) if self.exact_approach is None else self.exact_approach
+
+    @cached_property
+    def exact_depths(self) -> Ball:
+        """(n,) D, at a prescribed approach."""
+        return self.exact.offsets + self.depth
 
     def product(self, loads: Pair) -> Ball:
         """(n,) A P to some thirty digits."""
@@ -347,7 +350,7 @@ class NormalProblem:
     def overhang(self, weights: Array, displacement: Array) -> float:
         """Upper bound on D0 at every solution of load control, from any trial loads.
 
-        (1) of docs/theory/prescribed-load.md.
+        (2) of docs/theory/certificate.md.
 
         weights      : (n,) trial loads, not negative, not all zero
         displacement : A times weights
@@ -360,6 +363,27 @@ class NormalProblem:
     def to_scene(self, values: NDArray[Any]) -> Array:
         """Values of the candidates, set among zeros for all other asperities of the scene."""
         return among_zeros(values, self.candidates, len(self.scene))
+
+
+@lru_cache
+def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
+    """Mean curvature of the base, k^3 of a unit of curvature, and 1 / (pi E*), in own units."""
+    curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
+    cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
+    scale = INVERSE_PI / Fraction(modulus) * Fraction(unit)
+    return Ball.exact(curvature), Ball.exact(cubed), Ball.exact(scale)
+
+
+def _exact_coefficients(tips: Array, *constants: Any) -> Ball:
+    """k of tip radii (n,)."""
+    curvature, cubed, _ = _constants(*constants)
+    return ((1.0 / Ball.exact(tips) + curvature) * cubed).cbrt()
+
+
+@lru_cache
+def _even_coefficient(tip: float, *constants: Any) -> Ball:
+    """(1,) the same where all tips are equal, as often they are from scene to scene."""
+    return _exact_coefficients(np.array([tip]), *constants)
 
 
 def _middle(values: Array) -> float:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -45,7 +47,8 @@ class Obstacle(NamedTuple):
     which: Indices
 
 
-class Proved(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Proved:
     """The solution, as balls over the candidates, in own units.
 
     trial    : the loads that it was proved from
@@ -64,12 +67,12 @@ class Proved(NamedTuple):
     indentation: Ball
     approach: Ball
 
-    @property
+    @cached_property
     def touching(self) -> NDArray[np.bool_]:
         """(n,) proved to carry a load."""
         return self.indentation.positive | self.loads.positive
 
-    @property
+    @cached_property
     def open(self) -> NDArray[np.bool_]:
         """(n,) proved to have a gap."""
         return self.indentation.negative
@@ -99,7 +102,7 @@ def proved(
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
         found = _in_box(problem, box, state)
-        if isinstance(found, Proved) and not (box.held & ~found.open).any():
+        if isinstance(found, Proved) and not (box.held.any() and (box.held & ~found.open).any()):
             return found
     touching, room, obstacle = state.inside, np.zeros(len(loads)), Obstacle("", NONE)
     for _ in range(ATTEMPTS):
@@ -120,7 +123,7 @@ def proved(
 
 
 def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
-    """The solution, or how far the loads may be off where that is not proved to stay in the box."""
+    """The solution, or a bound on the error of the loads where it may leave the box."""
     loads = state.loads.high
     missing = float(state.missing.size)
     felt, own = _of_missing(problem, state, missing)

@@ -7,7 +7,8 @@ normal map (docs/theory/newton.md) in float64 from a residual in pairs.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,9 @@ from convexrough.convex.newton_step import correct
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.numbers.balls import Ball
+from convexrough.numbers.balls import TINY, Ball
 from convexrough.numbers.kernels import residual
-from convexrough.numbers.pairs import Pair, two_sum
+from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.sphere import hertz
 
 #: Corrections at most: each squares the error, or takes what conjugate gradients leave of it.
@@ -28,44 +29,45 @@ CORRECTIONS = 12
 #: Up to so many candidates coupled by a matrix, refinement costs no more than the press.
 FEW = 700
 
-#: Loads whose sum is off by less than this are not scaled: only the largest changes. Heuristic.
+#: Loads whose sum is wrong by less than this are not scaled: only the largest changes. Heuristic.
 FITS = 1e-6
 
 #: A correction by conjugate gradients reduces the residual by this; a factor leaves rounding.
 REDUCTION = 1e-7
 
 
-class Trial(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Trial:
     """Loads of the candidates, and how well they fit the contact law. In own units.
 
-    loads   : (n,) P;  product : (n,) A P;  depth : (n,) D0 + d
+    loads   : (n,) P;  product : (n,) A P
     local   : (n,) k P^(2/3), to float64
     gap     : (n,) k P^(2/3) + A P - d - D0
     approach : D0, prescribed, or under a prescribed load the one that fits best
     missing : what the loads miss the prescribed total by; 0 where none is prescribed
     """
 
+    problem: NormalProblem
     loads: Pair
     product: Ball
-    depth: Ball
     local: Array
     gap: Ball
     approach: Ball
     missing: Ball
 
-    @property
+    @cached_property
     def inside(self) -> NDArray[np.bool_]:
         """(n,) where a load is not 0."""
         return np.asarray(self.loads.high > 0)
 
-    @property
+    @cached_property
     def excess(self) -> Array:
         """(n,) how far the contact law is from holding."""
         return excess(self.gap, self.inside)
 
     def frozen(self) -> Trial:
-        """The same, which nobody can change any more: proofs rest on it."""
-        for ball in (self.product, self.depth, self.gap):
+        """The same with read-only arrays, because proofs rest on it."""
+        for ball in (self.product, self.gap):
             for part in (*ball.mid, ball.radius):
                 part.flags.writeable = False
         for part in (*self.loads, self.local):
@@ -75,28 +77,25 @@ class Trial(NamedTuple):
     @property
     def indentation(self) -> Ball:
         """(n,) D0 + d - A P: indentations of these loads, minus gaps where negative."""
-        return self.depth - self.product
+        problem = self.problem
+        depths = problem.exact.offsets + self.approach if problem.load else problem.exact_depths
+        return depths - self.product
 
 
-def trial(problem: NormalProblem, loads: Pair, product: Ball) -> Trial:
-    """The contact law evaluated at loads of which A P is known."""
+def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> Trial:
+    """The contact law evaluated at loads of which A P, and what they miss a total by, is known."""
     data, exact = problem.exact, Ball.exact(loads)
     local = hertz.indentation(loads.high, problem.coefficients)
-    missing = Ball.exact(0.0)
     if problem.load is None:
-        approach = problem.depth
-        depth = data.offsets + approach
-        gap = residual(data.coefficients, exact, product, depth)
-        return Trial(loads, product, depth, local, gap, approach, missing)
-    missing = problem.total - exact.sum()
+        gap = residual(data.coefficients, exact, product, problem.exact_depths)
+        return Trial(problem, loads, product, local, gap, problem.depth, missing)
     above = residual(data.coefficients, exact, product, data.offsets)  # D0 where touching
     weights = np.cbrt(loads.high)
     total = weights.sum()
     shift = float(weights @ above.value / total)
     rest = float(weights @ ((above.value - shift) + above.mid.low) / total)
     approach = Ball.exact(Pair(*(np.asarray(part) for part in two_sum(shift, rest))))
-    depth = data.offsets + approach
-    return Trial(loads, product, depth, local, above - approach, approach, missing)
+    return Trial(problem, loads, product, local, above - approach, approach, missing)
 
 
 def refines(problem: NormalProblem) -> bool:
@@ -125,8 +124,8 @@ def refined(problem: NormalProblem, start: Trial) -> Trial:
 
 def refined_loads(problem: NormalProblem, loads: Array) -> Trial:
     """`refined` from loads (n,) of any solver, not negative."""
-    pair = completed(problem, Pair.exact(loads))
-    return refined(problem, trial(problem, pair, problem.product(pair)))
+    pair, missing = completed(problem, Pair.exact(loads))
+    return refined(problem, trial(problem, pair, missing, problem.product(pair)))
 
 
 def corrected(problem: NormalProblem, state: Trial) -> Trial:
@@ -158,24 +157,31 @@ def corrected(problem: NormalProblem, state: Trial) -> Trial:
     gone = left & ~entering
     if gone.any():
         following = Pair(np.where(gone, 0.0, following.high), np.where(gone, 0.0, following.low))
-    following = completed(problem, following)
-    return trial(problem, following, problem.moved(state.loads, state.product, following))
+    following, missing = completed(problem, following)
+    product = problem.moved(state.loads, state.product, following)
+    return trial(problem, following, missing, product)
 
 
-def completed(problem: NormalProblem, loads: Pair) -> Pair:
-    """Loads in proportion to these that add up to the prescribed total: the largest fits last."""
-    if problem.load is None or not loads.high.any():
-        return loads
+def completed(problem: NormalProblem, loads: Pair) -> tuple[Pair, Ball]:
+    """Loads in proportion to these that add up to the prescribed total, and what they still miss.
+
+    The largest makes up for what the others leave, to its rounding.
+    """
+    if problem.load is None:
+        return loads, Ball.exact(0.0)
+    if not loads.high.any():
+        return loads, problem.total
     total = problem.total.mid
     if abs(float(loads.high.sum()) - problem.load) > FITS * problem.load:
         power = -np.frexp(loads.high.max())[1]  # of two: no factor overflows
         loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
         loads = loads * (total / loads.total())
     j = int(np.argmax(loads.high))
-    largest = loads.at(j) + (total - loads.total())
+    missing = problem.total - Ball.exact(loads).sum()
     high, low = loads.high.copy(), loads.low.copy()
-    high[j], low[j] = largest
-    return Pair(high, low)
+    high[j], low[j] = largest = loads.at(j) + missing.mid
+    rounding = PAIR_ROUNDOFF * abs(float(largest.high)) + TINY
+    return Pair(high, low), Ball.around(0.0, missing.radius + rounding)
 
 
 def _size(state: Trial) -> float:

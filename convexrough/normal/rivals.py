@@ -1,4 +1,4 @@
-"""What any other solution would have to be like: docs/theory/rivals.md, "Other solutions".
+"""What any other solution would have to be like: docs/theory/crowded.md, "Other solutions".
 
 Two solutions have contact radii a and b. With t_i = (2 / pi) m_i, m = (2/3) (a^2 + a b + b^2) /
 (a + b), they are one and the same if t_i + t_j <= r_ij for all pairs, or where the diagonal

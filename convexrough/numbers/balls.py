@@ -220,9 +220,10 @@ def elementwise(operation: Elementwise, *balls: Ball) -> Ball:
 
     All have one shape, or one number stands for all, or the result is computed at once.
     """
-    count = max(ball.radius.size for ball in balls)
-    if count <= CHUNK or any(ball.radius.size not in (1, count) for ball in balls):
-        operands = (part for ball in balls for part in (ball.mid, ball.radius))
+    sizes = [ball.radius.size for ball in balls]
+    count = max(sizes)
+    if count <= CHUNK or any(size not in (1, count) for size in sizes):
+        operands = [part for ball in balls for part in (ball.mid, ball.radius)]
         return Ball(*_finished(*operation(*operands)))
     shape = np.broadcast_shapes(*(ball.shape for ball in balls))
     flat = [ball if ball.radius.size == 1 else _flat(ball) for ball in balls]
@@ -245,7 +246,7 @@ def _flat(ball: Ball) -> Ball:
 def _finished(mid: Pair, radius: Array) -> tuple[Pair, Array]:
     """With an infinite radius where a number is none; the radius counts the midpoint's rounding."""
     high, low, radius = np.asarray(mid.high), np.asarray(mid.low), np.asarray(radius)
-    if math.isfinite(radius.sum()):
+    if math.isfinite(np.add.reduce(radius, axis=None)):
         return Pair(high, low), radius
     bad = ~np.isfinite(high + low)
     high, low = np.where(bad, 0.0, high), np.where(bad, 0.0, low)

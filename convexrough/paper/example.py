@@ -10,11 +10,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import convexrough as cr
 from convexrough.paper.states import lettered
-from convexrough.run.stages import Findings, Stages, compute
-from convexrough.run.summary import NORMAL, SHEAR, counts
+from convexrough.run.stage import Result
+from convexrough.run.stages import Cycle, Normal, Shear
 
 APPROACH = 5e-5
 
@@ -29,12 +30,12 @@ def scene() -> cr.Scene:
     return cr.Scene(1.0, asperities, material, friction=0.5, geometry="summit")
 
 
-def findings() -> Findings:
+def results() -> list[Result]:
     """Pressed, sheared to half of gross sliding, and cycled at the amplitudes the paper shows."""
-    maxima = (0.1, 0.37, 0.5)
-    minima = tuple(-part for part in maxima)
+    parts = [0.1, 0.37, 0.5]
+    stages = (Normal(approach=APPROACH), Shear(fractions=parts), Cycle(maximum=parts))
     contact = cr.press(scene(), approach=APPROACH)
-    return compute(contact, Stages(shear=maxima, cycle=(maxima, minima)))
+    return [stage.compute(contact) for stage in stages]
 
 
 def crossover(contact: cr.Contact) -> float:
@@ -50,33 +51,37 @@ def crossover(contact: cr.Contact) -> float:
     return float(brentq(excess, 0.2, 0.6, xtol=1e-12))
 
 
-def compare(found: Findings) -> dict[str, Any]:
+def compare(found: list[Result]) -> dict[str, Any]:
     """The paper's numbers and the computed ones, by the names that `summary.json` uses.
 
     The paper's number is None where it prints none.
     """
-    contact, named = found.contact, lettered(found.contact)
+    pressed, sheared, cycled = found
+    contact, named = pressed.contact, lettered(pressed.contact)
     onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)
-    half = next(row.state for row in found.shear if row.fraction == 0.5)
-    cycle = next(row.cycle for row in found.cycles if row.maximum == 0.5)
+    half, cycle = sheared.found[-1], cycled.found[-1]
     sliding = sorted(name for name, ring in named.items() if (half.status[ring] == "sliding").any())
     return {
-        "contacts": _pair(37, counts(contact.status, NORMAL)["contact"]),
+        "contacts": _pair(37, _count(contact.status, "contact")),
         "rings": {
             name: {
-                **_pair(count, counts(contact.status[named[name]], NORMAL)["contact"]),
+                **_pair(count, _count(contact.status[named[name]], "contact")),
                 "load": float(contact.loads[named[name]].mean()),
                 "first_slide": float(onsets[named[name]].min()),
             }
             for name, count in RINGS.items()
         },
-        "sliding_at_half": _pair(6, counts(half.status, SHEAR)["sliding"]),
+        "sliding_at_half": _pair(6, _count(half.status, "sliding")),
         "sliding_ring_at_half": _pair("A", "".join(sliding)),
         "first_slide": _pair(None, float(np.nanmin(onsets))),
         "crossover": _pair(0.37, crossover(contact)),
         "loss_at_half": _pair(None, cycle.loss_normalised),
         "smooth_loss_at_half": _pair(None, cycle.smooth_normalised),
     }
+
+
+def _count(status: NDArray[np.str_], word: str) -> int:
+    return int((status == word).sum())
 
 
 def _pair(paper: Any, computed: Any) -> dict[str, Any]:

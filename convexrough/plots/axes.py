@@ -78,7 +78,7 @@ def plot(
     """
     if _draw.dispatch(type(result)) is _draw.dispatch(object):
         expected = "a result that has a picture: a Contact, a state, a Cycle, History, ..."
-        raise InputError("result", found=f"something of {type(result).__name__}", expected=expected)
+        raise InputError("result", found=f"type {type(result).__name__}", expected=expected)
     if axes is None:
         axes = Figure(figsize=(SINGLE, 3.2), layout="constrained").subplots()
     contact = getattr(result, "contact", result)

@@ -6,10 +6,8 @@ Masing's rule (docs/theory/paths.md); nothing else is computed there, and nothin
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -20,10 +18,11 @@ from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.friction.cycle import Cycle, cycles
 from convexrough.friction.path import History, history
-from convexrough.progress import Announce
+from convexrough.progress import tell
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
+from convexrough.tabular.columns import bound
 from convexrough.tabular.units import UnitNames
 
 #: Forces of the slider for up to so many touching asperities; fewer for still more.
@@ -45,28 +44,20 @@ class Slides:
     loading: History
 
     @classmethod
-    def of(cls, contact: Contact, announce: Announce | None = None) -> Slides:
+    def of(cls, contact: Contact) -> Slides:
         """Of a contact. Raises InputError if the scene has no friction, or another base."""
         sphere_radius(contact.scene.sphere_radius, "slider page")
         limit = checks.friction(contact.scene.friction) * contact.load
         fractions = np.linspace(0.0, 1.0, _forces(int(np.count_nonzero(contact.loads))))
-        steady = cycles(contact, fractions * limit, announce=announce)
-        loading = history(contact, forces=fractions * limit, announce=announce)
+        steady = cycles(contact, fractions * limit, announce=tell)
+        loading = history(contact, forces=fractions * limit, announce=tell)
         return cls(contact, fractions, steady, loading)
 
 
-def slider_html(slides: Slides, proved: Sequence[str], units: UnitNames) -> str:
-    """The page.
-
-    proved : lines that say what is proved of the contact
-    """
-    found = json.dumps(slider_data(slides, proved, units), separators=(",", ":"))
-    template = files("convexrough.plots").joinpath("slider.html").read_text(encoding="utf-8")
-    return template.replace("{{data}}", found.replace("<", "\\u003c"))
-
-
-def slider_data(slides: Slides, proved: Sequence[str], units: UnitNames) -> dict[str, Any]:
+def slider_data(slides: Slides, said: Sequence[str], units: UnitNames) -> dict[str, Any]:
     """What the page shows: lengths of the map in a_H, forces in f P, displacements in X0.
+
+    said : lines on the contact
 
     Numbers have the five digits that are shown. `stick` has a row per force and a column per disc:
     the stick radius in thousandths of the contact radius, 0 where sliding, -1 where undecided.
@@ -94,7 +85,7 @@ def slider_data(slides: Slides, proved: Sequence[str], units: UnitNames) -> dict
         "units": units._asdict(),
         "touching": len(touching),
         "edge": _digits(edge),
-        "certificate": list(proved),
+        "certificate": list(said),
         "letters": _letters(limit, a_H, X0, units),
         "left_out": _left_out(len(touching), len(drawn), len(followed), len(fractions)),
         "states": _states(fractions, steady, X0, limit),
@@ -126,7 +117,7 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
         "force": _digits(fractions * limit),
         "length": _digits(moved),
         "displacement": _digits(moved / X0),
-        "displacement_error": [_bound(each.displacement_error) for each in steady],
+        "displacement_error": [bound(each.displacement_error) for each in steady],
         "loss": _digits([each.loss_normalised for each in steady]),
         "smooth_loss": _digits([each.smooth_normalised for each in steady]),
         "smooth_displacement": _digits(1.0 - stuck**2),
@@ -164,15 +155,10 @@ def _followed(contact: Contact, loading: History, which: Indices, X0: float) -> 
         "y": _digits(y),
         "word": certificate.status[which].tolist(),
         "load": _digits(contact.loads[which]),
-        "load_error": [_bound(error) for error in certificate.load_errors[which]],
+        "load_error": [bound(error) for error in certificate.load_errors[which]],
         "share": [_digits(curve) for curve in _shares(contact, loading, which).T],
         "moved": [_digits(curve) for curve in loading.asperity_displacements[:, which].T / X0],
     }
-
-
-def _bound(error: float) -> str:
-    """Two digits, never below the error."""
-    return f"{1.05 * error:.2g}" if np.isfinite(error) else "unknown"
 
 
 def _digits(values: ArrayLike) -> Any:

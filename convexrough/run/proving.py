@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from convexrough.friction.shear import shear
-from convexrough.progress import Announce
+from collections.abc import Sequence
+
+from convexrough.friction.shear import ShearState, shear
+from convexrough.progress import tell
 from convexrough.proof import Proof
-from convexrough.run.stages import Findings
+from convexrough.run.stage import Result, limit
+from convexrough.run.stages.cycle import Cycled
 
 #: At friction's limit nothing is left to stick; shear forces nearer to it are left out.
 BELOW_LIMIT = 1 - 1e-9
 
 
-def prove_findings(found: Findings, announce: Announce | None = None) -> Proof:
+def prove_results(results: Sequence[Result]) -> Proof:
     """Of the contact, of each shear force and of the amplitude of each cycle.
 
     Raises InputError for scenes too large for exact arithmetic, ProofError where nothing is proved.
     """
-    contact = found.contact
-    states = {abs(row.state.force): row.state for row in found.shear}
-    for row in found.cycles:
-        amplitude = (row.cycle.maximum - row.cycle.minimum) / 2
-        if amplitude not in states:
-            states[amplitude] = shear(contact, force=amplitude, announce=announce)
-    limit = BELOW_LIMIT * (contact.scene.friction or 0.0) * contact.load
-    chosen = [states[force] for force in sorted(states) if 0 < force < limit]
-    return contact.proof(sheared=chosen, announce=announce)
+    contact = results[0].contact
+    found = [each for result in results for each in result.found]
+    states = {abs(each.force): each for each in found if isinstance(each, ShearState)}
+    for result in results:
+        for each in result.found if isinstance(result, Cycled) else ():
+            amplitude = (each.maximum - each.minimum) / 2
+            if amplitude not in states:
+                states[amplitude] = shear(contact, force=amplitude)
+    most = BELOW_LIMIT * limit(contact) if contact.scene.friction else 0.0
+    chosen = [states[force] for force in sorted(states) if 0 < force < most]
+    return contact.proof(sheared=chosen, announce=tell)

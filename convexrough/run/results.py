@@ -1,30 +1,31 @@
-"""Result files of a run. Each is written beside its name and then renamed: whole, or not at all."""
+"""The folder of results: written beside its place, and renamed once.
+
+A folder that is there already is only written to where that is asked for: what an earlier run
+wrote, as its `files.json` says, is replaced, and other files stay.
+"""
 
 from __future__ import annotations
 
 import csv
 import json
+import os
 import platform
-import tempfile
-from collections.abc import Iterator, Mapping
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib import metadata
+from importlib import metadata, resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from convexrough.errors import FileError
-from convexrough.progress import Announce
-from convexrough.run.page import slider_page
-from convexrough.run.scene_file import SceneFile, digest
-from convexrough.run.sensitivity import NUMBERS, Differentiated
-from convexrough.run.stage_tables import stage_tables
-from convexrough.run.stages import Findings
-from convexrough.run.summary import Summary, to_json
+from convexrough.progress import tell
+from convexrough.run.scene_file import SceneFile
+from convexrough.run.stage import Result, Summary
+from convexrough.run.summary import headed, summarise
 from convexrough.tabular.units import UnitNames
-from convexrough.version import __version__
-from convexrough.whole import remove_unfinished, replacing
+from convexrough.whole import remove_unfinished, replacing, to_json, unfinished, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,95 +33,69 @@ if TYPE_CHECKING:
 #: Tables with more rows are written as .npz.
 MOST_CSV_ROWS = 100_000
 
-#: What was written, by name with its SHA-256, and from what.
+#: What was written, and from what.
 MANIFEST = "files.json"
 
 #: Packages whose versions results may depend on.
 NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
 
-def claim_folder(folder: Path, *, force: bool) -> list[Path]:
-    """Make the folder and prove that it can be written to, before anything is computed.
+@contextmanager
+def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
+    """A new folder to write to, which becomes `folder` if all goes well, or vanishes.
 
-    What processes that were killed left unfinished there is removed.
+    force : accept a folder that holds something
+    said  : what `files.json` says besides the names of files
 
-    force : accept a folder that holds something. What an earlier run wrote there, and nobody has
-        changed since, is removed; other files stay, unless new ones of the same names replace them
-
-    Returns what stays of the earlier run, as it was changed. Raises FileError.
+    Raises FileError before anything is computed.
     """
+    new = unfinished(folder / "results" if folder.is_dir() else folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        remove_unfinished(folder)
-        if any(folder.iterdir()) and not force:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        remove_unfinished(folder if folder.is_dir() else folder.parent)
+        if folder.exists() and not folder.is_dir():
+            raise FileExistsError(17, "File exists")
+        if folder.is_dir() and any(folder.iterdir()) and not force:
             raise FileError(
                 f"{folder}: not empty; --force replaces its results, --out takes another"
             )
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-        changed = []
-        for name, known in _manifest(folder).get("files", {}).items():
-            path = folder / Path(name).name  # inside the folder, whatever the manifest says
-            if path.is_file() and not path.is_symlink():
-                if digest(path) == known:
-                    path.unlink()
-                else:
-                    changed.append(path)
-        if _manifest(folder):
-            (folder / MANIFEST).unlink()
+        new.mkdir()
     except OSError as error:
         raise FileError(f"{folder}: cannot hold results: {error.strerror or error}") from error
-    return changed
+    try:
+        yield new
+        names = sorted(path.name for path in new.iterdir())
+        write_json(new / MANIFEST, headed(files=names, **said))
+        _moved(new, folder)
+    except OSError as error:
+        raise FileError(f"{folder}: cannot hold results: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
 
 
-def write_results(
-    folder: Path,
-    found: Findings,
-    summary: Summary,
-    *,
-    figures: bool,
-    html: bool = False,
-    units: UnitNames | None = None,
-    source: SceneFile | None = None,
-    announce: Announce | None = None,
-) -> list[Path]:
-    """Write summary.json, a table per stage (.csv, or .npz if long), the figures and the page.
-
-    html     : write the slider page
-    source   : the scene file, for a copy of it, and of what else says where the results are from
-    announce : told the name of each file
-
-    Returns the paths. Raises FileError; files already written stay.
-    """
-    tell: Announce = announce or (lambda news: None)
-    written = []
-    _note(folder, {} if source is None else _origin(source))
-    if source is not None:
-        path = folder / "scene.toml"
-        with beside(path) as temporary:
-            temporary.write_text(source.text, encoding="utf-8")
-        written.append(path)
-    for name, columns in stage_tables(found):
-        tell(name)
-        written.append(_write_columns(folder / f"{name}.csv", columns))
-    if figures:
-        tell("figures")
-        written += write_figures(folder, _draw(found, units or UnitNames()), tell)
-    if html:
-        tell("page")
-        page = slider_page(found.contact, summary, units or UnitNames(), tell)
-        path = folder / "slider.html"
-        with beside(path) as temporary:
-            temporary.write_text(page, encoding="utf-8")
-        written.append(path)
-    # Last, so that a summary says that the rest is there.
-    path = folder / "summary.json"
-    with beside(path) as temporary:
-        temporary.write_text(to_json(summary) + "\n", encoding="utf-8")
-    return [path, *written]
+def _moved(new: Path, folder: Path) -> None:
+    """Put the new folder in its place; into a folder that is there, file by file."""
+    if not folder.is_dir():
+        os.replace(new, folder)
+        return
+    for name in _earlier(folder):
+        path = folder / Path(name).name  # inside the folder, whatever the file says
+        if path.is_file() or path.is_symlink():
+            path.unlink()
+    for path in sorted(new.iterdir(), key=lambda path: path.name == MANIFEST):
+        os.replace(path, folder / path.name)
 
 
-def _origin(source: SceneFile) -> Summary:
+def _earlier(folder: Path) -> list[str]:
+    """The files of an earlier run; none where that cannot be read."""
+    try:
+        files = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["files"]
+        return [MANIFEST, *map(str, files)]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+
+
+def origin(source: SceneFile) -> Summary:
     """Where results are from: files read with their hashes, seed, and versions."""
     packages = {name: metadata.version(name) for name in NUMERICAL}
     return {
@@ -131,92 +106,69 @@ def _origin(source: SceneFile) -> Summary:
     }
 
 
-def _manifest(folder: Path) -> Summary:
-    """What the earlier run says that it wrote; nothing where that cannot be read."""
-    try:
-        found = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) and isinstance(found.get("files"), dict) else {}
+def write_results(
+    folder: Path,
+    results: Sequence[Result],
+    *,
+    figures: bool,
+    units: UnitNames | None = None,
+    more: Mapping[str, Any] | None = None,
+) -> list[Path]:
+    """Write the tables of all results, their figures, and summary.json with `more`; the paths.
+
+    Raises FileError.
+    """
+    written = []
+    for result in results:
+        tell(f"writing {result.name}")
+        written += write_tables(folder, result.tables())
+    if figures:
+        units = units or UnitNames()
+        for result in results:
+            tell(f"drawing {result.name}")
+            drawn = result.figures(length_unit=units.length, force_unit=units.force)
+            written += write_figures(folder, drawn)
+    path = folder / "summary.json"
+    write_json(path, summarise(results) | dict(more or {}))
+    return [path, *written]
 
 
-def _note(folder: Path, entries: Mapping[str, Any]) -> None:
-    """Add to what the manifest of a folder of results says; the first time, begin one."""
-    said = _manifest(folder) or {"schema": 1, "version": __version__, "files": {}}
-    with replacing(folder / MANIFEST) as temporary:
-        temporary.write_text(to_json(said | dict(entries)) + "\n", encoding="utf-8")
+def slider_page(pressed: Result, units: UnitNames) -> str:
+    """A page to move the shear force, as HTML; its states are found here.
+
+    Raises InputError if the scene has no friction, or another base than a sphere.
+    """
+    from convexrough.plots.slider import Slides, slider_data
+
+    data = slider_data(Slides.of(pressed.contact), pressed.lines(units), units)
+    found = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    template = resources.files("convexrough.plots").joinpath("slider.html")
+    return template.read_text(encoding="utf-8").replace("{{data}}", found)
+
+
+def write_json(path: Path, summary: Summary) -> Path:
+    """Write a summary; the path."""
+    return write_text(path, to_json(summary) + "\n")
 
 
 def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> list[Path]:
-    """Write each table, name -> columns, as NAME.csv; return the paths."""
-    _note(folder, {})
+    """Write each table, name -> columns, as NAME.csv; the paths."""
     return [_write_columns(folder / f"{name}.csv", table) for name, table in tables.items()]
 
 
-def write_figures(
-    folder: Path, figures: Mapping[str, Figure], announce: Announce | None = None
-) -> list[Path]:
-    """Write each figure as PNG and SVG; return the paths."""
-    _note(folder, {})
+def write_figures(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
+    """Write each figure as PNG and SVG; the paths."""
+    from convexrough.plots.notebook import save  # matplotlib: only when it draws
+
     written = []
     for stem, figure in figures.items():
-        if announce is not None:
-            announce(stem)
         for kind in ("png", "svg"):
             path = folder / f"{stem}.{kind}"
-            with beside(path) as temporary:
-                figure.savefig(temporary, format=kind, dpi=200)
+            with replacing(path) as temporary:
+                save(figure, temporary, kind)
             written.append(path)
             figure.set_layout_engine("none")  # laid out once: the second file takes half the time
     return written
-
-
-def _draw(found: Findings, units: UnitNames) -> dict[str, Figure]:
-    from convexrough import plots  # matplotlib: only when it draws
-
-    names: dict[str, Any] = dict(length_unit=units.length, force_unit=units.force)
-    figures = plots.press_figures(found.contact, **names)
-    if found.shear:
-        figures |= plots.shear_figures([row.state for row in found.shear], **names)
-    if found.cycles:
-        figures |= plots.cycle_figures(
-            [row.cycle for row in found.cycles],
-            loops=[row.loop for row in found.cycles],
-            **names,
-        )
-    if found.history is not None:
-        figures |= plots.history_figures(found.history.history, **names)
-    if isinstance(found.gradient, Differentiated):
-        asked, gradient = found.gradient
-        figures |= plots.gradient_figures(gradient, of=NUMBERS[asked.of], **names)
-    varied = found.varying
-    if varied.path is not None:
-        figures |= plots.path_figures(varied.path, **names)
-    if varied.steady is not None:
-        figures |= plots.steady_figures(varied.steady, **names)
-    if varied.phase_losses is not None:
-        figures |= plots.phase_figures(varied.phase_losses, **names)
-    if varied.shakedown is not None:
-        figures |= plots.shakedown_figures(varied.shakedown, **names)
-    return figures
-
-
-@contextmanager
-def beside(path: Path) -> Iterator[Path]:
-    """A name beside `path` to write to, which takes its place if all goes well, or vanishes.
-
-    The manifest says so, where the folder has one.
-    """
-    with replacing(path) as temporary:
-        yield temporary
-    listed(path)
-
-
-def listed(path: Path) -> None:
-    """Say in the manifest of a folder, where it has one, that this file is among the results."""
-    files = _manifest(path.parent).get("files")
-    if files is not None:
-        _note(path.parent, {"files": {**files, path.name: digest(path)}})
 
 
 def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
@@ -224,13 +176,15 @@ def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
     arrays = [np.asarray(values) for values in columns.values()]
     if len(arrays[0]) > MOST_CSV_ROWS:
         path = path.with_suffix(".npz")
-        with beside(path) as temporary, temporary.open("wb") as file:
+        with replacing(path) as temporary, temporary.open("wb") as file:
             np.savez(file, **columns)
         return path
-    with beside(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(
-            zip(*(array.tolist() for array in arrays), strict=True)
-        )  # repr of each float
+    write_rows(path, [list(columns), *zip(*(each.tolist() for each in arrays), strict=True)])
+    return path
+
+
+def write_rows(path: Path, rows: Sequence[Sequence[Any]]) -> Path:
+    """Write CSV, of each float its repr; the path."""
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)
     return path

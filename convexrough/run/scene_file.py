@@ -10,21 +10,16 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
+from convexrough.contact import Contact, solve
 from convexrough.errors import FileError, InputError, SceneFileError
-from convexrough.friction.shapes import elliptic_path
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import tell
 from convexrough.record import Record
-from convexrough.run.sensitivity import Sensitivity
-from convexrough.run.stages import Stages
 from convexrough.run.tables import read_summits, read_text
-from convexrough.run.toml_slips import explained
-from convexrough.run.varying import Limit, Phases, Points, Varying
 from convexrough.scene.asperities import Asperities, largest_tip_radius
 from convexrough.scene.base import checked
 from convexrough.scene.material import Material
@@ -32,10 +27,12 @@ from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
 from convexrough.tabular.table import Reading, few, named_columns
+from convexrough.tabular.toml_slips import explained
 from convexrough.tabular.units import UnitNames
 
 if TYPE_CHECKING:
-    from convexrough.run.schema import Cycle, Document, Lattice
+    from convexrough.run.stage import Result, Stage
+    from convexrough.run.study import Lattice, Study
 
 
 #: Mistakes of a scene file that are shown, more than anybody makes; the rest are counted.
@@ -55,21 +52,22 @@ _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class SceneFile(Record, Stages):
-    """What a scene file says: the shear stages, and the contact they start from.
+class SceneFile(Record):
+    """What a scene file says: what is pressed, and the stages that start from it.
 
     approach [length] or load [force] : what is prescribed; the other is None
     highest_approach : [length] upper bound on the approach under the load, where the scene was
         made to reach as far as that; else None
     influence : how to couple the asperities; None for the cheapest exact way
+    stages : the tables that compute something, [normal] first, by their names
     text   : the file itself;  seed : of its random heights and radii, None where there are none
     convert : numbers whose file names other units are converted
     inputs : the SHA-256 of each file it was read from, by its path
 
     >>> file = cr.read_scene(new_scene)
-    >>> contact = cr.press(file.scene, approach=file.approach, load=file.load)
-    >>> contact.certificate.holds
-    True
+    >>> contact = file.press()
+    >>> [result.certified for result in file.compute(contact)]
+    [True, True, True, True]
     """
 
     path: Path
@@ -80,6 +78,7 @@ class SceneFile(Record, Stages):
     approach: float | None
     load: float | None
     highest_approach: float | None
+    stages: Mapping[str, Stage]
     solver: Solver
     influence: Kind | None
     units: UnitNames
@@ -95,6 +94,14 @@ class SceneFile(Record, Stages):
             highest=self.highest_approach,
         )
 
+    def press(self) -> Contact:
+        """As the file says. Raises what `press` raises."""
+        return solve(self.problem(), self.solver, announce=tell)
+
+    def compute(self, contact: Contact) -> list[Result]:
+        """The result of each stage, of the pressed contact first."""
+        return [stage.compute(contact) for stage in self.stages.values()]
+
 
 def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = None) -> SceneFile:
     """Read and check a scene file.
@@ -108,83 +115,37 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     >>> len(file.scene)
     61
     """
-    from convexrough.run.schema import validate
+    from convexrough.run.study import validate
 
     path = Path(path)
     text = read_text(path, MOST_BYTES)
-    tables, mistakes = validate(parsed(path, text))
-    if tables is None:
+    study, mistakes = validate(parsed(path, text))
+    if study is None:
         raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
-    shear, cycle, history, units = tables.shear, tables.cycle, tables.history, tables.units
-    scene, highest = build_scene(path, tables, asperities=asperities)
-    layout, sources = tables.asperities, [path]
+    scene, highest = build_scene(path, study, asperities=asperities)
+    layout, sources = study.asperities, [path]
     if layout.pattern == "file" and asperities is None:
         sources.append(path.parent / layout.path)
+    for stage in study.stages.values():
+        try:
+            stage.fits(len(scene))
+        except InputError as error:
+            raise error.within(str(path)) from error
     return SceneFile(
         path=path,
         text=text,
         seed=None if layout.pattern == "file" or asperities is not None else layout.seed,
         inputs={str(each): digest(each) for each in sources},
         scene=scene,
-        approach=tables.normal.approach,
-        load=tables.normal.load,
+        approach=study.normal.approach,
+        load=study.normal.load,
         highest_approach=highest,
-        shear=tuple(shear.fractions) if shear else None,
-        cycle=(tuple(cycle.maximum), tuple(cycle.lowest)) if cycle else None,
-        history=tuple(history.fractions) if history else None,
-        varying=_varying(tables),
-        gradient=_sensitivity(tables),
-        loop_points=cycle.loop_points if cycle else None,
-        loop_asperities=_whose_loops(path, cycle, len(scene)) if cycle else None,
-        solver=named(tables.solver.name),
-        influence=cast("Kind | None", tables.solver.influence),
-        units=units.names,
-        convert=units.convert,
+        stages=study.stages,
+        solver=named(study.solver.name),
+        influence=study.solver.influence,
+        units=study.units.names,
+        convert=study.units.convert,
     )
-
-
-def _varying(tables: Document) -> Varying:
-    """The paths of a file, in its units."""
-    friction = tables.friction.coefficient if tables.friction else 0.0
-    found: dict[str, Any] = {}
-    for name in ("path", "steady"):
-        if (table := getattr(tables, name)) is None:
-            continue
-        if table.ellipse is not None:
-            loads, forces = elliptic_path(friction=friction, **table.ellipse.model_dump())
-        else:
-            loads, forces = np.array(table.loads), np.array(table.forces)
-        found[name] = Points(table.reference * loads, table.reference * forces)
-    closed = tables.steady
-    if closed is not None and closed.ellipse is not None and closed.phases:
-        shape = closed.ellipse
-        found["phases"] = Phases(
-            load=closed.reference * shape.load,
-            load_amplitude=closed.reference * shape.load_amplitude,
-            force=closed.reference * shape.force,
-            force_amplitude=closed.reference * shape.force_amplitude,
-            phases=tuple(closed.phases),
-            factors=tuple(closed.factors),
-            chords=shape.chords,
-        )
-    limit = None
-    if (table := tables.shakedown) is not None:
-        amplitudes = table.load_amplitudes or [0.0] * len(table.force_amplitudes)
-        limit = Limit(
-            table.reference * table.loads,
-            table.reference * np.array(table.forces),
-            table.reference * np.array(amplitudes),
-            table.reference * np.array(table.force_amplitudes),
-            table.kind,
-        )
-    return Varying(**found, shakedown=limit)
-
-
-def _sensitivity(tables: Document) -> Sensitivity | None:
-    """What the table [gradient] asks for."""
-    if (table := tables.gradient) is None:
-        return None
-    return Sensitivity(table.of, table.fraction or 0.0, tuple(table.by), table.holding)
 
 
 def digest(path: Path) -> str:
@@ -193,18 +154,6 @@ def digest(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
-
-
-def _whose_loops(path: Path, table: Cycle, count: int) -> tuple[int, ...] | Literal["all"] | None:
-    """`Stages.loop_asperities` of a file with so many asperities."""
-    asked = table.loop_asperities
-    if asked is None or asked == "all":
-        return asked
-    for place, index in enumerate(asked):
-        if index >= count:
-            what, expected = f"[cycle] loop_asperities[{place}]", f"an index from 0 to {count - 1}"
-            raise InputError(what, found=index, expected=expected, where=str(path))
-    return tuple(asked)
 
 
 def parsed(path: Path, text: str) -> dict[str, Any]:
@@ -219,6 +168,12 @@ def parsed(path: Path, text: str) -> dict[str, Any]:
     if not contents:
         raise FileError(f"{path}: empty; `convexrough new` writes a scene to start from")
     return contents
+
+
+def has_sweep(path: Path) -> bool:
+    """Whether a file asks for many scenes."""
+    text = read_text(path, MOST_BYTES)
+    return bool(re.search(r"^\s*\[\s*sweep\b", text, re.M)) and "sweep" in parsed(path, text)
 
 
 class Layouts(NamedTuple):
@@ -242,7 +197,7 @@ READ = Layouts(read_summits, _regular)
 
 
 def build_scene(
-    path: Path, tables: Document, layouts: Layouts = READ, asperities: Asperities | None = None
+    path: Path, study: Study, layouts: Layouts = READ, asperities: Asperities | None = None
 ) -> tuple[Scene, float | None]:
     """The scene of checked tables, and what `SceneFile.highest_approach` says.
 
@@ -253,40 +208,40 @@ def build_scene(
     Raises InputError for mistakes that show only here.
     """
     with _blamed_on(path, "material"):
-        stuff = _material(tables)
+        stuff = _material(study)
 
     def press_on(asperities: Asperities) -> Scene:
         return Scene(
-            checked(tables.sphere.radius),
+            checked(study.sphere.radius),
             asperities,
             stuff,
-            friction=tables.friction.coefficient if tables.friction else None,
-            geometry=tables.asperities.geometry,
+            friction=study.friction.coefficient if study.friction else None,
+            geometry=study.asperities.geometry,
         )
 
-    layout = tables.asperities
+    layout = study.asperities
     with _blamed_on(path, "asperities"):
         if asperities is not None:
             return press_on(asperities), None
         if layout.pattern == "file":
             how = Reading(
                 columns=named_columns("columns", layout.columns, SUMMIT_COLUMNS),
-                units=tables.units.names,
-                convert=tables.units.convert,
+                units=study.units.names,
+                convert=study.units.convert,
             )
             place = path.parent / layout.path
             return press_on(layouts.summits(place, tip_radius=layout.tip_radius, how=how)), None
-        return _lattice(layout, tables, press_on, layouts)
+        return _lattice(layout, study, press_on, layouts)
 
 
-def _material(tables: Document) -> Material:
+def _material(study: Study) -> Material:
     """Of both bodies."""
-    from convexrough.run.schema import Bodies
+    from convexrough.run.study import Bodies
 
     def of(body: Any) -> Material:
         return Material.from_youngs(body.youngs_modulus, body.poisson_ratio, body.hardness)
 
-    table = tables.material
+    table = study.material
     if isinstance(table, Bodies):
         return Material.pair(of(table.sphere), of(table.base))
     if table.youngs_modulus is not None:
@@ -295,7 +250,7 @@ def _material(tables: Document) -> Material:
 
 
 def _lattice(
-    layout: Lattice, tables: Document, press_on: Callable[[Asperities], Scene], layouts: Layouts
+    layout: Lattice, study: Study, press_on: Callable[[Asperities], Scene], layouts: Layouts
 ) -> tuple[Scene, float | None]:
     """The scene as far as `within`, or else as far as any asperity could touch."""
     tips = layout.tip_radius
@@ -311,7 +266,7 @@ def _lattice(
     def farthest(approach: float) -> float:
         return reach(
             approach,
-            sphere_radius=checked(tables.sphere.radius),
+            sphere_radius=checked(study.sphere.radius),
             tip_radius=largest_tip_radius(layout.tip_radius, layout.tip_radius_cv),
             height=CUT_DEVIATIONS * layout.height_std,
             geometry=layout.geometry,
@@ -319,10 +274,10 @@ def _lattice(
 
     if layout.within is not None:
         return scene(layout.within), None
-    if (approach := tables.normal.approach) is not None:
+    if (approach := study.normal.approach) is not None:
         return scene(farthest(approach)), None
-    assert tables.normal.load is not None  # exactly one of the two
-    return all_that_could_touch(scene, farthest, tables.normal.load)
+    assert study.normal.load is not None  # exactly one of the two
+    return all_that_could_touch(scene, farthest, study.normal.load)
 
 
 @contextmanager

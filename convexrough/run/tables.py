@@ -14,11 +14,6 @@ from convexrough.tabular.arrays import reading
 from convexrough.tabular.table import AS_IT_IS, Reading, read_table
 from convexrough.tabular.units import parsed
 
-#: Columns of asperities.csv, in this order.
-ASPERITY_COLUMNS = (
-    *("x", "y", "height", "tip_radius", "load", "contact_radius", "gap", "status", "load_error"),
-)
-
 
 def read_text(path: Path, most: int) -> str:
     """The whole of a UTF-8 file of up to `most` bytes, with or without a byte-order mark."""

@@ -1,30 +1,37 @@
-"""What a value in a table of a scene file may be, and what is said of one that may not.
+"""What a value in a table of a scene file may be, and how every mistake is told at once.
 
-Only this module and `schema` know pydantic, which takes 0.1 s to import.
+Only models of tables import this: pydantic takes 0.1 s to import.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
     BaseModel,
     ConfigDict,
     Discriminator,
     Field,
+    ModelWrapValidatorHandler,
     Tag,
     ValidationError,
     ValidatorFunctionWrapHandler,
     WrapValidator,
+    model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from convexrough.checks import SIZED, is_sized
-from convexrough.influence import KINDS
-from convexrough.run.sensitivity import BY, NUMBERS
-from convexrough.solvers import SOLVERS
+from convexrough.checks import SIZED, is_sized, nearest
+
+#: Letters of the formulas, and the keys that they stand for.
+MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
+MEANT |= {"nu": "poisson_ratio", "R": "radius", "rho": "tip_radius", "f": "coefficient"}
+MEANT |= {"mu": "coefficient", "P": "load", "D": "approach"}
+
+#: A mistake: the key, "" for all of the table, and what is said of it.
+Mistake = tuple[str, str]
 
 
 def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
@@ -42,6 +49,9 @@ def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> 
     return WrapValidator(check)
 
 
+#: Where the file has a list, the second; tags in brackets are not said.
+NUMBER_OR_LIST = Discriminator(lambda it: "(list)" if isinstance(it, list) else "(number)")
+
 _SIZED = expected(SIZED, is_sized)
 
 Finite = Annotated[float, expected("a finite number"), _SIZED]
@@ -54,9 +64,11 @@ Share = Annotated[float, expected("a number from 0 to 1", lambda value: 0 <= val
 Fraction = Annotated[float, expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
 Shares = Annotated[list[Share], expected("a list of numbers from 0 to 1", bool)]
 Fractions = Annotated[list[Fraction], expected("a list of numbers from -1 to 1", bool)]
+Whole = Annotated[int, expected("a whole number that is not negative", lambda value: value >= 0)]
+Text = Annotated[str, expected("text in quotes", bool)]
+Switch = Annotated[bool, expected("true or false")]
 TipRadius = Annotated[
-    Annotated[Positive, Tag("number")] | Annotated[list[Positive], Tag("list")],
-    Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
+    Annotated[Positive, Tag("(number)")] | Annotated[list[Positive], Tag("(list)")], NUMBER_OR_LIST
 ]
 _Length = Annotated[
     float,
@@ -68,59 +80,95 @@ _TwoLengths = Annotated[
     list[_Length], expected("two radii, along x and along y", lambda value: len(value) == 2)
 ]
 Radius = Annotated[
-    Annotated[_Length, Tag("number")] | Annotated[_TwoLengths, Tag("list")],
-    Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
+    Annotated[_Length, Tag("(number)")] | Annotated[_TwoLengths, Tag("(list)")], NUMBER_OR_LIST
 ]
-Seed = Annotated[int, expected("a whole number that is not negative", lambda value: value >= 0)]
-Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
-Chosen = Annotated[
-    Literal["all"] | list[Seed], expected('"all" or a list of indices of asperities, from 0')
-]
-Text = Annotated[str, expected("text in quotes", bool)]
-Switch = Annotated[bool, expected("true or false")]
-Pattern = Annotated[Literal["hexagonal", "square"], expected('"hexagonal", "square" or "file"')]
-Geometry = Annotated[Literal["summit", "closest"], expected('"summit" or "closest"')]
-InfluenceName = Annotated[str, expected(f"one of: {', '.join(KINDS)}", KINDS.__contains__)]
-SolverName = Annotated[str, expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)]
-ShakedownKind = Annotated[
-    Literal["exact", "elastic", "vector"], expected('"exact", "elastic" or "vector"')
-]
-Pair = Annotated[
+_Pair = Annotated[
     list[Finite], expected("a pair [x, y] of finite numbers", lambda value: len(value) == 2)
 ]
 Force = Annotated[
-    Annotated[Finite, Tag("number")] | Annotated[Pair, Tag("list")],
-    Discriminator(lambda value: "list" if isinstance(value, list) else "number"),
+    Annotated[Finite, Tag("(number)")] | Annotated[_Pair, Tag("(list)")], NUMBER_OR_LIST
 ]
-Number = Annotated[str, expected(f"one of: {', '.join(NUMBERS)}", NUMBERS.__contains__)]
-By = Annotated[
-    list[str],
-    expected(f"a list of some of: {', '.join(BY)}", lambda it: bool(it) and {*it} <= {*BY}),
-]
-Control = Annotated[Literal["load", "approach"], expected('"load" or "approach"')]
 
 
 class Table(BaseModel):
     """A table: numbers are finite, no text or truth value stands for one, no other keys."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
 
-    alternatives: ClassVar[tuple[str, str] | None] = None  # keys of which exactly one is given
-    needs: ClassVar[dict[str, str]] = {}  # the key on the left is only used with that on the right
+    alternatives: ClassVar[tuple[str, ...]] = ()  # keys of which exactly one is given
+    needs: ClassVar[Mapping[str, str]] = {}  # the key on the left is only used with the right one
+    elsewhere: ClassVar[tuple[str, frozenset[str]]] = ("", frozenset())  # keys not used with this
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _all_mistakes(cls, keys: Any, validated: ModelWrapValidatorHandler[Self]) -> Self:
+        """Those of single values, of keys beside each other, and of a table right in itself."""
+        if not isinstance(keys, dict):
+            raise PydanticCustomError("expected", "a table")
+        found: list[InitErrorDetails] = []
+        try:
+            table = validated(keys)
+        except ValidationError as error:
+            found += [_again(each) for each in error.errors()]
+        found += [_told(*each, keys) for each in cls.mistakes_between(keys)]
+        if not found:
+            found = [_told(*each, keys) for each in table.mistakes_within()]
+        if found:
+            raise ValidationError.from_exception_data(cls.__name__, found)
+        return table
 
     @classmethod
-    def mistakes_between(cls, keys: dict[str, Any]) -> Iterator[str]:
-        """Mistakes in which keys are given together, whatever their values."""
+    def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
+        """Mistakes in which keys are given, whatever their values."""
+        words, others = cls.elsewhere
+        for key in keys:
+            if key in cls.model_fields:
+                continue
+            meant = f'did you mean "{MEANT[key]}"?' if MEANT.get(key) in cls.model_fields else ""
+            unknown = f"unknown key, {meant or nearest(key, cls.model_fields)}"
+            yield key, f"not used with {words}" if key in others else unknown
         if cls.alternatives:
             given = [key for key in cls.alternatives if key in keys]
             if len(given) != 1:
                 found = "both" if given else "neither"
-                both = ", ".join(cls.alternatives)
-                yield f"{both}: found {found}, expected exactly one of the two"
+                either = ", ".join(cls.alternatives)
+                yield either, f"found {found}, expected exactly one of the two"
         for key, needed in cls.needs.items():
             if key in keys and needed not in keys:
-                yield f"{needed}: missing, needed with {key}"
+                yield needed, f"missing, needed with {key}"
 
-    def mistakes_within(self) -> Iterator[str]:
+    def mistakes_within(self) -> Iterator[Mistake]:
         """Mistakes that only show between values each right by itself."""
         yield from ()
+
+
+def _told(key: str, said: str, keys: Any) -> InitErrorDetails:
+    kind = PydanticCustomError("told", "{said}", {"said": said})
+    return InitErrorDetails(type=kind, loc=(key,) if key else (), input=keys)
+
+
+def _again(error: ErrorDetails) -> InitErrorDetails:
+    """The same mistake, to be told beside others."""
+    kind = error["type"] if error["type"] in ("told", "missing") else "expected"
+    expects = "a table" if error["type"] == "model_type" else error["msg"]
+    again = PydanticCustomError(kind, "{said}", {"said": expects})
+    return InitErrorDetails(type=again, loc=error["loc"], input=error["input"])
+
+
+def phrased(error: ErrorDetails) -> str:
+    """[table] key.key[i]: what was found, what is expected."""
+    table, *inner = (each for each in error["loc"] if not str(each).startswith("("))
+    place = "".join(f"[{each}]" if isinstance(each, int) else f".{each}" for each in inner)
+    where = f"[{table}] {place.removeprefix('.')}".rstrip()
+    if error["type"] == "missing":
+        return f"{where}: missing"
+    if not place and error["type"] == "told":
+        return f"{where} {error['msg']}"
+    found = "" if error["type"] == "told" else f"found {shown(error['input'])}, expected "
+    return f"{where}: {found}{error['msg']}"
+
+
+def shown(value: object) -> str:
+    """A value as a message says it, not too long."""
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

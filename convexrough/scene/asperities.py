@@ -1,4 +1,4 @@
-"""Where the asperities stand, how tall and how sharp they are."""
+"""Positions, heights and tip radii of the asperities."""
 
 from __future__ import annotations
 
@@ -57,10 +57,10 @@ class Asperities(Record):
         object.__setattr__(self, "heights", tall)
 
     def with_tips(self, tip_radii: ArrayLike, heights: ArrayLike = 0.0) -> Asperities:
-        """Other tips at the same positions; arguments as for `Asperities`.
+        """Asperities with other tips at the same positions; arguments as for `Asperities`.
 
-        What follows from the positions alone, such as their lattice and their distances, is found
-        once and shared: for many scenes on one array.
+        Data that depend only on the positions, such as lattice and distances, are computed once and
+        shared by many scenes.
 
         >>> array = scene.asperities
         >>> rougher = array.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
@@ -72,9 +72,9 @@ class Asperities(Record):
     def roughened(
         self, *, height_std: float = 0.0, tip_radius_cv: float = 0.0, seed: int | None = None
     ) -> Asperities:
-        """These asperities with random heights and tip radii, drawn as in `hexagonal`.
+        """These asperities with random heights and tip radii, distributed as in `hexagonal`.
 
-        Many such surfaces cost less this way, as `with_tips` says.
+        Many random surfaces share the data of their positions, as with `with_tips`.
 
         >>> regular = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
         >>> rough = [regular.roughened(height_std=1e-6, seed=seed) for seed in range(3)]
@@ -104,12 +104,12 @@ class Asperities(Record):
 
     @cached_property
     def layout(self) -> Layout:
-        """What follows from the positions alone."""
+        """Data that depend only on the positions."""
         return Layout(self.positions)
 
     @property
     def lattice(self) -> Lattice | None:
-        """What the summits lie on, each on a site of its own, if that is a lattice."""
+        """The lattice of the summits, each on a different site, or None."""
         return self.layout.lattice
 
     @property
@@ -138,8 +138,7 @@ class Asperities(Record):
         seed          : required when heights or radii are random
 
         Asperities are ordered by distance from the axis, then by angle. A larger `within`
-        adds asperities behind the others and leaves those, with their random heights and
-        radii, as they were.
+        appends asperities and does not change the others, nor their random heights and radii.
         """
         rough = (height_std, tip_radius_cv, seed)
         return cls._lattice(HEXAGONAL, spacing, tip_radius, within, *rough)

@@ -44,7 +44,7 @@ def curved(radius: Radius) -> list[tuple[float, slice]]:
 
 
 def named(radius: Radius) -> str:
-    """What it is."""
+    """The name of the shape."""
     if not curved(radius):
         return "a flat base"
     if not isinstance(radius, tuple):
@@ -53,7 +53,7 @@ def named(radius: Radius) -> str:
 
 
 def sphere_radius(radius: Radius, what: str) -> float:
-    """R of a sphere, for what has a meaning on no other base."""
+    """R of a sphere; raises InputError for other bases."""
     if isinstance(radius, tuple) or not curved(radius):
         raise InputError(what, found=named(radius), expected="a scene whose base is a sphere")
     return radius

@@ -15,8 +15,8 @@ from convexrough.kept import Keeper
 
 Sites = NDArray[Any]  # of whole numbers
 
-#: Points may be off a lattice by this many roundoffs of the largest coordinate: a few more than
-#: computing them in float64 loses.
+#: Points may differ from a lattice by this many roundoffs of the largest coordinate: a few more
+#: than computing them in float64 loses.
 BLUR = 32 * 2.0**-53
 
 #: ... and of the shortest distance between sites by this part: the bounds on products count it.
@@ -34,7 +34,7 @@ class Lattice(Keeper):
     """The points origin + i b1 + j b2, i and j whole numbers.
 
     basis   : (2, 2) [length] rows b1 and b2, reduced to rounding
-    blur    : [length] bound on how far each coordinate of the points it was found from is off
+    blur    : [length] bound on the distance of each coordinate of the points from its site
     shrink  : by which it is smaller than one whose basis float64 holds exactly, `unshrunk`
     """
 

@@ -1,4 +1,4 @@
-"""Where asperities stand, and what follows from that alone, whoever stands there."""
+"""Positions of asperities, and data that depend only on them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from convexrough.scene.patterns import Pattern
 MANY = 5000
 
 
-#: Coordinates of points made on a lattice may be off their sites by this part of the largest: three
+#: Coordinates of points made on a lattice may differ from sites by this part of the largest: three
 #: roundoffs in making them, and what `Lattice.sites` loses and allows for when it looks.
 MADE_BLUR = 16 * 2.0**-53
 
@@ -51,7 +51,7 @@ class Layout(Keeper):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """What the points lie on, each on a site of its own, if that is a lattice."""
+        """The lattice of the points, each on a different site, or None."""
         return Lattice.through(self.points) if self.made is None else self.made[0]
 
     @cached_property

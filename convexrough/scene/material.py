@@ -1,4 +1,4 @@
-"""What both bodies are made of."""
+"""The material of both bodies."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from convexrough.errors import InputError
 
 @dataclass(frozen=True, init=False)
 class Material:
-    """Both bodies: two like ones, or by `pair` two that differ.
+    """The material of both bodies; `pair` combines two different materials.
 
     contact_modulus : E*, 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2  [force / length^2]
     poisson_ratio   : nu, from 0 to 0.5; of a pair the mean, weighted with 1 / G
-    hardness        : the mean pressure at which asperities yield [force / length^2], if known:
-        nothing is computed from it, a contact beyond it is warned of
-    mismatch        : Dundurs' beta of a pair, 0 of like bodies: the coupling of pressing to shear,
-        which is neglected
+    hardness        : mean pressure at which asperities yield [force / length^2], if known; used
+        for a warning only
+    mismatch        : Dundurs' beta of a pair, 0 for one material: the coupling of normal and
+        tangential displacements, which is neglected
 
     >>> steel = cr.Material.from_youngs(210e9, 0.3)
     >>> print(f"{steel.contact_modulus:.4g}")
@@ -64,7 +64,7 @@ class Material:
 
         Normal and tangential compliances, of asperities and between them, are those of two like
         bodies with 2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, but for the
-        coupling of the two by Dundurs' beta (docs/theory/two-bodies.md).
+        coupling of the two by Dundurs' beta (docs/theory/bodies.md).
 
         >>> steel = cr.Material.from_youngs(210e9, 0.3)
         >>> both = cr.Material.pair(steel, base=cr.Material.from_youngs(70e9, 0.33))

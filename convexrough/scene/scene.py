@@ -1,4 +1,4 @@
-"""What is pressed on what: a sphere, or another base, on asperities. No loads, no solving."""
+"""The scene: a sphere or another base, asperities and materials, without loads and solutions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Geometry = Literal["summit", "closest"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene(Record):
-    """A sphere, the asperities it is pressed on, and what both are made of.
+    """A sphere, the asperities on which it is pressed, and the material of both.
 
     sphere_radius : R [length]; inf of a flat base, a pair (Rx, Ry) of an ellipsoid whose axes are
                     those of x and y, of which one is inf for a cylinder
@@ -76,7 +76,7 @@ class Scene(Record):
 
     @property
     def mean_radius(self) -> float:
-        """[length] of the sphere that curves as the base does, on average; inf where it is flat."""
+        """[length] radius of the sphere with the mean curvature of the base; inf if it is flat."""
         R = self.sphere_radius
         return 1.0 / self.curvature if isinstance(R, tuple) else R
 
@@ -127,7 +127,7 @@ class Scene(Record):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """What the contact points lie on, if that is the lattice of the summits, shrunk or not."""
+        """The lattice of the contact points, if it is that of the summits, scaled; or None."""
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice
@@ -145,7 +145,7 @@ class Scene(Record):
 
     @property
     def drops(self) -> Array:
-        """(n,) [length] how much further away the base is than on the axis.
+        """(n,) [length] drop of the base below its height on the axis.
 
         r_i^2 / (2 R), or in the "closest" geometry r_i^2 / (2 (R + rho_i)); x and y with a radius
         each where the base has two.

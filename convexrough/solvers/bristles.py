@@ -66,7 +66,7 @@ SMALLEST_BOX = 1e-6
 class BristleQP:
     """Settings of the bristle program: OSQP (1.0 or newer) with polishing.
 
-    bristles    : m, over half the contact width of each asperity; the loads are off by about
+    bristles    : m, over half the contact width of each asperity; the error of the loads is about
         0.4 / m^2 of the largest load
     newton_step : end with one Newton step, which squares the error and costs little
     tolerance   : OSQP's, absolute and relative, in the problem's units; polishing then solves the

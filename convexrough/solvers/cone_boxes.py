@@ -71,7 +71,7 @@ class TooDenseError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
-    """Who is in a lifted program, in which boxes, tied by which cones.
+    """Which asperities are in a lifted program, in which boxes, tied by which cones.
 
     members : (m,) candidates in the program
     loads   : (m,) B_i, the loads at t = 1

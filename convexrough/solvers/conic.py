@@ -24,7 +24,7 @@ from convexrough.solvers.programs import Answer, ConeProgram, RawAnswer, Reducti
 SUPERNODAL = 300
 
 #: Words of Clarabel after which there is a point to judge. At tight tolerances it often stops a
-#: little short of them, at a point that is right: the contact law decides, not the word.
+#: little short of them, at a point that is right: the contact law decides, not the status.
 STOPPED = ("Solved", "AlmostSolved")
 
 

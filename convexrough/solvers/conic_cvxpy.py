@@ -40,6 +40,20 @@ OPTIONS = {
 }
 
 
+#: What `pip` knows those by that have second-order cones.
+PACKAGES = {
+    "CLARABEL": "clarabel",
+    "ECOS": "ecos",
+    "QOCO": "qoco",
+    "SCS": "scs",
+    "CVXOPT": "cvxopt",
+    "MOSEK": "Mosek",
+    "GUROBI": "gurobipy",
+    "COPT": "coptpy",
+    "CPLEX": "cplex",
+}
+
+
 @dataclass(frozen=True)
 class ConicCVXPY(ConeSolver):
     """Settings of the cone program in CVXPY, with any of its solvers for second-order cones.
@@ -85,10 +99,7 @@ class ConicCVXPY(ConeSolver):
                 warnings.filterwarnings("ignore", message="Solution may be inaccurate")
                 program.solve(solver=self.solver, **options)
         except cp.error.SolverError as error:
-            what, installed = str(error), cp.installed_solvers()
-            if self.solver not in installed:
-                what = f"{self.solver} is not installed; CVXPY finds {', '.join(installed)}"
-                advice = f"pip install {self.solver.lower()}, or choose one of these"
+            what, advice = _missing(cp, self.solver) or (str(error), advice)
             raise SolverError(what, solver=self.name, advice=advice) from error
         if program.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
             what = f"{self.solver.lower()} stopped with {program.status}"
@@ -96,7 +107,32 @@ class ConicCVXPY(ConeSolver):
         return program
 
 
-@dataclass(frozen=True, eq=False)
+def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
+    """Why CVXPY cannot run the program with a solver of this name, and what to do; None if it can.
+
+    Packages are named only where the solver's name is right.
+    """
+    from cvxpy.reductions.solvers import defines  # which solver knows which cones
+
+    conic = defines.SOLVER_MAP_CONIC
+    able = [name for name in conic if cp.SOC in conic[name].SUPPORTED_CONSTRAINTS]
+    installed = [name for name in cp.installed_solvers() if name in able]
+    if solver in installed:
+        return None
+    choice = f"choose one of {', '.join(installed)}"
+    if solver in able:
+        package = PACKAGES.get(solver)
+        get = f"pip install {package}" if package else "install it as its documentation says"
+        return (
+            f"{solver} is not installed; CVXPY finds {', '.join(installed)}",
+            f"{get}, or {choice}",
+        )
+    if solver in conic or solver in defines.SOLVER_MAP_QP:
+        return f"{solver} has no second-order cones", f"{choice}, or solvers.BristleQP()"
+    return f"CVXPY knows no solver {solver}", checks.nearest(solver, installed)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class LiftedModel(Reduction[Any, Any, Answer]):
     """A compiled program: CVXPY objects, in the problem's own units.
 
@@ -115,6 +151,12 @@ class LiftedModel(Reduction[Any, Any, Answer]):
     p: Any
     link: Any
     total: Any
+
+    def __repr__(self) -> str:
+        size = self.program.size_metrics
+        asperities = f"{len(self.boxes.members):,} asperities"
+        sides = f"{size.num_scalar_variables:,} variables, {size.num_scalar_eq_constr:,} equations"
+        return f"LiftedModel: {asperities}, {sides}; `program` is the cvxpy.Problem"
 
     @classmethod
     def accept(cls, settings: ConicCVXPY, normal: NormalProblem, boxes: Boxes) -> LiftedModel:

@@ -37,7 +37,7 @@ ALL_ITERATED = 1000
 ACCURATE = 1e-12
 
 #: Near the contact: with a gap of at most this part of the largest prescribed approach. Heuristic,
-#: as who is left out is looked at in the end.
+#: as the asperities left out are checked in the end.
 MARGIN = 0.03
 
 
@@ -64,10 +64,11 @@ class Newton:
         announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates, from any start that is not negative (own units)."""
-        indentation = on_constraint(problem, _start(problem, start))
+        indentation = _start(problem, start)
         highest = float(np.maximum(problem.ceiling + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
         if len(problem) > ALL_ITERATED and start is None:
+            indentation = on_constraint(problem, indentation)
             near = np.flatnonzero(indentation > -MARGIN * highest)
         iterations = 0
         while True:

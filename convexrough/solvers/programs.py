@@ -1,8 +1,8 @@
-"""Programs in standard form: how a problem becomes one, who solves it, and the way back.
+"""Programs in standard form: how a problem becomes one, is solved, and is converted back.
 
-Clarabel, OSQP and what CVXPY knows know no contact. They are reached by a `Reduction`, as those of
-cvxpy (Agrawal, Verschueren, Diamond and Boyd, J. Control Decis. 5 (2018) 42), and run by a few
-lines each: data in, raw answer out. docs/how-to/add-a-solver.md adds another.
+A `Reduction` converts the contact problem to a program, as in cvxpy (Agrawal, Verschueren, Diamond
+and Boyd, J. Control Decis. 5 (2018) 42). A few lines per library run Clarabel, OSQP and the solvers
+of CVXPY: data in, raw answer out. docs/how-to/solvers.md adds another.
 """
 
 from __future__ import annotations
@@ -62,6 +62,38 @@ class ConeProgram(NamedTuple):
     def cones(self) -> int:
         return (len(self.constant) - self.equalities) // 3
 
+    def dual(self) -> ConeProgram:
+        """The dual in the same form: minimise (1/2) v'P v + b'z,  P v + A'z = -q,  z in the cones.
+
+        v has the variables that are in P, and comes before z. Entries of z at equalities are free;
+        second-order cones are their own duals. At any feasible point the objective times -1 is a
+        lower bound on that of the program, and the least one is equal to it; the multipliers of the
+        equations are then those x, times -1.
+        """
+        from scipy import sparse  # 0.1 s to import: only when it is asked for
+
+        upper = self.quadratic
+        used = np.flatnonzero(upper.diagonal())
+        whole = (upper + sparse.triu(upper, 1).T)[:, used]
+        rows = len(self.constant)
+        in_cones = sparse.eye_array(rows, format="csr")[self.equalities :]
+        nothing = sparse.csr_array((rows - self.equalities, len(used)))
+        quadratic = sparse.block_diag((upper[used][:, used], sparse.csc_array((rows, rows))))
+        stationary = sparse.hstack((whole, self.constraints.T))
+        return ConeProgram(
+            quadratic=sparse.csc_matrix(quadratic),
+            linear=np.concatenate((np.zeros(len(used)), self.constant)),
+            constraints=sparse.csc_matrix(
+                sparse.vstack((stationary, sparse.hstack((nothing, -in_cones))))
+            ),
+            constant=np.concatenate((-self.linear, np.zeros(rows - self.equalities))),
+            equalities=len(self.linear),
+        )
+
+    def __repr__(self) -> str:
+        sides = f"{self.equalities:,} equations, {self.cones:,} second-order cones"
+        return f"ConeProgram: {len(self.linear):,} variables, {sides}"
+
 
 class QuadraticProgram(NamedTuple):
     """minimise (1/2) x'P x + q'x,  lower <= A x <= upper."""
@@ -71,6 +103,10 @@ class QuadraticProgram(NamedTuple):
     constraints: csc_matrix  # A
     lower: Array
     upper: Array
+
+    def __repr__(self) -> str:
+        size = f"{len(self.linear):,} variables, {len(self.lower):,} rows"
+        return f"QuadraticProgram: {size}"
 
 
 class RawAnswer(NamedTuple):

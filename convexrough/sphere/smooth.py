@@ -1,4 +1,4 @@
-"""`smooth`: the equivalent smooth sphere, whose closed forms anchor every result of a rough one.
+"""`smooth`: closed forms of the equivalent smooth sphere, for comparison with a rough contact.
 
 The sphere of a scene on the same material without asperities, under the same load: Hertz's contact,
 and Cattaneo, Mindlin and Deresiewicz's under shear. With t = Q / (f P), P the load, f the friction,
@@ -44,7 +44,7 @@ def smooth(scene: Scene, *, load: float) -> SmoothSphere:
 
 
 def smooth_reference(scene: Scene, load: float) -> SmoothSphere | None:
-    """`smooth`, or None where there is none."""
+    """`smooth`, or None for bases without a smooth reference."""
     if isinstance(scene.sphere_radius, tuple):
         return None if math.inf in scene.sphere_radius else SmoothEllipsoid(scene, load)
     return SmoothSphere(scene, load) if scene.curved else None

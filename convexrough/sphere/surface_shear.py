@@ -48,7 +48,7 @@ def surface_displacement(
 
     share : t, from -1 to 1;  peak : f p0 [force / length^2];  shear_modulus : G
 
-    Of q0 sqrt(1 - r^2/a^2), by Johnson 3.91 ([A3] of the source paper, mended, for both bodies),
+    Of q0 sqrt(1 - r^2/a^2), by Johnson 3.91 ([A3] of the source paper, corrected, for both bodies),
 
         (q0/(4 G a)) {(2 - nu) [pi (a^2 - b^2) + r^2 (sin(2 phi)/2 - phi cos(2 phi))]
                       + (nu/2) (x^2 - y^2) [phi - sin(4 phi)/4]},   sin(phi) = b/r,  b = min(a, r),

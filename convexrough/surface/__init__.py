@@ -1,5 +1,6 @@
 """From a measured surface to asperities: read, detrend, find summits, hold them against theory."""
 
+from convexrough.surface.boundary_elements import Whole, press_whole
 from convexrough.surface.moments import Moments
 from convexrough.surface.provability import Provability, crowded, model_errors, provability
 from convexrough.surface.reading import read
@@ -13,8 +14,10 @@ __all__ = [
     "Provability",
     "Summits",
     "Surface",
+    "Whole",
     "crowded",
     "model_errors",
+    "press_whole",
     "provability",
     "read",
     "self_affine",

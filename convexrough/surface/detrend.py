@@ -1,4 +1,4 @@
-"""What is no roughness: the plane or the sphere that fits a map best."""
+"""The form to remove before finding summits: the plane or the sphere that fits a map best."""
 
 from __future__ import annotations
 

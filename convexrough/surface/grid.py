@@ -21,7 +21,7 @@ HEIGHTS = ("z", "h")
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
 _LENGTH = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(\S*)")
 
-#: Parts of a pixel by which coordinates may be off.
+#: Largest error of a coordinate, in pixels.
 OFF_GRID = 0.05
 
 
@@ -40,7 +40,8 @@ def read_grid(path: Path) -> Grid:
     Three columns are x, y and height, as no map is three pixels wide. A comment above a matrix may
     say its width and height with their unit, and the unit of the values.
 
-    Raises FileError for what is no text, and InputError with row and column for what is no map.
+    Raises FileError where the file is not text, and InputError with row and column where the
+    numbers are not a map.
     """
     comments: list[str] = []
     body: list[tuple[int, str]] = []

@@ -73,7 +73,7 @@ class Provability(Table, Drawn):
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """(m,) every word is proved, no contact discs overlap, and the model error is below 5 %."""
+        """(m,) all statuses are proved, no discs overlap, and the model error is below 5 %."""
         proved = np.isin(self.scope, ("global", "local")) & (self.undecided == 0)
         return frozen(proved & (self.crowding <= OVERLAP) & (self.model_error <= TOO_FAR))
 
@@ -105,6 +105,7 @@ def provability(
     >>> cr.surface.provability(summits, press).trusted_from
     0.0
     """
+    checks.instance("summits", summits, Summits)
     rows = []
     for prune in sorted({checks.between("levels", each, 0.0, 1.0) for each in levels}):
         if not (summits.prominences >= prune * summits.origin.max_height).any():
@@ -128,6 +129,7 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
     """
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
+    checks.instance("contact", contact, Contact)
     touching = np.flatnonzero(contact.contact_radii)
     points, radii = contact.scene.contact_points[touching], contact.contact_radii[touching]
     if len(touching) < 2:
@@ -149,6 +151,7 @@ def model_errors(contact: Contact) -> Array:
     >>> print(f"{cr.surface.model_errors(contact).max() / contact.model_error:.6g}")
     1
     """
+    checks.instance("contact", contact, Contact)
     scene, errors = contact.scene, np.zeros(len(contact.loads))
     touching = np.flatnonzero(contact.loads)
     points = scene.contact_points[touching]

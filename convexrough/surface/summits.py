@@ -67,7 +67,7 @@ class Origin(Record):
 
 
 class Statistics(NamedTuple):
-    """Of summits, in the words of `Moments`."""
+    """Of summits, with the names of `Moments`."""
 
     density: float
     mean_curvature: float
@@ -153,7 +153,7 @@ class Summits(Table, Asperities, Drawn):
 
     @property
     def statistics(self) -> Statistics:
-        """Density, curvature and heights, to hold against `origin.moments`."""
+        """Density, curvature and heights, to compare with `origin.moments`."""
         return Statistics(
             density=len(self) / self.origin.area,
             mean_curvature=float(np.mean(self.largest_curvatures + self.smallest_curvatures) / 2),

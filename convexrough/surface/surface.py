@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,6 +23,9 @@ from convexrough.tabular.units import known_unit
 #: Pixels longer than wide by more than this show no summits: eight neighbours are none.
 MOST_ASPECT = 10.0
 
+#: A trend that explains more of the variance is named; and pixels along a side that are looked at.
+MOST, FITTED = 0.5, 256
+
 #: Part of the largest height that rounding may leave of a map that was all trend.
 ROUNDING = 64 * np.finfo(float).eps
 
@@ -32,7 +36,7 @@ class Surface(Record, Drawn):
 
     heights : (ny, nx) [length] x grows with the column, y with the row; taller is positive
     pixel   : (dx, dy) [length]; one number for squares
-    unit    : of all lengths, "" where nobody said
+    unit    : of all lengths, "" if unknown
     removed : what was taken from the heights, in this order
     filled  : how many pixels were holes
     source  : the file, or what made it
@@ -98,10 +102,42 @@ class Surface(Record, Drawn):
         """Every maximum, and its prominence: what any pruning begins with."""
         return hills(self.heights)
 
-    def detrend(self, kind: Trend = "plane") -> Surface:
-        """Without the best plane, or the best sphere: the sphere of a scene is no roughness.
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """A plane or sphere that explains most of the variance of the heights, and its remedy.
 
-        What is taken away is the last of `removed`. Raises InputError where nothing is left.
+        Fitted to at most 256 by 256 of the pixels.
+
+        >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
+        >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3
+        >>> print(cr.surface.Surface(rough, pixel=1.0).warnings[0].partition(",")[0])
+        a sphere of radius 49.9828
+        """
+        every = -(-max(self.heights.shape) // FITTED)
+        few = self.heights[::every, ::every]
+        pixel = (self.pixel[0] * every, self.pixel[1] * every)
+        left, found = float(np.var(few)), ""
+        for kind in TRENDS if min(few.shape) >= 3 else ():
+            try:
+                trend, there = fitted(few, pixel, kind)
+            except InputError:  # no sphere spans the map
+                continue
+            if (least := float(np.var(few - there))) < (1.0 - MOST) * left:
+                name = f"a {trend!r}".partition(" in the")[0]
+                part = f"{100 * (1.0 - least / np.var(few)):.3g} %"
+                found = f"{name}, explains {part} of the variance of the heights: "
+                found += f'detrend="{kind}", or --detrend {kind}, removes it'
+            left = least
+        return (found,) if found else ()
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield from super()._rows()
+        yield from (("warning", each) for each in self.warnings)
+
+    def detrend(self, kind: Trend = "plane") -> Surface:
+        """The surface without the plane or the sphere that fits it best.
+
+        The last entry of `removed` is that form. Raises InputError where nothing is left.
 
         >>> ball = cr.surface.Surface(-np.hypot(*np.mgrid[-8:9, -8:9]) ** 2 / 200, pixel=1.0)
         >>> print(ball.detrend("plane").detrend("sphere").removed[1].kind)

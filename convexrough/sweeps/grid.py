@@ -105,16 +105,12 @@ class Grid:
             found |= {draw.key: draw.value(seed) for draw in self.draws}
         return Point({key: found[key] for key in self.keys}, seed)
 
-    def tables_at(self, number: int) -> dict[str, dict[str, Any]]:
-        """The tables of the scene file of scene `number`."""
-        return self.with_values(*self.point(number))
-
     def with_values(self, values: Mapping[str, Any], seed: int | None) -> dict[str, dict[str, Any]]:
         """The tables of a scene file with these values and this seed."""
-        tables = {name: dict(table) for name, table in self.tables.items()}
+        tables = {name: {**table} for name, table in self.tables.items()}
         for key, value in values.items():
             table, _, name = key.partition(".")
             tables.setdefault(table, {})[name] = value
         if seed is not None and tables.get("asperities", {}).get("pattern") != "file":
-            tables["asperities"]["seed"] = seed
+            tables.setdefault("asperities", {})["seed"] = seed
         return tables

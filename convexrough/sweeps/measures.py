@@ -1,182 +1,117 @@
-"""What a sweep can measure of a contact: the columns of its table, and their values."""
+"""What a sweep can measure: every number of the summary of a run, by its name or the end of it.
+
+`cycle.loss` is the loss of each cycle; so is `loss`, if no stage before has one. Columns are named
+by the measure and the row of the summary: `loss_0.37` is that of the cycle between +-0.37 f P,
+`history.loss_2` that of the third force of a history.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Container, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from convexrough import checks
-from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.friction.cycle import Cycle, cycles
+from convexrough.errors import InputError
 from convexrough.friction.onset import onset_of_sliding
-from convexrough.friction.shear import ShearState, shear
+from convexrough.run.stage import Stage, limit, unit_of
+from convexrough.tabular.units import UnitNames
 
-#: Quantiles of the onset of sliding over the loaded asperities.
-QUANTILES = (0.0, 0.25, 0.5, 0.75, 1.0)
+Stages = Mapping[str, Stage]
 
+#: Every number, by its name and row.
+Numbers = dict[tuple[str, str], float]
 
-@dataclass(frozen=True)
-class Stages:
-    """The shear stages of every scene, as fractions of f P.
+#: Quantiles, over the loaded asperities, of the force at which they start to slide, over f P.
+ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
-    cycle : minimum and maximum of each steady cycle;  shear : on first loading
-    """
-
-    cycle: tuple[tuple[float, float], ...] = ()
-    shear: tuple[float, ...] = ()
-
-    def named(self, stage: str) -> list[str]:
-        """What each column of a stage ends in: the amplitude of a cycle, the fraction of a force.
-
-        A cycle that is not symmetric is named by its minimum and its maximum.
-        """
-        if stage == "shear":
-            return [f"{fraction!r}" for fraction in self.shear]
-        return [f"{high!r}" if low == -high else f"{low!r}_{high!r}" for low, high in self.cycle]
+#: Keys of a scene file that are lengths.
+LENGTHS = ("radius", "spacing", "tip_radius", "within", "height_std")
 
 
-class Sheared:
-    """A contact, and its shear stages as far as they are asked for."""
+class Column(NamedTuple):
+    """A column of a table, the number of a summary in it, and the row of that."""
 
-    def __init__(self, contact: Contact, stages: Stages) -> None:
-        self.contact, self.stages = contact, stages
+    name: str
+    number: str
+    row: str
 
     @property
-    def limit(self) -> float:
-        """f P [force]."""
-        return checks.friction(self.contact.scene.friction) * self.contact.load
-
-    @cached_property
-    def cycles(self) -> list[Cycle]:
-        low, high = self.limit * np.array(self.stages.cycle).T
-        return cycles(self.contact, high, low)
-
-    @cached_property
-    def states(self) -> list[ShearState]:
-        return [shear(self.contact, force=part * self.limit) for part in self.stages.shear]
-
-    @property
-    def onsets(self) -> Array:
-        """(n,) of the loaded asperities, as fractions of f P."""
-        loaded = np.flatnonzero(self.contact.loads)
-        return onset_of_sliding(self.contact, which=loaded) / (self.limit or 1.0)
-
-    def undecided(self) -> int:
-        """How many words are not proved, in all that was asked for."""
-        made = [self.contact, *vars(self).get("cycles", ()), *vars(self).get("states", ())]
-        return sum(int((each.status == "undecided").sum()) for each in made)
+    def stage(self) -> str:
+        return self.number.partition(".")[0]
 
 
-def _counts(it: Sheared) -> Iterator[float]:
-    for word in ("contact", "open", "undecided"):
-        yield float((it.contact.status == word).sum())
+def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> tuple[Numbers, str]:
+    """Every number of the stages that are wanted, and why they are not certified, "" if they are.
 
-
-def _certificate(it: Sheared) -> Iterator[float]:
-    judged = it.contact.certificate
-    yield from (judged.load_error, judged.convexity_number)
-    yield from (it.contact.model_error, it.contact.crowding)
-
-
-def _onset_quantiles(it: Sheared) -> list[float]:
-    onsets = it.onsets
-    if len(onsets) == 0:
-        return [np.nan] * len(QUANTILES)
-    return [float(each) for each in np.quantile(onsets, QUANTILES)]
-
-
-@dataclass(frozen=True)
-class Measure:
-    """What is measured under one name.
-
-    values : one for each column; suffixes name them;  stage : the table that it needs, or ""
-    units  : "force", "length", "work" or "stiffness" of all columns, or of each; "" of a number
+    Whether the contact is certified is always asked.
     """
-
-    values: Callable[[Sheared], Iterator[float] | Sequence[float]]
-    stage: str = ""
-    suffixes: tuple[str, ...] = ()
-    units: str | tuple[str, ...] = ""
-
-    def columns(self, name: str, stages: Stages) -> list[str]:
-        if self.stage in ("cycle", "shear"):
-            return [f"{name}_{each}" for each in stages.named(self.stage)]
-        return [f"{name}_{each}" for each in self.suffixes] or [name]
-
-
-def _of_cycles(value: Callable[[Cycle], float], units: str = "") -> Measure:
-    return Measure(lambda it: [value(each) for each in it.cycles], "cycle", units=units)
-
-
-#: By name. Energies, forces and lengths are in the scene's units.
-MEASURES = {
-    "contacts": Measure(lambda it: [float((it.contact.status == "contact").sum())]),
-    "words": Measure(_counts, suffixes=("contact", "open", "undecided")),
-    "load": Measure(lambda it: [it.contact.load], units="force"),
-    "approach": Measure(lambda it: [it.contact.approach], units="length"),
-    "certificate": Measure(
-        _certificate,
-        suffixes=("load_error", "convexity_number", "model_error", "crowding"),
-        units=("force", "", "", ""),
-    ),
-    "displacement": Measure(
-        lambda it: [state.displacement for state in it.states], "shear", units="length"
-    ),
-    "onset": Measure(_onset_quantiles, "friction", tuple(f"{part:g}" for part in QUANTILES)),
-    "loss": _of_cycles(lambda cycle: cycle.loss, "work"),
-    "loss_normalised": _of_cycles(lambda cycle: cycle.loss_normalised),
-    "loss_over_smooth": _of_cycles(
-        lambda cycle: cycle.loss_normalised / (cycle.smooth_normalised or np.nan)
-    ),
-    "loss_factor": _of_cycles(lambda cycle: cycle.loss_factor),
-    "stiffness": _of_cycles(lambda cycle: cycle.secant_stiffness, "stiffness"),
-}
+    found: Numbers = {}
+    doubts: list[str] = []
+    for name, stage in stages.items():
+        if name in wanted or name == "normal":
+            result = stage.compute(contact)
+            found |= dict(_numbers(result.summary(), name, "", stage.labels))
+            doubts += result.doubts()
+    if ONSET in wanted:
+        which = np.flatnonzero(contact.loads)
+        onsets = onset_of_sliding(contact, which=which) / (limit(contact) or 1.0)
+        at = np.quantile(onsets, QUANTILES) if len(which) else np.full(len(QUANTILES), np.nan)
+        found |= {(ONSET, f"{q:g}"): float(it) for q, it in zip(QUANTILES, at, strict=True)}
+    return found, "; ".join(doubts)
 
 
-def columns(measures: Sequence[str], stages: Stages) -> list[str]:
-    """The names of the measured columns, in the order of the measures."""
-    return [each for name in measures for each in MEASURES[name].columns(name, stages)]
+def _numbers(
+    value: Any, name: str, row: str, labels: Sequence[str]
+) -> Iterator[tuple[tuple[str, str], float]]:
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from _numbers(each, f"{name}.{key}", row, labels)
+    elif isinstance(value, list):
+        for i, each in enumerate(value):
+            told = _label(each, labels) if isinstance(each, dict) and labels else str(i)
+            yield from _numbers(each, name, f"{row}_{told}" if row else told, labels)
+    elif isinstance(value, (int, float)):
+        yield (name, row), float(value)
 
 
-def said(column: str) -> str:
-    """What a measured column is, as a figure says it: "loss at Q/(fP) = 0.37"."""
-    own = [name for name in MEASURES if column == name or column.startswith(f"{name}_")]
-    name = max(own, key=len, default=column)
-    words, suffix = name.replace("_", " "), column.removeprefix(name).strip("_")
-    if not own or not suffix:
-        return words
-    if name == "onset":
-        return f"onset of sliding, Q/(fP), quantile {suffix}"
-    if MEASURES[name].stage not in ("cycle", "shear"):
-        return suffix.replace("_", " ")
-    low, _, high = suffix.rpartition("_")
-    return f"{words} at Q/(fP) = {high}" if not low else f"{words}, Q/(fP) from {low} to {high}"
+def _label(row: Mapping[str, Any], labels: Sequence[str]) -> str:
+    """What tells a row apart: a force; or the ends of a cycle, the maximum alone if symmetric."""
+    last, *first = (row[label] for label in labels)
+    return "_".join(f"{it!r}" for it in (*(it for it in first if it != -last), last))
 
 
-def units(measures: Sequence[str], stages: Stages, length: str, force: str) -> dict[str, str]:
-    """What each measured column is in, where the names of both units are known."""
-    if not (length and force):
-        return {}
-    names = {"": "", "length": length, "force": force}
-    names |= {"work": f"{force} {length}", "stiffness": f"{force}/{length}"}
-    found: dict[str, str] = {}
+def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
+    """The columns of each measure: the first number of that name. Raises InputError.
+
+    No stage is computed beyond the one in which the last of them is found.
+    """
+    rows: dict[str, list[str]] = {}
+
+    def number(name: str) -> str:
+        return next((each for each in rows if f".{each}".endswith(f".{name}")), "")
+
+    for stage in (*stages, *((ONSET,) if ONSET in measures else ())):
+        if not all(map(number, measures)):
+            new = measured(contact, {stage: stages[stage]} if stage in stages else {}, {stage})[0]
+            for each, row in new:
+                rows.setdefault(each, []).append(row)
+    columns = []
     for name in measures:
-        own = MEASURES[name].columns(name, stages)
-        kinds = MEASURES[name].units
-        each = [kinds] * len(own) if isinstance(kinds, str) else kinds
-        found |= {column: names[kind] for column, kind in zip(own, each, strict=True) if kind}
-    return found
+        if not number(name):
+            names = sorted({each.rpartition(".")[2] for each in rows} | {ONSET})
+            expected = f"a number of the stages of this file: {checks.nearest(name, names)}"
+            raise InputError("[sweep] measure", found=f'"{name}"', expected=expected)
+        known = number(name)
+        columns += [Column(f"{name}_{row}" if row else name, known, row) for row in rows[known]]
+    return tuple(columns)
 
 
-def measure(contact: Contact, measures: Sequence[str], stages: Stages) -> tuple[list[float], str]:
-    """A value for each of `columns`, and what is not proved, "" if all is."""
-    it = Sheared(contact, stages)
-    values = [float(each) for name in measures for each in MEASURES[name].values(it)]
-    if contact.certificate.scope == "none":
-        return values, "no certificate"
-    unsure = it.undecided()
-    return values, f"{unsure} undecided" if unsure else ""
+def unit(name: str, units: UnitNames) -> str:
+    """What a number of a summary, or a key of a file, is in; "" where that has no name."""
+    end = name.rpartition(".")[2]
+    if name.startswith("gradient."):
+        return ""
+    return units.length if end in LENGTHS else unit_of(end, units)

@@ -4,33 +4,35 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.errors import InputError, MistakesError
-from convexrough.progress import Announce
+from convexrough.errors import FileError, InputError, MistakesError
+from convexrough.progress import tell
+from convexrough.run.stage import Stage
 from convexrough.scene.scene import Scene
-from convexrough.sweeps.engines import Given, processes
+from convexrough.sweeps.batch import Columns, table
+from convexrough.sweeps.folder import Folder, make_folder
 from convexrough.sweeps.measures import Stages
-from convexrough.sweeps.running import run
-from convexrough.sweeps.sources import Objects
-from convexrough.sweeps.sweep_file import (
-    Plan,
-    identified,
-    mistakes_of_measures,
-    plan_of,
-    read_sweep,
-)
-from convexrough.sweeps.sweep_schema import of_measures
+from convexrough.sweeps.plan import Plan, planned
+from convexrough.sweeps.pool import Processes, computed
+from convexrough.sweeps.scenes import Objects
 from convexrough.sweeps.table import SweepTable
+from convexrough.tabular.units import UnitNames
 
 #: A file, its contents, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
+
+#: Scenes that one call computes at most; of a larger sweep a part may be asked for.
+MOST = 10**8
 
 
 def sweep(
@@ -41,35 +43,34 @@ def sweep(
     executor: Executor | None = None,
     workers: int | None = None,
     resume: bool = False,
+    overwrite: bool = False,
     part: tuple[int, int] | None = None,
     approach: ArrayLike | None = None,
     load: ArrayLike | None = None,
     cycle: Sequence[float] = (),
     shear: Sequence[float] = (),
-    announce: Announce | None = None,
 ) -> SweepTable:
     """Measure many scenes.
 
     what     : a sweep file; or the tables of one, as a mapping; or scenes, with `approach` [length]
         or `load` [force], one for all or one for each, and the amplitudes of `cycle` and forces of
         `shear` as fractions of f P
-    measure  : what to measure, by name; of a file, instead of what it says
+    measure  : numbers of a run's summary, by name or its end; of a file, instead of what it says
     out      : folder for the results; default: they are returned only
     executor : who computes, any executor of `concurrent.futures`; default: processes
     workers  : how many processes; default: as many as there are processors
-    resume   : go on with what is in the folder
+    resume   : go on with what is in the folder;  overwrite : or compute it again
     part     : (k, n), the k-th of n parts of the sweep, from 1
-    announce : told in a line how far the work has come
 
     The table is the same, bit for bit, whoever computes it in whatever order and in how many
     sittings. A scene that fails has a row that says why.
 
     Raises FileError and InputError for what is wrong before anything is computed, and WorkerError
-    where nobody is left to compute.
+    where a worker died with some scenes, twice, or nobody is left to compute.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
-    >>> table = cr.sweep(scenes, approach=5e-5, measure=["contacts", "load"], workers=1)
-    >>> print(table.read()["contacts"])
+    >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)
+    >>> print(table.read()["contact"])
     [37. 37. 43.]
     """
     given = {"approach": approach, "load": load, "cycle": cycle or None, "shear": shear or None}
@@ -77,32 +78,130 @@ def sweep(
         for name, value in given.items():
             if value is not None:
                 raise InputError(name, found="given", expected="in the tables of the sweep")
-        plan = _of_tables(what, measure)
+        from convexrough.sweeps.file import plan_of, read_sweep  # it loads pydantic
+
+        if isinstance(what, Mapping):
+            plan = plan_of(what, Path("sweep"), measure)
+        else:
+            plan = read_sweep(what, measure)
     else:
         plan = _of_scenes(what, measure, approach, load, _stages(cycle, shear))
-    asked: Any = dict(out=out, resume=resume, part=part, announce=announce)
+    asked: Any = dict(out=out, resume=resume, overwrite=overwrite, part=part)
     if executor is not None:
         checks.instance("executor", executor, Executor)
-        return run(plan, Given(executor), **asked).table
+        return run(plan, executor, **asked).table
     if workers is not None and workers < 1:
         raise InputError("workers", found=workers, expected="at least one process")
-    with processes(workers) as engine:
-        return run(plan, engine, **asked).table
+    with Processes(workers) as mine:
+        return run(plan, mine, **asked).table
 
 
-def _of_tables(what: str | os.PathLike[str] | Mapping[str, Any], measure: Any) -> Plan:
-    if isinstance(what, Mapping):
-        return plan_of(what, Path("sweep"), measure)
-    return read_sweep(what, measure)
+@dataclass(frozen=True)
+class Done:
+    """A table, what was found before, and how many scenes were computed in how many seconds."""
+
+    table: SweepTable
+    found: str
+    computed: int
+    seconds: float
+
+
+def run(
+    plan: Plan,
+    executor: Executor,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    part: tuple[int, int] | None = None,
+) -> Done:
+    """`sweep` of a plan; its arguments are as there."""
+    began, folder, found = time.monotonic(), None, ""
+    todo = _share(plan, part)
+    if out is not None:
+        folder = make_folder(Path(out), plan.manifest(), overwrite=overwrite)
+        todo, found = _missing(folder, todo, resume)
+        tell(found)
+    count = sum(map(len, todo))
+    held = [table(plan.batch(range(0)), [])]  # no rows, all columns
+    for columns in _told(computed(map(plan.batch, todo), executor), count):
+        if folder is None:
+            held.append(columns)
+        else:
+            folder.write(columns)
+    seconds = time.monotonic() - began
+    if folder is not None:
+        return Done(SweepTable(folder.manifest, folder), found, count, seconds)
+    joined = {name: np.concatenate([each[name] for each in held]) for name in held[0]}
+    order = np.argsort(joined["scene"])
+    rows = {name: values[order] for name, values in joined.items()}
+    return Done(SweepTable(plan.manifest(), None, rows), found, count, seconds)
+
+
+def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
+    """The k-th of n shares of the parts, or all."""
+    k, n = part or (1, 1)
+    if not 1 <= k <= n:
+        raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
+    first, stop = plan.parts * (k - 1) // n, plan.parts * k // n
+    if (count := (stop - first) * plan.size) > MOST:
+        expected = f"at most {MOST:,} at once; a part of the sweep (K/N) may be that small"
+        where = str(plan.said["source"])
+        raise InputError("scenes", found=f"about {count:,}", expected=expected, where=where)
+    return [plan.part(number) for number in range(first, stop)]
+
+
+def _missing(folder: Folder, wanted: list[range], resume: bool) -> tuple[list[range], str]:
+    """The parts to compute, and what was found; FileError where that is not to be gone on with."""
+    known = {part.start for part in folder.parts()}
+    there = sum(len(part) for part in wanted if part.start in known)
+    if there and not resume:
+        raise FileError(
+            f"{folder.path}: holds {there:,} of these {sum(map(len, wanted)):,} scenes already; "
+            f"--resume computes the rest, --force overwrites them, --out takes another folder"
+        )
+    return folder.missing(wanted)
+
+
+def _told(found: Iterator[Columns], count: int) -> Iterator[Columns]:
+    """The rows themselves; how far they have come is told on the way."""
+    began, done, failed = time.monotonic(), 0, 0
+    for columns in found:
+        yield columns
+        done += len(columns["status"])
+        failed += int(np.count_nonzero(columns["status"] == "failed"))
+        rate = done / max(time.monotonic() - began, 1e-9)
+        said = f"{done:,} of {count:,} scenes, {rate:,.3g} a second, "
+        said += f"{duration((count - done) / rate)} left"
+        tell(said + (f", {failed:,} failed" if failed else ""))
+
+
+def duration(seconds: float) -> str:
+    """In the unit that suits."""
+    for size, unit in ((365.25 * 86400, "years"), (86400, "days"), (3600, "h"), (60, "min")):
+        if seconds >= 2 * size:
+            return f"{seconds / size:,.0f} {unit}"
+    return f"{seconds:.0f} s"
 
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
-    amplitudes = checks.array("cycle", cycle, sign="positive").tolist()
-    forces = checks.array("shear", shear, sign="not negative").tolist()
-    for name, values in (("cycle", amplitudes), ("shear", forces)):
-        for i, value in enumerate(values):
-            checks.between(f"{name}[{i}]", value, 0.0, 1.0)
-    return Stages(tuple((-value, value) for value in amplitudes), tuple(forces))
+    """Of tables with these values."""
+    from convexrough.run.stages import Cycle, Normal, Shear
+    from convexrough.run.study import validate_table
+
+    found: dict[str, Stage] = {"normal": Normal(approach=0.0)}
+    mistakes: list[str] = []
+    models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
+    models = ((Shear, "fractions", shear), (Cycle, "maximum", cycle))
+    for model, key, values in models:
+        if len(values):
+            table, wrong = validate_table(model.name, {key: [*map(float, values)]}, model)
+            mistakes += wrong
+            if table is not None:
+                found[model.name] = table
+    if mistakes:
+        raise MistakesError("sweep", mistakes)
+    return found
 
 
 def _of_scenes(
@@ -118,16 +217,12 @@ def _of_scenes(
     if not scenes:
         raise InputError("scenes", found="none", expected="at least one")
     checks.exactly_one("approach", approach, "load", load)
-    by_load = load is not None
-    name, given = ("load", load) if by_load else ("approach", approach)
-    assert given is not None  # exactly_one
-    controls = checks.array(name, given, length=len(scenes), one="scene")
-    names = tuple(measure or ())
-    tables = {"cycle": stages.cycle, "shear": stages.shear, "friction": True}
-    asked = {key for key, value in tables.items() if value}
-    mistakes = [*of_measures(names)] or [*mistakes_of_measures(names, stages, asked)]
-    if mistakes:
-        raise MistakesError("sweep", mistakes)
+    name, control = ("approach", approach) if load is None else ("load", load)
+    assert control is not None  # exactly_one
+    controls = checks.array(name, control, length=len(scenes), one="scene")
+    if not measure:
+        expected = 'a list of numbers of a summary, such as ["load"]'
+        raise InputError("measure", found=measure, expected=expected)
     content = hashlib.sha256()
     for scene in scenes:
         layout, material = scene.asperities, scene.material
@@ -135,11 +230,6 @@ def _of_scenes(
             content.update(values.tobytes())
         content.update(repr((scene.sphere_radius, material, scene.friction)).encode())
         content.update(f"{scene.geometry} {len(scene)}".encode())
-    identity = identified(
-        scenes=content.hexdigest(),
-        **{name: controls.tolist()},
-        measure=names,
-        stages=[stages.cycle, stages.shear],
-    )
-    source = Objects(scenes, controls, by_load)
-    return Plan(source, names, stages, identity, {"source": "scenes made in Python"})
+    given = {"scenes": content.hexdigest(), name: controls.tolist(), "stages": repr(stages)}
+    source = Objects(scenes, controls, load is not None, stages)
+    return planned(source, measure, {"source": "scenes made in Python"}, UnitNames(), **given)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,8 @@ import numpy as np
 from convexrough import checks, frames
 from convexrough.errors import ExtraError, InputError
 from convexrough.record import Record, in_words
-from convexrough.sweeps.batch import Columns, Rows
-from convexrough.sweeps.measures import said
-from convexrough.sweeps.parts import Folder, Part, length, missing, once, open_folder, read_part
+from convexrough.sweeps.batch import Columns
+from convexrough.sweeps.folder import Folder, open_folder
 
 if TYPE_CHECKING:
     import dask.dataframe
@@ -96,7 +96,7 @@ class SweepTable(Record):
         """How many rows there are."""
         if self.held is not None:
             return len(self.held["scene"])
-        return self.scenes - sum(map(length, missing(self._parts(), range(self.scenes))))
+        return sum(map(len, self._parts()))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
         """Some columns, default all, a part after the other: for what exceeds memory."""
@@ -104,8 +104,9 @@ class SweepTable(Record):
         if self.held is not None:
             yield {name: self.held[name] for name in names or self.columns}
             return
-        for part, numbers in once(self._parts()):
-            yield read_part(part, numbers, names)
+        assert self.folder is not None  # or it is held
+        for part in self._parts():
+            yield self.folder.read(part, names)
 
     def read(self, names: Sequence[str] | None = None) -> Columns:
         """Some columns, default all, as arrays.
@@ -149,12 +150,12 @@ class SweepTable(Record):
         except ImportError as error:
             raise ExtraError("dask") from error
         self._refuse_unknown(columns or ())
-        parts = list(once(self._parts())) if self.folder is not None else []
-        if not parts:
+        if self.folder is None or not len(self):
             raise InputError("table", found="no parts", expected="rows in a folder")
         names = self.columns if columns is None else list(columns)
-        first = _frame(parts[0], names)
-        return dask.dataframe.from_map(_frame, parts, names=names, meta=first.iloc[:0])
+        frame = partial(_frame, self.folder, names)
+        meta = frame(self._parts()[0]).iloc[:0]
+        return dask.dataframe.from_map(frame, self._parts(), meta=meta)
 
     def plot(
         self, measured: str | None = None, over: str | None = None, axes: Axes | None = None
@@ -179,17 +180,40 @@ class SweepTable(Record):
         label(axes, literal(self._said(over)), literal(self._said(measured)))
         return axes
 
+    def quantiles(
+        self, measured: Sequence[str] | None = None, at: Sequence[float] = USUAL
+    ) -> Columns:
+        """A row for each point of the grid and each quantity, from the rows that are there.
+
+        Columns: the swept keys that are not drawn; `quantity`; `scenes`, those computed, and
+        `failed` of them, which do not count; a column for each quantile, nan where all failed.
+        """
+        names = self.measured if measured is None else list(measured)
+        about = self.read([*self.points, "scene", "status"])
+        ends = np.flatnonzero(np.diff(about["scene"] // int(self.manifest["each"]))) + 1
+        points = np.split(np.arange(len(about["scene"])), ends) if len(about["scene"]) else []
+        good = about["status"] != "failed"
+        rows: list[tuple[Any, ...]] = []
+        for name in names:
+            values = self.read([name])[name]
+            for place, point in enumerate(points):
+                known = values[point][good[point] & ~np.isnan(values[point])]
+                found = np.quantile(known, at) if len(known) else np.full(len(at), np.nan)
+                keys = (about[key][point[0]] for key in self.points)
+                failed = np.count_nonzero(~good[point])
+                rows.append((place, *keys, name, len(point), failed, *found))
+        rows.sort(key=lambda row: row[0])
+        heads = (*self.points, "quantity", "scenes", "failed", *(f"{part:g}" for part in at))
+        return {head: np.array([row[i] for row in rows]) for i, head in enumerate(heads, 1)}
+
     def _said(self, name: str) -> str:
         """A column in words, with its unit."""
-        if name in self.swept:
-            table, _, key = name.rpartition(".")
-            words = (f"{table}: {key}" if table else key).replace("_", " ")
-        else:
-            words = said(name)
+        table, _, key = name.rpartition(".") if name in self.swept else ("", "", name)
+        words = (f"{table}: {key}" if table else key).replace("_", " ")
         unit = self.manifest["units"].get(name, "")
         return f"{words} ({unit})" if unit else words
 
-    def _parts(self) -> list[Part]:
+    def _parts(self) -> list[range]:
         assert self.folder is not None  # or it is held
         return self.folder.parts()
 
@@ -208,13 +232,6 @@ class SweepTable(Record):
         yield "folder", in_words("none" if self.folder is None else self.folder.path)
 
 
-def joined(rows: Iterable[Rows]) -> Columns:
-    """All rows in the order of their scenes."""
-    blocks = [each.columns for each in sorted(rows, key=lambda each: each.first)]
-    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-
-
-def _frame(slice_of_part: tuple[Part, range], names: Sequence[str]) -> pandas.DataFrame:
-    part, numbers = slice_of_part
-    columns = read_part(part, numbers, names)
+def _frame(folder: Folder, names: Sequence[str], part: range) -> pandas.DataFrame:
+    columns = folder.read(part, names)
     return frames.dataframe({name: (("row",), it) for name, it in columns.items()}, {})

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import csv
-import struct
-import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -23,12 +20,9 @@ Columns = dict[str, list[Any]]
 #: Endings of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
 
-#: What the readers of files raise besides OSError, in files that are not what they are named.
-SPOILED = (
-    *(ValueError, TypeError, EOFError, SyntaxError, KeyError, OverflowError, RuntimeError),
-    *(IndexError, AttributeError, NotImplementedError, MemoryError),
-    *(zipfile.BadZipFile, zlib.error, struct.error, csv.Error, TokenError),
-)
+#: What a file that is not what it is named makes our own readers raise besides OSError: what says
+#: so, text with open quotes, and packed text that ends early. Others raise what `foreign` turns.
+SPOILED = (ValueError, csv.Error, EOFError, zlib.error)
 
 
 @contextmanager
@@ -50,13 +44,18 @@ def reading(path: Path) -> Iterator[None]:
 
 @contextmanager
 def foreign() -> Iterator[None]:
-    """Whatever another package raises on a spoiled file, as a ValueError."""
+    """Any error that another package raises on a corrupted file, as a ValueError.
+
+    None of them says what it may raise: numpy, scipy, pyarrow and openpyxl have been seen to raise
+    SyntaxError, KeyError, TypeError, AttributeError, MemoryError, struct.error, TokenError and
+    BadZipFile on files cut short or with one byte changed. Nothing else may be done inside.
+    """
     try:
         yield
     except OSError:
         raise
     except Exception as error:
-        raise ValueError(str(error)) from error
+        raise ValueError(str(error) or type(error).__name__) from error
 
 
 def needed(path: Path, package: str) -> Any:
@@ -74,7 +73,7 @@ def named_arrays(path: Path) -> dict[str, Any]:
         return _matlab(path)
     if path.suffix.lower() == ".parquet":
         return _parquet(path)
-    with path.open("rb") as raw:
+    with path.open("rb") as raw, foreign():
         loaded = np.load(raw, allow_pickle=False)
         if isinstance(loaded, np.ndarray):
             return {"": loaded}

@@ -102,7 +102,7 @@ def one_unit(what: str, given: str | None, found: str) -> Unit | None:
 
 
 class UnitNames(NamedTuple):
-    """How a scene's units of length and force are called, "" where nobody says."""
+    """Names of a scene's units of length and force; "" if it names none."""
 
     length: str = ""
     force: str = ""

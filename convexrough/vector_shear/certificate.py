@@ -21,7 +21,7 @@ gradient of a convex function of eta. All other asperities together bear at most
 6. Words. i slides where |eta*_i| > k_i for sure, and does not where |eta*_i| < k_i or |q*_i| < P_i.
 
 The energy E is convex: E(q) - E(q*) <= sum e_i |q_i - q*_i| + X.(sum q - T) of any forces q.
-docs/theory/friction-proofs.md has the slopes of step 2, and what is left close to gross sliding.
+docs/theory/vector-friction.md has the slopes of step 2, and what is left close to gross sliding.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
 
     In a direction z the slope of q_i is at least radial + (across - radial) sin^2 of the angle
     between z and eta_i, at the longest eta_i. All together, by Minkowski's inequality, with sines
-    that are off by theta_i:  lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
+    with errors theta_i:  lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
     """
     known, size = problem.scalar, np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:
@@ -241,7 +241,7 @@ def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
 def _by_exhaustion(
     problem: VectorProblem, known: Loaded, state: VectorState, total: Ball
 ) -> VectorBounds:
-    """docs/theory/friction-proofs.md, "Close to gross sliding".
+    """docs/theory/vector-friction.md, "Close to gross sliding".
 
     The sum of P_i - q_i.t is at most `unused`. So each q is within (2 P unused)^(1/2) of P t, all
     together in the same sense; then X.t is no less than what it is at any asperity, and a sliding

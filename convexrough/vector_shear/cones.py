@@ -104,7 +104,7 @@ STEPS = (0.9, 0.99)
 class FrictionConic:
     """Settings of the cone program for `shear_vector`, through Clarabel.
 
-    tolerance : of Clarabel: duality gap and feasibility. Its word is not relied on
+    tolerance : of Clarabel: duality gap and feasibility. Its status is not relied on
     accepted  : an answer is accepted if its energy is proved to be within this of the least,
         relatively, and its `residual`, slips included, is at most 1e4 times this; else SolverError
 
@@ -162,7 +162,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
 
     @classmethod
     def accept(cls, problem: VectorProblem, total: Array) -> FrictionProgram:
-        """Raises SolverError where S is above the range of the cones, and says who is too dense."""
+        """Raises SolverError, with the asperities, where S is above the range of the cones."""
         scalar, shares = problem.scalar, problem.shift.shares
         if shares.max() > FIVE_CONES_LIMIT:
             raise _too_dense(problem)

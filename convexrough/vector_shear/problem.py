@@ -19,7 +19,7 @@ the multipliers of |q_i| <= P_i times the direction of q_i, with
     X = own(q_i) + (B q)_i + slip_i,    own(q) = ceiling_i deflection(|q| / P_i) q / |q|.
 
 Averaging d d' over all directions leaves B = A: that is Ciavarella and Jaeger's problem. Derived in
-docs/theory/friction.md, "The kernel" and "The program".
+docs/theory/vector-friction.md, "The kernel" and "The program".
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Shift(NamedTuple):
 
     shares : (n,) S_i, the shift over the least local stiffness; convex where all S_i <= 1
 
-    docs/theory/friction-cones.md, "Convexity".
+    docs/theory/vector-friction.md, "Convexity".
     """
 
     values: Array
@@ -111,7 +111,7 @@ class VectorProblem:
         """(n,) h_i = (2/3) ceiling_i / P_i = 1 / (2 E* a_i): the local Hessian is at least h_i I.
 
         Its eigenvalues, along q and across, are ceiling/P times deflection'(t) and deflection(t)/t:
-        docs/theory/friction-cones.md, "Convexity".
+        docs/theory/vector-friction.md, "Convexity".
         """
         h: Array = (2.0 / 3.0) * self.scalar.ceilings / self.scalar.loads
         return h
@@ -124,7 +124,7 @@ class VectorProblem:
 
     @property
     def product_error(self) -> float:
-        """(B q)_i as computed is off by at most this times sum_j A_ij |q_j|."""
+        """The error of (B q)_i as computed is at most this times sum_j A_ij |q_j|."""
         entries = self.scalar.influence.entry_error
         return 2.0 * (entries + (2 * len(self) + SUM_ROUNDOFFS) * ROUNDOFF)
 
@@ -164,7 +164,7 @@ class VectorProblem:
         The largest of: what displacements fail to balance by at an asperity, the part of a slip
         that is not along the force, the slip where friction is not used up times the share of it
         that is left (all over |X|); the force beyond P_i over P_i; the missing total over |T|. The
-        conditions are those of docs/theory/friction.md, "The program".
+        conditions are those of docs/theory/vector-friction.md, "The program".
         """
         if not np.isfinite(state.rise).all():
             return np.inf
@@ -185,7 +185,7 @@ class VectorProblem:
 
     @cached_property
     def shift(self) -> Shift:
-        """A shift for the cones: docs/theory/friction-cones.md, "Convexity".
+        """A shift for the cones: docs/theory/vector-friction.md, "Convexity".
 
         By the neighbours' distances (3), 2 / (2 - nu) of
 

@@ -3,7 +3,7 @@
 One step beyond Ciavarella and Jaeger (`shear`): tangential point forces move the surface by
 Cerruti's tensor, so forces and slips are vectors and turn a little out of the direction of the
 shear force. The state is the least of a convex energy (`convexrough.vector_shear.problem`), found
-by Newton's method or as a second-order cone program. Derived in docs/theory/friction.md.
+by Newton's method or as a second-order cone program. Derived in docs/theory/vector-friction.md.
 """
 
 from __future__ import annotations

@@ -18,10 +18,11 @@ import convexrough as cr
 from convexrough.bench import measure, page, reference, suite
 from convexrough.bench.figures import bench_figures
 from convexrough.bench.measure import Attempt
+from convexrough.bench.profile import Profile, profile_of
 from convexrough.bench.rows import Bench, Row, better_than_default, exponent, frontier
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, scene
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers import Conic, Newton
+from convexrough.solvers import BristleQP, Conic, Newton
 
 ROOT = Path(__file__).parent.parent.parent
 LONG = np.finfo(np.longdouble).eps < 1e-18
@@ -294,3 +295,22 @@ def test_figures() -> None:
     labels = {text.get_text() for text in words(work)}
     assert {"newton (default)", "conic", "bristles", "frontier", "seconds"} <= labels
     assert bench_figures(replace(tiny(), rows=()))
+
+
+def test_a_performance_profile() -> None:
+    """Parts of the cases by time over the least; nothing that is not right counts."""
+    seconds = np.array([[1.0, 2.0, np.inf, np.inf], [4.0, 1.0, 3.0, np.inf]])
+    words = (("right", "right", "wrong", "failed"), ("right", "right", "right", "refused"))
+    found = Profile(("a", "b"), ("1", "2", "3", "4"), seconds, words)
+    assert found.part(1.0).tolist() == [0.25, 0.5]
+    assert found.part(2.0).tolist() == [0.5, 0.5]
+    assert found.part(4.0).tolist() == [0.5, 0.75]
+    assert found.rows()[1][:6] == ["a", "2", "1", "0", "1", "25%"]
+    assert [len(line.get_xdata()) for line in found.plot().lines] == [4, 4]
+
+
+def test_answers_are_judged_before_they_are_timed() -> None:
+    found = profile_of([BristleQP(newton_step=False)], cases=["two-equal"], within=1e-9)
+    assert found.solvers == ("newton", "bristles")
+    assert found.outcomes == (("right",), ("wrong",))
+    assert found.ratios.tolist() == [[1.0], [np.inf]]

@@ -140,47 +140,6 @@ def test_the_limits_are_sharp() -> None:
     assert sp.expand(E3.subs(S, 1) - factored) == 0
 
 
-def test_the_four_weights_are_the_only_ones() -> None:
-    """A tight dual certificate at s uses each cone's tangent there: only these weights fit.
-
-    So where e < 0 the four-cone program lies strictly below the energy, and 21/25 is the limit of
-    the cones and not of the proof.
-    """
-    unknown = sp.symbols("w1 w2 w3 w4")
-    combination = sum(w * cone for w, cone in zip(unknown, tangents(FOUR_CONES), strict=True))
-    defect = sp.Poly(sp.expand(LIFTED_ENERGY - LAM * Y3 + MU - combination), *LIFT)
-    solution = sp.solve(defect.coeffs(), unknown, dict=True)
-    assert len(solution) == 1
-    for w, weight in zip(unknown, FOUR_WEIGHTS, strict=True):
-        assert sp.simplify(solution[0][w] - weight) == 0
-
-
-def lowest(number: float, at: float, names: int) -> float:
-    """How far the lifted energy comes below the tangent at `at`, by Clarabel."""
-    import clarabel
-    from scipy.sparse import csc_matrix
-
-    lam, mu = (float(f.subs({S: number, s: at})) for f in (LAM, MU))
-    rows = power_cones([np.array([column]) for column in range(names)], names)
-    objective = np.zeros(names)
-    objective[[-4, -2, -1]] = -lam, 3 / 5 - number / 3, number / 3
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    cones = [clarabel.SecondOrderConeT(3)] * rows.cones
-    quadratic, matrix = csc_matrix((names, names)), csc_matrix(rows.matrix)
-    solver = clarabel.DefaultSolver(quadratic, objective, matrix, rows.constant, cones, settings)
-    return float(solver.solve().obj_val) + mu
-
-
-@pytest.mark.parametrize(
-    ("number", "names", "exact"),
-    [(0.84, 5, True), (0.9, 5, False), (1.0, 5, False), (0.9, 6, True), (1.0, 6, True)],
-)
-def test_the_limits_in_a_solver(number: float, names: int, exact: bool) -> None:
-    below = min(lowest(number, at, names) for at in (0.5, 0.9, 0.97, 0.99))
-    assert below > -1e-7 if exact else below < -1e-5
-
-
 def test_rows_of_many_lifts_are_those_of_each() -> None:
     """Lifts scattered among other variables: every row says what its cone says."""
     rng = np.random.default_rng(1)

@@ -109,17 +109,3 @@ def test_what_is_not_finite_proves_nothing(count: int, wrong: float) -> None:
     huge = 1e200 * (np.ones((3, 3)) - np.eye(3))
     assert not proves_margin(huge, 0.1, 0.0)
     assert not proves_margin(np.zeros((2, 2)), 0.1, np.inf)
-
-
-def test_the_first_margin_that_is_proved() -> None:
-    matrix = 0.8 * (np.ones((6, 6)) - np.eye(6))
-    assert proved_margin(matrix, (0.6, 0.3, 0.1, 0.01), 0.0) == 0.1
-    assert proved_margin(matrix, (0.6, 0.3), 0.0) == 0.0
-    assert proved_margin(matrix, (0.19, 0.1), 0.0, spare=0.02) == 0.1
-    assert not matrix.diagonal().any()
-
-
-def test_is_definite() -> None:
-    assert is_definite(np.array([[1.0, 0.99], [0.99, 1.0]]))
-    assert not is_definite(np.array([[1.0, 1.01], [1.01, 1.0]]))
-    assert not is_definite(np.array([[1.0, 0.0], [0.0, -1.0]]))

@@ -131,7 +131,7 @@ def test_gross_sliding_is_refused() -> None:
     contact = pressed("paper")
     limit = FRICTION * contact.load
     for force in (1.01 * limit, -1.01 * limit):
-        with pytest.raises(cr.InputError, match=r"gross sliding, 0\.01 beyond it"):
+        with pytest.raises(cr.InputError, match=r"1\.01 f P: gross sliding"):
             cr.shear(contact, force=force)
     with pytest.raises(cr.InputError, match="found nan, expected at most f P"):
         cr.shear(contact, force=float("nan"))

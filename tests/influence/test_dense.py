@@ -13,7 +13,7 @@ from scenes import paper, rough, scattered
 
 from convexrough.influence import sliced_matrix
 from convexrough.influence.choice import couple
-from convexrough.influence.coupling import Kind, error_reach, inverse_distances
+from convexrough.influence.coupling import error_reach, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.shells import shells
 from convexrough.numbers.pairs import Pair
@@ -56,15 +56,6 @@ def test_rounding_is_a_bound(seed: int, count: int) -> None:
     off = np.array([abs(float(v - t)) for v, t in zip(map(arb, computed), exact, strict=True)])
     assert (off <= bounds).all()
     assert bounds.max() <= 1e-14 * operator.apply(np.abs(loads)).max()
-
-
-def test_the_sum_in_blocks_is_the_product() -> None:
-    rng = np.random.default_rng(5)
-    for count in (1, 2, 64, 65, 300):
-        points, loads = rng.uniform(-1, 1, (count, 2)), rng.random(count)
-        operator = DenseInfluence.assemble(points, SCALE)
-        assert len(operator) == count
-        assert_allclose(operator.apply(loads), SCALE * inverse_distances(points, points) @ loads)
 
 
 def sums(points: np.ndarray, loads: Pair, row: int) -> arb:
@@ -260,13 +251,6 @@ def test_crowding() -> None:
     assert operator.smoother(radii) is None
 
 
-def test_shell_radii() -> None:
-    points = np.array([[0, 0], [1, 0], [4, 0]], dtype=float)
-    assert_allclose(shell_radii(points), [0.5, 0.5, 1.5])
-    assert list(shells(DenseInfluence.assemble(points[:1], SCALE))) == [0]
-    assert shells(DenseInfluence.assemble(points, SCALE, point_error=1.0))[0] == np.inf
-
-
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.floats(0.3, 4))
 def test_shell_lemma(seed: int, count: int, shape: float) -> None:
@@ -292,16 +276,3 @@ def test_shells_do_not_overlap() -> None:
     radii = shell_radii(points)
     inverse = inverse_distances(points, points)
     assert ((radii[:, None] + radii) * inverse <= 1 + 1e-14).all()
-
-
-@pytest.mark.parametrize("kind", ["dense", "lattice", "scattered"])
-def test_a_part_of_the_matrix(kind: Kind) -> None:
-    """It may be written into: the operator keeps its own."""
-    scene, which = paper(), np.array([5, 0, 60, 17])
-    operator = couple(scene, np.arange(len(scene)), SCALE, kind)
-    assert operator.at_hand == (kind == "dense")
-    expected = operator.matrix[np.ix_(which, which)]
-    part = operator.submatrix(which)
-    assert (part == expected).all()
-    part[:] = 0.0
-    assert (operator.submatrix(which) == expected).all()

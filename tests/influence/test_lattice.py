@@ -15,15 +15,13 @@ from numpy.typing import NDArray
 from scenes import paper, rough, steel
 
 import convexrough as cr
-from convexrough.convex.newton_step import correct
-from convexrough.influence.convolution import PASS_ROUNDOFFS, Box, _pass_roundoffs, neighbours
+from convexrough.influence.convolution import Box, _pass_roundoffs
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.shells import fitted_shells, shells
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import BLUR, Lattice
-from convexrough.scene.neighbours import nearest_distances
 
 Array = NDArray[np.float64]
 
@@ -329,23 +327,6 @@ def test_fitted_shells_do_not_overlap(
         assert ((s[:, None] + s) * inverse).max() <= 1 + 4 * ROUNDOFF, A.name
 
 
-@pytest.mark.parametrize("name", BASES)
-@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (7, 1), (9, 13)])
-def test_neighbours_come_by_distance(name: str, shape: tuple[int, int]) -> None:
-    """Each difference of two sites of a box once, up to its sign."""
-    lattice = Lattice.through(patch(turned(BASES[name], 0.2), 60))
-    assert lattice is not None
-    found = list(neighbours(Box(shape, lattice.basis)))
-    rows, columns = shape
-    assert len({(i, j) for _, i, j in found}) == len(found)
-    assert len(found) == ((2 * rows - 1) * (2 * columns - 1) - 1) // 2
-    distances = [distance for distance, _, _ in found]
-    assert distances == sorted(distances)
-    for distance, i, j in found:
-        assert distance == pytest.approx(np.hypot(*(np.array([i, j]) @ lattice.basis)), rel=1e-14)
-        assert (i, j) > (0, 0)
-
-
 # Rounding of the transforms.
 
 
@@ -428,12 +409,6 @@ def test_no_two_differences_share_a_place(name: str, seed: int, kind: str) -> No
     assert_allclose(values[*places.T], exact, atol=1e-13)
 
 
-def test_discs_on_a_hexagonal_lattice_need_three_quarters_of_twice_the_box() -> None:
-    A = operator(patch(np.array(BASES["hexagonal"]), 30_000))
-    sites, padded = (np.prod(np.array(shape)) for shape in (A.box.shape, A.box.padded))
-    assert padded < 0.8 * 4 * sites
-
-
 # The smoother.
 
 
@@ -472,74 +447,3 @@ def test_smoother(name: str, scale: float, kind: str) -> None:
     matrix = np.array(columns)
     assert_allclose(matrix, matrix.T, atol=1e-5)
     assert np.linalg.eigvalsh((matrix + matrix.T) / 2).min() > 1e-3
-
-
-class _Counted:
-    """An operator that counts its products, with its smoother or without."""
-
-    def __init__(self, influence: LatticeInfluence, *, smoothed: bool) -> None:
-        self.influence, self.smoothed, self.products = influence, smoothed, 0
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.influence, name)
-
-    def apply(self, loads: Any) -> Any:
-        self.products += 1
-        return self.influence.apply(loads)
-
-    def smoother(self, root: Array) -> Any:
-        return self.influence.smoother(root) if self.smoothed else None
-
-
-@pytest.mark.parametrize("balanced", [False, True])
-@pytest.mark.parametrize("kind", ["smooth", "0.2", "0.5"])
-def test_the_smoother_saves_products(kind: str, balanced: bool) -> None:
-    """And the answer is that of a matrix, to what was asked for."""
-    points = patch(np.array(BASES["hexagonal"]), 3000)
-    lattice, dense = operator(points, scale=0.4), DenseInfluence.assemble(points, 0.4)
-    root = roots(points, kind)
-    defect = np.random.default_rng(4).random(3000) * (1.0 + points[:, 0])
-    plain, smoothed = _Counted(lattice, smoothed=False), _Counted(lattice, smoothed=True)
-    options: Any = dict(balanced=balanced, tolerance=1e-4)
-    exact = correct(dense, shells(dense), root, defect, **options)
-    found = correct(smoothed, shells(lattice), root, defect, **options)  # type: ignore[arg-type]
-    correct(plain, shells(lattice), root, defect, **options)  # type: ignore[arg-type]
-    assert smoothed.products <= 0.5 * plain.products
-    assert_allclose(found, exact, atol=3e-3 * np.abs(exact).max())
-    assert np.linalg.norm(found - exact) <= 1e-3 * np.linalg.norm(exact)
-
-
-class _AtHand(_Counted):
-    """One whose matrix costs nothing."""
-
-    at_hand = True
-
-
-def test_a_matrix_at_hand_is_factorised_whatever_its_class() -> None:
-    points = patch(np.array(BASES["hexagonal"]), 300)
-    lattice = operator(points, scale=0.4)
-    root, defect = roots(points, "smooth"), np.random.default_rng(4).random(300)
-    options: Any = dict(balanced=False, tolerance=1e-4)
-    stored, other = _AtHand(lattice, smoothed=True), _Counted(lattice, smoothed=True)
-    for each in (stored, other):
-        correct(each, shells(lattice), root, defect, **options)  # type: ignore[arg-type]
-    assert stored.products == 1
-    assert other.products > 1
-
-
-def test_the_spacing_is_that_of_the_shortest_vector() -> None:
-    """Also where b2 is shorter than b1 by less than the reduction of the basis can tell."""
-    basis = np.array([[1.0, 0.0], [0.0, 1.0 - 4e-10]])
-    sites = np.stack(np.meshgrid(np.arange(-10, 11), np.arange(-10, 11)), -1).reshape(-1, 2)
-    points = sites[~((sites[:, 0] == 0) & (np.abs(sites[:, 1]) == 1))] @ basis
-    lattice = Lattice.through(points)
-    assert lattice is not None
-    separations = LatticeInfluence.assemble(points, lattice, 1.0).separations()
-    assert (separations <= nearest_distances(points)).all()
-
-
-def test_a_pass_is_allowed_what_the_theory_says() -> None:
-    """4.5 for twiddle factors and their products, and the sums: docs/theory/operators.md."""
-    for radix, allowed in PASS_ROUNDOFFS.items():
-        sums = np.sqrt(radix) * ((radix - 1) / 2 + 4 if radix > 2 else 1)
-        assert 4.5 + sums <= allowed < 5.5 + sums

@@ -203,6 +203,15 @@ def test_touching_to_rounding(steps: int) -> None:
     assert contact.certificate.holds
 
 
+def test_touching_exactly_is_undecided() -> None:
+    """Neither load nor gap: two asperities that first touch at approach 0, all numbers exact."""
+    pair = cr.Asperities([[0.0, 0.0], [0.5, 0.0]], 0.02, [0.0, 0.125])
+    contact = cr.press(cr.Scene(1.0, pair, MATERIAL, geometry="summit"), approach=0.0)
+    assert list(contact.status) == ["undecided", "undecided"]
+    assert list(contact.loads) == [0.0, 0.0]
+    assert not contact.certificate.holds
+
+
 def test_scopes() -> None:
     """From easy to hard: the shells, the Cholesky test, a local box, nothing."""
 

@@ -149,7 +149,7 @@ def scaled(lengths: Array, points: Array) -> Array:
     )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 120), st.floats(0.05, 4.0))
 def test_overlapping_shells(seed: int, count: int, width: float) -> None:
     """H^-1/2 (H + A) H^-1/2 >= S for any radii, and what is proved is below the least of it."""
@@ -205,7 +205,7 @@ def test_who_is_in_the_way() -> None:
     assert list(crowded(problem, loads)) == [1, 3, 4]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(-0.2, 0.6))
 def test_sparse_elimination_proves_no_more_than_is_true(seed: int, count: int, lift: float) -> None:
     rng = np.random.default_rng(seed)

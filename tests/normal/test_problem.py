@@ -18,7 +18,6 @@ from scenes import (
     operators,
     paper,
     random_cases,
-    rough,
     scattered,
 )
 
@@ -143,7 +142,7 @@ def test_the_approach_bound_is_sharp_enough_to_screen(kind: Kind) -> None:
     assert highest_approach(paper(), load, kind) == pytest.approx(PAPER_APPROACH, rel=1e-2)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(random_cases(crowding=2.0), st.floats(0.01, 1))
 def test_convexity_number(drawn: Case, size: float) -> None:
     """The smallest eigenvalue of the scaled Hessian is at least 1 - theta."""
@@ -171,7 +170,7 @@ def test_convexity_number(drawn: Case, size: float) -> None:
         assert theta == pytest.approx(true, rel=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.lists(st.floats(-1, 1), min_size=1, max_size=9), st.floats(1e-40, 1e9))
 def test_shifted_to_load(indentation: list[float], load: float) -> None:
     depth = np.array(indentation)
@@ -239,14 +238,6 @@ def test_newton_converges_from_any_start(drawn: Case, seed: int, size: float) ->
     for control in ({"approach": approach}, {"load": contact.load}):
         again = cr.press(scene, start=start, influence=kind, **control)
         assert_allclose(again.loads, contact.loads, rtol=1e-9, atol=1e-12 * contact.loads.max())
-
-
-@pytest.mark.parametrize("kind", OPERATORS)
-def test_newton_takes_few_steps(kind: Kind) -> None:
-    for scene in (paper(), rough(), rough("closest")):
-        for control in ({"approach": PAPER_APPROACH}, {"load": 3.6e-7}):
-            if kind in operators(scene):
-                assert cr.press(scene, influence=kind, **control).iterations <= 9
 
 
 #: Dense alone where the points are scattered; on a lattice, every operator.

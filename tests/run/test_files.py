@@ -10,14 +10,16 @@ from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
 from convexrough.run import results
-from convexrough.run.claims import Manner, read_loads
-from convexrough.run.results import MANIFEST, beside, claim_folder, write_results
+from convexrough.run.results import MANIFEST, results_folder, write_results
 from convexrough.run.scene_file import read_scene
-from convexrough.run.stages import Findings
-from convexrough.run.summary import Summary, summarise, to_json
-from convexrough.run.tables import ASPERITY_COLUMNS
+from convexrough.run.stages import Normal
 from convexrough.tabular.table import read_table
 from convexrough.tabular.units import UnitNames
+from convexrough.verdict.claims import Manner, read_loads
+from convexrough.whole import replacing, to_json
+
+COLUMNS = ("x", "y", "height", "tip_radius", "load", "contact_radius", "gap", "status",
+           "load_error")  # fmt: skip
 
 
 def read(tmp_path: Path, *parts: str, **tables: str) -> Any:
@@ -73,9 +75,10 @@ force = "N"
     assert np.array_equal(file.scene.asperities.heights, expected.heights)
     assert (file.scene.geometry, file.scene.friction) == ("closest", 0.5)
     assert (file.approach, file.load) == (None, 1.0)
-    assert file.shear == (0.0, 0.5, 1.0)
-    assert file.cycle == ((0.1, 0.5), (-0.1, -0.5))
-    assert file.history == (1.0, -1.0, 0.25)
+    assert list(file.stages) == ["normal", "shear", "cycle", "history"]
+    assert file.stages["shear"].fractions == [0.0, 0.5, 1.0]
+    assert (file.stages["cycle"].maximum, file.stages["cycle"].lowest) == ([0.1, 0.5], [-0.1, -0.5])
+    assert file.stages["history"].fractions == [1.0, -1.0, 0.25]
     assert file.solver == cr.solvers.Newton()
     assert file.units == ("mm", "N")
 
@@ -255,19 +258,17 @@ def test_the_default_within_reaches_as_far_as_the_tallest_asperity_could(tmp_pat
 
 
 def written(folder: Path, contact: cr.Contact, *, figures: bool = False) -> list[str]:
-    found = Findings(contact)
-    paths = write_results(
-        folder, found, summarise(found), figures=figures, units=UnitNames("m", "N")
-    )
+    found = [Normal(approach=contact.approach).compute(contact)]
+    paths = write_results(folder, found, figures=figures, units=UnitNames("m", "N"))
     assert all(path.stat().st_size > 0 for path in paths)
-    assert {path.name for path in paths} == {path.name for path in folder.iterdir()} - {MANIFEST}
+    assert {path.name for path in paths} == {path.name for path in folder.iterdir()}
     return [path.name for path in paths]
 
 
 def test_results_read_back_the_same(tmp_path: Path, contact: cr.Contact) -> None:
     assert written(tmp_path, contact) == ["summary.json", "asperities.csv"]
     path = tmp_path / "asperities.csv"
-    assert path.read_text().splitlines()[0] == ",".join(ASPERITY_COLUMNS)
+    assert path.read_text().splitlines()[0] == ",".join(COLUMNS)
     wanted = ("x", "y", "height", "tip_radius", "load")
     columns = read_table(path, required=wanted).columns
     asperities = contact.scene.asperities
@@ -287,24 +288,9 @@ def test_many_asperities_go_to_npz(
     assert written(tmp_path, contact) == ["summary.json", "asperities.npz"]
     path = tmp_path / "asperities.npz"
     with np.load(path) as arrays:
-        assert tuple(arrays) == ASPERITY_COLUMNS
+        assert tuple(arrays) == COLUMNS
         assert arrays["status"].tolist() == contact.status.tolist()
     assert np.array_equal(read_loads(path, contact.scene, Manner()).values, contact.loads)
-
-
-@pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x03\x04 and then nothing"])
-def test_a_broken_npz(tmp_path: Path, contact: cr.Contact, content: bytes) -> None:
-    path = tmp_path / "loads.npz"
-    path.write_bytes(content)
-    with pytest.raises(cr.FileError, match=str(path)):
-        read_loads(path, contact.scene, Manner())
-
-
-def test_figures_are_written_twice_each(tmp_path: Path, contact: cr.Contact) -> None:
-    names = written(tmp_path, contact, figures=True)
-    assert {"pressure.png", "pressure.svg"} < set(names)
-    assert (tmp_path / "pressure.png").read_bytes().startswith(b"\x89PNG")
-    assert b"<svg" in (tmp_path / "pressure.svg").read_bytes()
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -312,7 +298,7 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     path.write_text("old")
 
     def write(error: Exception | None) -> None:
-        with beside(path) as temporary:
+        with replacing(path) as temporary:
             temporary.write_text("new")
             if error:
                 raise error
@@ -328,36 +314,43 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ["result.csv"]
 
 
-def test_a_failure_while_drawing_leaves_no_half_figure_and_no_summary(
-    tmp_path: Path, contact: cr.Contact, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from matplotlib.figure import Figure
+def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
 
-    def fail(self: Figure, path: Path, **_: Any) -> None:
-        path.write_bytes(b"half")
-        raise OSError(28, "No space left on device")
+    def write(error: BaseException | None, text: str, *, force: bool = False) -> None:
+        with results_folder(folder, force=force) as new:
+            (new / "one.csv").write_text(text)
+            assert not folder.exists() or (folder / "one.csv").read_text() == "1"
+            if error is not None:
+                raise error
 
-    monkeypatch.setattr(Figure, "savefig", fail)
-    with pytest.raises(cr.FileError, match=r"pressure\.png: cannot be written"):
-        written(tmp_path, contact, figures=True)
-    assert {each.name for each in tmp_path.iterdir()} == {"asperities.csv", MANIFEST}
+    with pytest.raises(cr.FileError, match="b: cannot hold results: No space"):
+        write(OSError(28, "No space left on device"), "half")
+    assert not list((tmp_path / "a").iterdir())
+    write(None, "1")
+    assert json.loads((folder / MANIFEST).read_text())["files"] == ["one.csv"]
+    with pytest.raises(KeyboardInterrupt):
+        write(KeyboardInterrupt(), "2", force=True)
+    assert sorted(each.name for each in folder.iterdir()) == [MANIFEST, "one.csv"]
+    assert (folder / "one.csv").read_text() == "1"
 
 
 def test_a_folder_is_claimed_before_computing(tmp_path: Path) -> None:
-    folder = tmp_path / "a" / "b"
-    claim_folder(folder, force=False)
-    claim_folder(folder, force=False)  # empty: nothing to lose
+    folder = tmp_path / "a"
+    folder.mkdir()
+    with results_folder(folder, force=False):  # empty: nothing to lose
+        pass
     (folder / "mine.txt").write_text("precious")
-    with pytest.raises(cr.FileError, match="not empty"):
-        claim_folder(folder, force=False)
-    claim_folder(folder, force=True)
-    with pytest.raises(cr.FileError, match="cannot hold results"):
-        claim_folder(folder / "mine.txt", force=True)
-    with pytest.raises(cr.FileError, match="cannot hold results"):
-        claim_folder(folder / "mine.txt" / "c", force=False)
-    assert [each.name for each in folder.iterdir()] == ["mine.txt"]
+    for place, force, said in (
+        (folder, False, "not empty"),
+        (folder / "mine.txt", True, "cannot hold results"),
+        (folder / "mine.txt" / "c", False, "cannot hold results"),
+    ):
+        with pytest.raises(cr.FileError, match=said), results_folder(place, force=force):
+            raise AssertionError("computed")
+    assert (folder / "mine.txt").read_text() == "precious"
 
 
 def test_json_has_no_infinities() -> None:
-    summary: Summary = {"a": {"b": [1.0, float("inf")]}, "c": float("nan"), "d": -float("inf")}
+    summary: Any = {"a": {"b": [1.0, float("inf")]}, "c": float("nan"), "d": -float("inf")}
     assert json.loads(to_json(summary)) == {"a": {"b": [1.0, None]}, "c": None, "d": None}

@@ -50,7 +50,7 @@ def test_a_run(command: Any) -> None:
     gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient()
     table = read("gradient")
     np.testing.assert_array_equal(table["by_height"], gradient.heights)
-    np.testing.assert_array_equal(table["error"], gradient.height_errors)
+    np.testing.assert_array_equal(table["by_height_error"], gradient.height_errors)
     np.testing.assert_array_equal(table["by_tip_radius"], gradient.tip_radii)
     np.testing.assert_array_equal(table["by_y"], gradient.positions[:, 1])
     assert summary["by"]["contact_modulus"] == gradient.contact_modulus

@@ -101,7 +101,7 @@ def test_surface_displacement_is_the_mean_of_two_like_pairs() -> None:
 
 
 def test_derivatives_by_the_constants_of_each_body() -> None:
-    """As docs/theory/two-bodies.md gives them: the chain rule of gradients."""
+    """As docs/theory/bodies.md gives them: the chain rule of gradients."""
     step, E, nu = 1e-5, np.array([210e9, 70e9]), np.array([0.3, 0.33])
 
     def both(E: Any, nu: Any) -> Any:
@@ -124,5 +124,5 @@ def test_bad_bodies() -> None:
     both = cr.Material.pair(STEEL, ALUMINIUM)
     with pytest.raises(cr.InputError, match="base: found a pair, expected one body"):
         cr.Material.pair(STEEL, both)
-    with pytest.raises(cr.InputError, match="sphere: found something of float"):
+    with pytest.raises(cr.InputError, match="sphere: found type float, expected a Material"):
         cr.Material.pair(210e9, STEEL)  # type: ignore[arg-type]

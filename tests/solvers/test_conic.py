@@ -1,5 +1,6 @@
 """The cone programs against 50 digits, Newton's method, the certificate and each other."""
 
+import re
 import sys
 from dataclasses import dataclass, replace
 from typing import Any
@@ -84,36 +85,6 @@ def test_what_the_solver_itself_finds(name: str, control: str) -> None:
         assert ((found.loads > 0) == (expected.loads > 0)).all()
         assert abs(found.approach - expected.approach) < 1e-7
     assert disagreement(direct, modelled) < 1e-7
-
-
-@pytest.mark.parametrize(("density", "contacts"), [(1, 37), (2.31, 199)])
-def test_larger_scenes(density: float, contacts: int) -> None:
-    problem = problem_of(hexagonal(density), PAPER_APPROACH)
-    expected = Newton().solve(problem)
-    assert (expected.loads > 0).sum() == contacts
-    solver = Recorded()
-    assert disagreement(solver.solve(problem), expected) < 1e-12
-    raw = expected.loads * 0
-    raw[solver.members[0]] = solver.answers[0].loads
-    assert np.abs(raw - expected.loads).max() < 1e-7 * expected.loads.max()
-
-
-@dataclass(frozen=True)
-class Recorded(Conic):
-    """Keeps what Clarabel answered, so that one solve serves two tests."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "answers", [])
-        object.__setattr__(self, "members", [])
-
-    answers: Any = None
-    members: Any = None
-
-    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
-        self.answers.append(super().answer(problem, boxes))
-        self.members.append(boxes.members)
-        return self.answers[-1]
 
 
 @pytest.mark.parametrize("name", NAMED)
@@ -329,26 +300,27 @@ def test_tolerance_and_most_steps_reach_the_solver(
     assert bare == {}
 
 
-def test_names_tell_the_solver() -> None:
-    assert ConicCVXPY(solver="clarabel") == ConicCVXPY()
-    assert ConicCVXPY().name == "conic in CVXPY + Newton step"
-    assert ConicCVXPY(solver="scs").name == "conic in CVXPY (SCS) + Newton step"
-    assert ConicCVXPY(solver="QOCO", newton_step=False).name == "conic in CVXPY (QOCO)"
-    with pytest.raises(cr.InputError, match="solver: found 3, expected a name"):
-        ConicCVXPY(solver=3)  # type: ignore[arg-type]
-
-
 def test_solvers_that_cvxpy_has_not(monkeypatch: pytest.MonkeyPatch) -> None:
     """Unknown, not installed, or not one for cones: an error that says which there are."""
     problem = problem_of(paper(), PAPER_APPROACH)
-    has = r"is not installed; CVXPY finds (?=.*CLARABEL).*; pip install"
-    with pytest.raises(cr.SolverError, match=rf"^conic in CVXPY \(NONE\).*NONE {has} none"):
-        ConicCVXPY(solver="none").solve(problem)
-    with pytest.raises(cr.SolverError, match=r"^conic in CVXPY \(OSQP\)"):
-        ConicCVXPY(solver="OSQP").solve(problem)
+    for name, said in (
+        ("none", r"^conic in CVXPY \(NONE\).*: CVXPY knows no solver NONE; valid: .*CLARABEL"),
+        ("scss", r'knows no solver SCSS; did you mean "SCS"'),
+        ("OSQP", r"OSQP has no second-order cones; choose one of .*, or solvers.BristleQP"),
+        ("highs", "HIGHS has no second-order cones"),
+        ("gurobi", "GUROBI is not installed; .*; pip install gurobipy, or"),
+    ):
+        with pytest.raises(cr.SolverError, match=said):
+            ConicCVXPY(solver=name).solve(problem)
     monkeypatch.setitem(sys.modules, "scs", None)
-    with pytest.raises(cr.SolverError, match=rf"SCS {has} scs"):
+    has = r"is not installed; CVXPY finds (?=.*CLARABEL).*; pip install"
+    with pytest.raises(cr.SolverError, match=rf"SCS {has} scs, or"):
         ConicCVXPY(solver="SCS").solve(problem)
+
+
+def test_a_model_says_itself_in_one_line() -> None:
+    model = ConicCVXPY().model(problem_of(paper(), PAPER_APPROACH))
+    assert re.fullmatch(r"LiftedModel: 55 asperities, 330 variables, 55 equations;.*", repr(model))
 
 
 @dataclass(frozen=True)

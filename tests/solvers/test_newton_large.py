@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 from scenes import MATERIAL, PAPER_APPROACH, STEEL
 
 import convexrough as cr
@@ -17,8 +16,6 @@ from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.newton import ALL_ITERATED
 from convexrough.sphere import hertz
-
-Array = NDArray[np.float64]
 
 
 def scene(
@@ -142,30 +139,6 @@ def dense_answer(name: str) -> cr.Contact:
     return _DENSE[name]
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("control", ["approach", "load"])
-@pytest.mark.parametrize(
-    ("options", "steps"),
-    [
-        (dict(), 5),
-        (dict(pattern="square"), 5),
-        (dict(height_std=1e-7, seed=1), 6),
-        (dict(height_std=1e-6, tip_radius_cv=0.1, seed=1), 7),
-        (dict(geometry="closest"), 5),
-    ],
-)
-def test_as_few_steps_for_many(options: Any, steps: int, control: str) -> None:
-    """At 2,100 and at some 36,000 asperities, to twelve digits."""
-    for k in (6, 25):
-        pressed = scene(k, **options)
-        prescribed: Any = {"approach": {"approach": PAPER_APPROACH}, "load": {"load": 3e-7}}
-        contact = cr.press(pressed, **prescribed[control])
-        assert_solved(contact, steps=steps)
-        assert (contact.loads > 0).sum() > 0.25 * len(pressed)
-        problem = NormalProblem.assemble(pressed, **prescribed[control], influence="lattice")
-        assert residual(problem, contact) <= 1e-12
-
-
 @pytest.mark.parametrize("k", [6, 12, 25])
 def test_loads_tend_to_those_of_a_smooth_sphere(k: int) -> None:
     """Within 2 % of Hertz where asperities are as fine and stiff as here; nearer for finer."""
@@ -248,6 +221,7 @@ def test_approaches_of_any_size(approach: float, steps: int) -> None:
         assert_allclose(again.loads, contact.loads, rtol=0, atol=1e-9 * contact.loads.max())
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("above", [1e-7, 4e-6])
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_a_far_tall_asperity_is_found(control: str, above: float) -> None:
@@ -321,6 +295,7 @@ def test_order_and_orientation_do_not_matter(control: str, angle: float) -> None
     assert (contact.status == known.status[order]).all()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", ["dropped", "perturbed", "swapped", "single precision", "added"])
 def test_the_certificate_under_attack(kind: str) -> None:
     """Its bounds hold and its words stay right for thousands of wrong loads, too."""
@@ -351,8 +326,8 @@ def test_the_certificate_under_attack(kind: str) -> None:
 
 
 def test_fifty_digits_of_some_hundred() -> None:
-    """The largest contact that is worth proving in ball arithmetic: 253 candidates."""
-    pressed = scene(2.2, height_std=1e-6, seed=9)
+    """A contact through transforms, proved in ball arithmetic."""
+    pressed = scene(1.6, height_std=1e-6, seed=9)
     contact = cr.press(pressed, approach=PAPER_APPROACH, influence="lattice")
     exact = multiprecision.solve(
         pressed.asperities.positions,
@@ -398,7 +373,7 @@ def test_few_touching_under_a_load(kind: Kind) -> None:
     """A defect that is the same at all that touch lies wholly in the change of the approach."""
     rng = np.random.default_rng(0)
     flat = cr.Asperities.square(spacing=2.5e-3, tip_radius=0.01, within=0.05)
-    for _ in range(12):
+    for _ in range(3 if kind == "lattice" else 1):
         heights = flat.distances**2 / 2
         few = int(rng.integers(1, 6))
         heights[rng.choice(len(flat), few, replace=False)] += rng.uniform(1e-5, 3e-5, few)

@@ -15,7 +15,7 @@ from convexrough.solvers import BristleQP, Conic, Newton, Solution, programs
 from convexrough.solvers.bristles import BristleProgram
 from convexrough.solvers.cone_boxes import Boxes
 from convexrough.solvers.conic import LiftedProgram
-from convexrough.solvers.programs import RawAnswer, run_clarabel, run_osqp
+from convexrough.solvers.programs import RawAnswer, run_osqp
 from convexrough.vector_shear.cones import FrictionConic
 from convexrough.vector_shear.problem import VectorProblem
 
@@ -85,19 +85,6 @@ def test_the_bristle_program_bounds_the_energy(control: str) -> None:
         assert_allclose(found.loads, raw.x[: len(problem)], atol=1e-8 * found.loads.max())
         excess.append(cost(program, raw.x) - energy)
     assert 0 < excess[1] < 0.3 * excess[0]
-
-
-def test_the_same_answer_through_each_step() -> None:
-    """accept, apply, run, invert by hand is what the settings object does."""
-    problem, _ = solved("paper", "approach")
-    solver = Conic(newton_step=False)
-    boxes = Boxes.choose(problem)
-    lifted = LiftedProgram.accept(problem, boxes)
-    raw = run_clarabel(lifted.apply(), "conic", 1e-9, direct_solve_method="qdldl")
-    found = solver.solve(problem)
-    assert raw.word in ("Solved", "AlmostSolved")
-    touching = found.loads[boxes.members] > 0
-    assert (lifted.invert(raw).loads[touching] == found.loads[boxes.members][touching]).all()
 
 
 def test_what_is_undefined_is_infinite() -> None:

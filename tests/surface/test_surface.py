@@ -114,6 +114,49 @@ def test_nothing_but_trend() -> None:
         cr.surface.Surface(NOISE, 1.0).detrend("cone")  # type: ignore[arg-type]
 
 
+def test_a_trend_that_explains_most_is_named() -> None:
+    x, y = grid()
+    ball, tilt = -(x**2 + y**2) / 400, 0.3 * x
+    for trend, kind in (
+        (tilt, "plane"),
+        (ball, "sphere"),
+        (ball + tilt, "sphere"),
+        (-ball, "sphere"),
+    ):
+        surface = cr.surface.Surface(trend + NOISE, (0.5, 0.7))
+        assert f'explains 100 % of the variance of the heights: detrend="{kind}"' in str(
+            surface.warnings
+        )
+        assert "warning" in repr(surface)
+        assert surface.detrend(kind).warnings == ()
+    assert surface.detrend("plane").warnings[0].startswith("a sphere of radius -2")
+    assert cr.surface.Surface(NOISE, 1.0).warnings == ()
+    for seed in range(3):
+        assert cr.surface.self_affine(0.8, 0.1, 256.0, seed).warnings == ()
+
+
+def test_a_map_pressed_whole_is_hertz_where_it_is_smooth() -> None:
+    """Oblong pixels; load and area, and the half axes on an ellipsoid."""
+    flat = cr.surface.Surface(1e-9 * RNG.standard_normal((201, 161)), (1.0, 1.2))
+    single = cr.Asperities([[0.0, 0.0]], 1e9)
+    contact = cr.press(cr.Scene(1e4, single, cr.Material(2.0, 0.3)), approach=0.1)
+    whole = cr.surface.press_whole(flat, contact)
+    assert_allclose(whole.load, contact.load, rtol=5e-4)
+    assert_allclose(whole.area, np.pi * 1e3, rtol=0.02)
+    assert (whole.pieces, whole.resolution < 2e-3) == (1, True)
+    assert_allclose(whole.loads.sum(), whole.load, rtol=1e-12)
+    assert "of the asperities" in repr(whole)
+    ellipsoid = cr.press(cr.Scene((1e4, 1.2e4), single, cr.Material(2.0, 0.3)), approach=0.1)
+    across = np.argwhere(cr.surface.press_whole(flat, ellipsoid).pressures > 0)
+    height, width = np.ptp(across, axis=0) + 1
+    assert_allclose(1.2 * height / width, 1.2 ** (2 / 3), rtol=0.04)  # Johnson 1985, eq. 4.28
+    for approach, said in ((3.0, "contact at the edge of the map"), (1e-12, "no pixel that")):
+        deep = cr.press(contact.scene, approach=approach)
+        low = cr.surface.Surface(flat.heights - 1e-6, (1.0, 1.2))
+        with pytest.raises(cr.InputError, match=said):
+            cr.surface.press_whole(low, deep)
+
+
 def test_holes_become_soap_films() -> None:
     """A harmonic map comes back as it was, and no filled pixel is a maximum."""
     x, y = grid()

@@ -8,8 +8,9 @@ import pytest
 from sweep_files import SMALL, sweeping, tables, toml
 
 import convexrough as cr
+from convexrough.sweeps.file import plan_of
 from convexrough.sweeps.grid import Draw, Grid
-from convexrough.sweeps.sweep_file import Plan, plan_of
+from convexrough.sweeps.plan import Plan
 
 
 def plan(contents: dict[str, Any]) -> Plan:
@@ -36,7 +37,7 @@ def test_rows_are_in_the_order_of_lists_then_grid_then_seeds() -> None:
 
 def test_tables_are_those_of_the_file_with_the_values_set() -> None:
     grid = plan(SMALL).source.grid  # type: ignore[attr-defined]
-    point = grid.tables_at(grid.count - 1)
+    point = grid.with_values(*grid.point(grid.count - 1))
     assert point["asperities"] == {**SMALL["asperities"], "height_std": 1e-6, "seed": 3}
     assert point["normal"] == {"load": 3e-7}
     assert "sweep" not in point
@@ -91,11 +92,6 @@ def test_the_contents_of_a_file_of_asperities_are_in_the_hash(tmp_path: Path) ->
 
 WRONG = {
     "no table": ({k: v for k, v in SMALL.items() if k != "sweep"}, "[sweep]: missing table"),
-    "a gradient": (
-        SMALL | {"gradient": {"of": "load"}},
-        "[gradient]: not computed in a sweep; `convexrough run` computes it",
-    ),
-    "a history": (SMALL | {"history": {"fractions": [0.5]}}, "[history]: not computed in a sweep"),
     "a number": ({**SMALL, "sweep": 3}, "[sweep]: found 3, expected a table"),
     "unknown key": (tables(sweep={"sede": 3}), '[sweep] sede: unknown key, did you mean "seeds"?'),
     "unknown swept key": (
@@ -106,17 +102,21 @@ WRONG = {
         sweeping(over={"nromal.load": [1.0]}),
         "[nromal]: unknown table, did you mean",
     ),
-    "no table in a key": (sweeping(over={"load": [1.0]}), '"load": expected a table and a key'),
-    "empty grid": (sweeping(over={"normal.load": []}), '"normal.load": found [], expected a list'),
+    "no table in a key": (sweeping(over={"load": [1.0]}), "over.load: expected a table and a key"),
+    "empty grid": (
+        sweeping(over={"normal.load": []}),
+        "over.normal.load: found [], expected a list",
+    ),
     "no list": (sweeping(over={"normal.load": 3.0}), "found 3.0, expected a list of values"),
+    "no table of keys": (sweeping(over=[1.0]), "[sweep] over: found [1.0], expected a table of"),
     "a wrong value": (
         sweeping(over={"normal.load": [1e-7, -1.0]}),
-        '[sweep.over] "normal.load"[1]: [normal] load: found -1.0, expected a positive number',
+        "[sweep] over.normal.load[1]: [normal] load: found -1.0, expected a positive number",
     ),
-    "a value twice": (sweeping(over={"normal.load": [1e-7, 1e-7]}), "a value is there twice"),
+    "a value twice": (sweeping(over={"normal.load": [1e-7, 1e-7]}), "values, none of them twice"),
     "two ways of one key": (
         sweeping(over={"normal.load": [1e-7]}, together={"normal.load": [2e-7]}),
-        '"normal.load": swept twice, in [sweep.together] too',
+        "over.normal.load: swept twice, in [sweep.together] too",
     ),
     "seed twice": (
         sweeping(seeds=3, over={"asperities.seed": [1], "asperities.height_std": [1e-7]}),
@@ -124,15 +124,15 @@ WRONG = {
     ),
     "fractions swept": (
         sweeping(over={"cycle.maximum": [[0.1]]}),
-        "the values of [cycle] are columns",
+        "values of [cycle] are columns",
     ),
     "of unequal length": (
         sweeping(together={"normal.load": [1e-7, 2e-7], "sphere.radius": [1.0]}),
         "together: found [1, 2] values, expected as many of each key",
     ),
     "no seeds": (sweeping(seeds=0), "seeds: found 0, expected how many (1 or more)"),
-    "a truth value": (sweeping(seeds=True), "seeds: found True"),
-    "a seed twice": (sweeping(seeds=[1, 1]), "seeds: one is there twice"),
+    "a truth value": (sweeping(seeds=True), "seeds: found true"),
+    "a seed twice": (sweeping(seeds=[1, 1]), "seeds: found [1, 1], expected how many"),
     "nothing random": (sweeping(seeds=3), "seeds: nothing is random"),
     "draws without seeds": (
         sweeping(draw={"sphere.radius": {"uniform": [1, 2]}}),
@@ -144,30 +144,27 @@ WRONG = {
     ),
     "wrong order": (
         sweeping(seeds=1, draw={"sphere.radius": {"uniform": [2, 1]}}),
-        "expected the lower one first",
+        "uniform = [low, high] with low < high",
     ),
     "a negative mean": (
         sweeping(seeds=1, draw={"sphere.radius": {"lognormal": [-1, 1]}}),
-        "expected positive numbers",
+        "lognormal = [mean > 0, coefficient of variation > 0]",
     ),
     "one number": (
         sweeping(seeds=1, draw={"sphere.radius": {"normal": [1]}}),
-        "expected two numbers",
+        "{'normal': [1]}, expected one of: uniform",
     ),
     "unknown measure": (
         tables(sweep={"measure": ["los"]}),
-        '"los" is not known, did you mean "loss"?',
+        'measure: found "los", expected a number of the stages of this file: did you mean "loss"?',
     ),
-    "no measure": (tables(sweep={"measure": []}), "measure: found [], expected a list of some of"),
-    "a measure twice": (tables(sweep={"measure": ["load", "load"]}), '"load" is named twice'),
-    "no cycle": (tables(cycle=None), "[cycle]: missing table, needed to measure loss"),
+    "no measure": (tables(sweep={"measure": []}), "measure: found [], expected a list of numbers"),
+    "measure missing": (SMALL | {"sweep": {}}, "[sweep] measure: missing"),
+    "a measure twice": (tables(sweep={"measure": ["load"] * 2}), "numbers of summary.json, such"),
+    "no cycle": (tables(cycle=None), 'measure: found "loss", expected a number of the stages'),
     "no friction": (
         {**tables(cycle=None, friction=None), "sweep": {"measure": ["onset"]}},
-        "[friction]: missing table, needed to measure onset",
-    ),
-    "columns of one name": (
-        tables(cycle={"maximum": [0.37, 0.37]}),
-        "two columns would be named loss_0.37",
+        "friction: found none, expected a coefficient",
     ),
     "a wrong scene": (tables(sphere={"radius": -1}), "[sphere] radius: found -1"),
 }
@@ -180,9 +177,33 @@ def test_mistakes(contents: dict[str, Any], said: str) -> None:
     assert all(line.startswith("sweep.toml: ") for line in message.splitlines())
 
 
-def test_all_mistakes_of_the_table_are_told_at_once() -> None:
-    both = mistakes(sweeping(seeds=0, over={"load": [1.0], "normal.load": []}))
-    assert len(both.splitlines()) == 3
+def test_all_mistakes_are_told_at_once() -> None:
+    wrong = sweeping(seeds=0, over={"load": [1.0], "normal.load": []})
+    wrong = {**wrong, "sphere": {"radius": -1}}
+    said = mistakes(wrong).splitlines()
+    assert [line.split(": ")[1] for line in said] == [
+        "[sweep] seeds", "[sweep] over.normal.load", "[sweep] over.load", "[sweep] seeds",
+        "[sphere] radius",
+    ]  # fmt: skip
+
+
+def test_a_new_scene_takes_a_sweep(command: Any, tmp_path: Path) -> None:
+    """It has stages that are not measured: one line names them."""
+    command("new", "a.toml")
+    text = (tmp_path / "a.toml").read_text()
+    over = '"asperities.within" = [0.003, 0.004]\n'
+    (tmp_path / "a.toml").write_text(f'{text}[sweep]\nmeasure = ["loss"]\n[sweep.over]\n{over}')
+    status, out, err = command("sweep", "a.toml", "--workers", "1")
+    assert (status, err) == (0, "")
+    assert "left out    [shear], [history]: nothing measured\n" in out
+    wrong = f"{text}[sweep]\nseeds = 2\n"
+    (tmp_path / "a.toml").write_text(wrong)
+    assert command("sweep", "a.toml").err.splitlines() == [
+        "convexrough: error: a.toml: [sweep] measure: missing, expected a list of numbers of "
+        'summary.json, such as ["load"]',
+        "convexrough: error: a.toml: [sweep] seeds: nothing is random: expected height_std or "
+        "tip_radius_cv in [asperities], or a table [sweep.draw]",
+    ]
 
 
 def test_what_is_wrong_ends_with_status_2(command: Any, tmp_path: Path) -> None:

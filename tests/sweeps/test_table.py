@@ -1,6 +1,7 @@
 """What is in the table of a sweep, and the forms in which it is had."""
 
 import json
+import logging
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
@@ -12,8 +13,6 @@ from scenes import MATERIAL
 from sweep_files import SMALL, numbers, same, sweeping, tables, toml
 
 import convexrough as cr
-from convexrough.sweeps import measures, running
-from convexrough.sweeps.statistics import quantiles
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +25,16 @@ def here() -> Iterator[Executor]:
 ALL = tables(
     shear={"fractions": [0.2, 0.5]},
     cycle={"maximum": [0.37, 0.5], "minimum": [-0.37, 0.1]},
-    sweep={"measure": list(measures.MEASURES)},
+    history={"fractions": [0.5, -0.2, 0.5]},
+    steady={"ellipse": {"load": 3e-7, "load_amplitude": 5e-8, "force_amplitude": 4e-8}},
+    sweep={
+        "measure": [
+            *("contact", "open", "undecided", "load", "approach", "load_error"),
+            *("certificate.convexity_number", "model_error", "crowding", "displacement"),
+            *("loss", "loss_normalised", "loss_over_smooth", "loss_factor", "secant_stiffness"),
+            *("history.loss", "steady.loss"),
+        ]
+    },
 )
 
 
@@ -46,32 +54,43 @@ def test_rows_are_those_of_single_scenes(here: Executor) -> None:
         contact = cr.press(scene, load=rows["normal.load"][i])
         P, proof = 0.5 * contact.load, contact.certificate
         first, second = cr.cycles(contact, P * np.array([0.37, 0.5]), P * np.array([-0.37, 0.1]))
-        onsets = cr.onset_of_sliding(contact) / P
+        loads, forces = cr.elliptic_path(
+            load=3e-7, load_amplitude=5e-8, force_amplitude=4e-8, friction=0.5
+        )
+        closed = cr.steady(scene, loads=loads, forces=forces)
         expected = {
-            "contacts": (contact.status == "contact").sum(),
-            "words_contact": (contact.status == "contact").sum(),
-            "words_open": (contact.status == "open").sum(),
-            "words_undecided": 0,
+            "contact": (contact.status == "contact").sum(),
+            "open": (contact.status == "open").sum(),
+            "undecided": 0,
             "load": contact.load,
             "approach": contact.approach,
-            "certificate_load_error": proof.load_error,
-            "certificate_convexity_number": proof.convexity_number,
-            "certificate_model_error": contact.model_error,
-            "certificate_crowding": contact.crowding,
+            "load_error": proof.load_error,
+            "certificate.convexity_number": proof.convexity_number,
+            "model_error": contact.model_error,
+            "crowding": contact.crowding,
             "displacement_0.2": cr.shear(contact, force=0.2 * P).displacement,
             "displacement_0.5": cr.shear(contact, force=0.5 * P).displacement,
-            "onset_0": np.nanmin(onsets),
-            "onset_0.5": np.nanquantile(onsets, 0.5),
-            "onset_1": np.nanmax(onsets),
             "loss_0.37": first.loss,
             "loss_0.1_0.5": second.loss,
             "loss_normalised_0.37": first.loss_normalised,
             "loss_over_smooth_0.1_0.5": second.loss_normalised / second.smooth_normalised,
             "loss_factor_0.37": first.loss_factor,
-            "stiffness_0.1_0.5": second.secant_stiffness,
+            "secant_stiffness_0.1_0.5": second.secant_stiffness,
+            "history.loss_2": cr.history(contact, forces=P * np.array([0.5, -0.2, 0.5])).losses[2],
+            "steady.loss": closed.loss,
         }
         for name, value in expected.items():
             assert rows[name][i] == value, name
+
+
+def test_onsets_are_quantiles_over_the_loaded_asperities(here: Executor) -> None:
+    contents = sweeping(measure=["onset"], over={"normal.load": [3e-7]})
+    rows = cr.sweep(contents, executor=here).read()
+    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    contact = cr.press(cr.Scene(1.0, asperities, MATERIAL, 0.5, geometry="summit"), load=3e-7)
+    onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)
+    for q in (0.0, 0.25, 0.5, 0.75, 1.0):
+        assert rows[f"onset_{q:g}"][0] == np.nanquantile(onsets, q)
 
 
 def test_scenes_made_in_python(here: Executor) -> None:
@@ -91,13 +110,13 @@ def test_scenes_made_in_python(here: Executor) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [({"measure": ["load"]}, "approach, load: found neither"),
-     ({"measure": ["loss"], "load": 1e-7}, "[cycle]: missing table, needed to measure loss"),
-     ({"load": 1e-7}, "measure: found (), expected a list"),
+     ({"measure": ["loss"], "load": 1e-7}, '[sweep] measure: found "loss"'),
+     ({"load": 1e-7}, "measure: found None, expected a list"),
      ({"load": [1e-7, 2e-7], "measure": ["load"]}, "expected 1 values"),
-     ({"load": 1e-7, "measure": ["loss"], "cycle": [1.2]}, "cycle[0]: found 1.2"),
+     ({"load": 1e-7, "measure": ["loss"], "cycle": [1.2]}, "[cycle] maximum[0]: found 1.2"),
      ({"load": 1e-7, "measure": ["load"], "workers": 0}, "workers: found 0"),
      ({"load": 1e-7, "measure": ["load"], "part": (3, 2)}, "part: found 3/2"),
-     ({"load": 1e-7, "measure": ["load"], "executor": 3}, "executor: found something of int")],
+     ({"load": 1e-7, "measure": ["load"], "executor": 3}, "executor: found type int")],
 )  # fmt: skip
 def test_wrong_arguments(arguments: dict[str, Any], said: str) -> None:
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
@@ -111,11 +130,11 @@ def test_a_scene_that_fails_has_a_row_that_says_why(here: Executor) -> None:
     both["asperities"] = {**both["asperities"], "tip_radius": [0.02] * 61}
     both["sweep"]["over"]["asperities.within"] = [0.0102, 0.0052]  # of 61 and of 19 asperities
     table = cr.sweep(both, executor=here)
-    status, message, contacts = numbers(table, "status", "message", "contacts")
+    status, message, contact = numbers(table, "status", "message", "contact")
     assert status == ["certified", "failed"] * 3
     assert "tip_radius: found shape (61,), expected 19 values" in message[1]
-    assert np.isnan(contacts[1::2]).all()
-    assert not np.isnan(contacts[::2]).any()
+    assert np.isnan(contact[1::2]).all()
+    assert not np.isnan(contact[::2]).any()
 
 
 def test_what_is_not_proved_is_said(here: Executor) -> None:
@@ -123,20 +142,8 @@ def test_what_is_not_proved_is_said(here: Executor) -> None:
     graze["normal"] = {}
     table = cr.sweep(graze, executor=here)
     assert numbers(table, "status", "message") == [
-        ["undecided", "certified"], ["1 undecided", ""]
+        ["undecided", "certified"], ["not certified: 1 of the asperities undecided", ""]
     ]  # fmt: skip
-
-
-def test_parquet_and_npz_hold_the_same(
-    here: Executor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    parquet = cr.sweep(ALL, executor=here, out=tmp_path / "a")
-    monkeypatch.setattr(running, "best_format", lambda: "npz")
-    npz = cr.sweep(ALL, executor=here, out=tmp_path / "b")
-    kinds = [{path.suffix for path in (tmp_path / it / "parts").iterdir()} for it in "ab"]
-    assert kinds == [{".parquet"}, {".npz"}]
-    assert same(parquet, npz)
-    assert same(parquet, cr.sweep(ALL, executor=here))
 
 
 def test_data_frames(here: Executor, tmp_path: Path) -> None:
@@ -156,7 +163,7 @@ def test_data_frames(here: Executor, tmp_path: Path) -> None:
 
 def test_quantiles_are_those_of_each_point(here: Executor, tmp_path: Path) -> None:
     table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
-    found = quantiles(table, ["loss_0.37"], [0.1, 0.5])
+    found = table.quantiles(["loss_0.37"], [0.1, 0.5])
     frame = table.to_dataframe()
     groups = frame.groupby(["asperities.height_std", "normal.load"])["loss_0.37"]
     for i, (point, values) in enumerate(groups):
@@ -187,18 +194,6 @@ def test_other_versions_are_refused(here: Executor, tmp_path: Path) -> None:
         cr.sweep(SMALL, executor=here, out=tmp_path / "a", resume=True)
 
 
-def test_scenes_computed_twice_are_there_once(here: Executor, tmp_path: Path) -> None:
-    table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
-    assert table.folder is not None
-    for numbers_again in (range(1, 4), range(16)):
-        rows = cr.sweep(SMALL, executor=here).read()
-        some = slice(numbers_again.start, numbers_again.stop)
-        columns = {name: values[some] for name, values in rows.items()}
-        table.folder.write(running.Rows(numbers_again.start, columns, 0.0))
-    assert len(table) == 16
-    assert same(table, cr.sweep(SMALL, executor=here))
-
-
 def test_a_folder_of_another_sweep_is_refused(here: Executor, tmp_path: Path) -> None:
     cr.sweep(SMALL, executor=here, out=tmp_path / "a")
     before = sorted(path.name for path in (tmp_path / "a/parts").iterdir())
@@ -216,22 +211,22 @@ def test_a_folder_of_another_sweep_is_refused(here: Executor, tmp_path: Path) ->
     assert sorted(path.name for path in (tmp_path / "a/parts").iterdir()) == before
 
 
-def test_resuming_computes_what_is_missing_or_damaged_only(here: Executor, tmp_path: Path) -> None:
+def test_resuming_computes_what_is_missing_or_damaged_only(
+    here: Executor, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     table = cr.sweep(SMALL, executor=here, out=tmp_path / "a")
     assert table.folder is not None
-    gone, broken, *kept = table.folder.parts()
-    gone.path.unlink()
-    broken.path.write_bytes(b"")
-    (tmp_path / "a/parts" / f".{gone.path.name}.123").write_bytes(b"half")
+    gone, broken, *kept = map(table.folder.file, table.folder.parts())
+    gone.unlink()
+    broken.write_bytes(broken.read_bytes()[:-1] + b"x")
+    (tmp_path / "a/parts" / f".{gone.name}.123.unfinished").write_bytes(b"half")
     (tmp_path / "a/parts/notes.txt").write_text("mine")
-    times = {part.path: part.path.stat().st_mtime_ns for part in kept}
-    said: list[str] = []
-    again = cr.sweep(SMALL, executor=here, out=tmp_path / "a", resume=True, announce=said.append)
-    missing = gone.stop - gone.first + broken.stop - broken.first
-    assert said[0] == (
-        f"found {16 - missing} scenes, 1 damaged parts removed, 1 unfinished files removed"
-    )
-    assert said[-1].startswith(f"{missing} of {missing} scenes, ")
+    times = {part: part.stat().st_mtime_ns for part in kept}
+    with caplog.at_level(logging.INFO, "convexrough"):
+        again = cr.sweep(SMALL, executor=here, out=tmp_path / "a", resume=True)
+    said = [news for news in caplog.messages if "scenes" in news]
+    assert said[0] == "found 14 scenes, 1 damaged parts removed, 1 unfinished files removed"
+    assert said[-1].startswith("2 of 2 scenes, ")
     assert {path: path.stat().st_mtime_ns for path in times} == times
     assert not list((tmp_path / "a/parts").glob(".*"))
     assert (tmp_path / "a/parts/notes.txt").read_text() == "mine"
@@ -271,8 +266,8 @@ def test_failed_scenes_are_named_and_change_the_status(command: Any, tmp_path: P
 def test_a_contact_with_nothing_loaded_has_numbers_all_the_same(here: Executor) -> None:
     nothing = tables(normal=None)
     nothing["normal"] = {"approach": -1e-6}
-    nothing["sweep"] = {"measure": ["contacts", "loss", "onset", "loss_factor"]}
+    nothing["sweep"] = {"measure": ["contact", "loss", "onset", "loss_factor"]}
     table = cr.sweep(nothing, executor=here)
     rows = {name: values[0] for name, values in table.read().items()}
-    assert (rows["status"], rows["contacts"], rows["loss_0.37"]) == ("certified", 0.0, 0.0)
+    assert (rows["status"], rows["contact"], rows["loss_0.37"]) == ("certified", 0.0, 0.0)
     assert np.isnan(rows["onset_0.5"])

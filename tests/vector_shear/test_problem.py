@@ -20,7 +20,7 @@ def duality_gap(problem: VectorProblem, state: VectorState) -> float:
     return certify_vectors(problem, state, Ball.exact(state.total)).excess
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.floats(0, 0.5))
 def test_the_shift_makes_the_kernel_semidefinite(seed: int, count: int, nu: float) -> None:
     """C + diag(c) >= 0 with the c of the neighbours' distances, over random layouts."""

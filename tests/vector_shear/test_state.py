@@ -59,7 +59,7 @@ def test_without_poissons_ratio_it_is_ciavarella_and_jaeger(name: str, fraction:
 def test_the_error_of_the_papers_assumption(
     nu: float, fraction: float, forces: float, transverse: float, travel: float, sliding: int
 ) -> None:
-    """The numbers of docs/theory/friction.md, for the paper's scene."""
+    """The numbers of docs/theory/vector-friction.md, for the paper's scene."""
     contact, state = pressed("paper", nu=nu), found("paper", nu, fraction)
     assert state.disagreement == pytest.approx(forces, abs=6e-5)
     largest = FRICTION * contact.loads.max()
@@ -179,7 +179,7 @@ def test_small_forces_keep_their_digits() -> None:
         assert_allclose(state.displacement, X, rtol=1e-11)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     random_scenes(crowding=0.9),
     st.one_of(st.floats(1e-6, 0.999), st.floats(-12, -2).map(lambda x: 1 - 10**x)),
@@ -235,7 +235,7 @@ def test_bad_input() -> None:
     contact = pressed("paper")
     limit = FRICTION * contact.load
     for force in (1.01 * limit, -1.01 * limit, (limit, 0.2 * limit)):
-        with pytest.raises(cr.InputError, match=r"force: found .*gross sliding, 0\.0.* beyond it"):
+        with pytest.raises(cr.InputError, match=r"force: found .*\(1\.0\d+ f P: gross sliding\)"):
             shear_vector(contact, force=force)
     for force in (float("nan"), (0.0, float("inf")), "much", None):
         with pytest.raises(cr.InputError, match="force"):

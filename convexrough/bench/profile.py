@@ -1,0 +1,125 @@
+"""How often each solver is right on the hard cases, and how fast: a performance profile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from convexrough.arrays import Array, frozen
+from convexrough.compare import compare, every_solver
+from convexrough.frames import Variables
+from convexrough.gallery.cases import case, names
+from convexrough.plots.notebook import Figure
+from convexrough.plots.style import SINGLE, TICK, label
+from convexrough.progress import Announce
+from convexrough.record import Table
+from convexrough.solvers import Newton, Solver
+
+#: Times over the least at which `rows` looks.
+FACTORS = (1, 2, 5, 10, 100)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Profile(Table):
+    """Times of k solvers on m hard cases, after Dolan and More (Math. Program. 91 (2002) 201).
+
+    solvers : (k,) names;  cases : (m,) names
+    seconds : (k, m) of right answers, infinite where a solver gave none
+    outcomes : (k, m) "right", "wrong", "refused" or "failed"
+    """
+
+    solvers: tuple[str, ...]
+    cases: tuple[str, ...]
+    seconds: Array
+    outcomes: tuple[tuple[str, ...], ...]
+
+    @property
+    def ratios(self) -> Array:
+        """(k, m) seconds over those of the fastest right answer to the case."""
+        least = self.seconds.min(axis=0)
+        none = np.full_like(self.seconds, np.inf)
+        ratios: Array = np.divide(self.seconds, least, where=np.isfinite(least), out=none)
+        return ratios
+
+    def part(self, factor: float) -> Array:
+        """(k,) part of the cases answered rightly within this factor of the least time."""
+        part: Array = (self.ratios <= factor).mean(axis=1)
+        return part
+
+    def rows(self) -> list[list[str]]:
+        """A heading, and a line for each solver: outcomes, and parts within FACTORS."""
+        words = ("right", "wrong", "refused", "failed")
+        parts = np.array([self.part(factor) for factor in FACTORS]).T
+        heading = ["solver", *words, *(f"within {factor}x" for factor in FACTORS)]
+        return [heading] + [
+            [solver, *(str(said.count(word)) for word in words), *(f"{p:.0%}" for p in row)]
+            for solver, said, row in zip(self.solvers, self.outcomes, parts, strict=True)
+        ]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Part of the cases against time over the least; axes in, axes out."""
+        if axes is None:
+            axes = Figure(figsize=(SINGLE, 3.8), layout="constrained").subplots()
+        finite = self.ratios[np.isfinite(self.ratios)]
+        factors = np.unique(np.append(finite, 2.0 * finite.max(initial=1.0)))
+        parts = np.array([self.part(factor) for factor in factors])
+        axes.step(factors, parts, where="post", label=self.solvers)
+        axes.set(xscale="log", ylim=(0.0, 1.02))
+        axes.legend(fontsize=TICK - 2, ncols=2, frameon=False,
+                    loc="upper center", bbox_to_anchor=(0.5, -0.2))  # fmt: skip
+        label(axes, "time over that of the fastest", "part of the cases")
+        return axes
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "cases", f"{len(self.cases):,}"
+        for solver, *cells in self.rows()[1:]:
+            yield solver, f"{cells[0]} right, {cells[-4]} within 2x of the fastest"
+
+    def _variables(self) -> Variables:
+        both = ("solver", "case")
+        return {
+            "solver": (("solver",), np.array(self.solvers)),
+            "case": (("case",), np.array(self.cases)),
+            "seconds": (both, self.seconds),
+            "outcome": (both, np.array(self.outcomes)),
+        }
+
+
+def profile_of(
+    solvers: Sequence[Solver] | None = None,
+    *,
+    cases: Sequence[str] = (),
+    within: float = 1e-3,
+    announce: Announce | None = None,
+) -> Profile:
+    """Time solvers on the hard cases, once each, and judge what they answer.
+
+    solvers : settings objects; the default is every one of `compare`. Newton's method is the first
+    cases   : names of cases or families; all, if none is given
+    within  : how far loads may be from the answer, over the largest, to be right
+    announce : told the name of each case before it starts
+    """
+    rivals = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
+    wanted = names(*cases)
+    seconds = np.full((len(rivals), len(wanted)), np.inf)
+    outcomes = [[""] * len(wanted) for _ in rivals]
+    for column, name in enumerate(wanted):
+        if announce is not None:
+            announce(name)
+        hard = case(name)
+        entries = compare(hard.scene, **hard.control, solvers=rivals).entries
+        for row, entry in enumerate(entries):
+            outcomes[row][column] = entry.outcome
+            if (found := entry.contact) is not None:
+                near = hard.judge(found.loads).error <= within
+                outcomes[row][column] = "right" if near else "wrong"
+                seconds[row, column] = found.seconds if near else np.inf
+    return Profile(
+        solvers=tuple(each.name for each in rivals),
+        cases=wanted,
+        seconds=frozen(seconds),
+        outcomes=tuple(map(tuple, outcomes)),
+    )

@@ -1,0 +1,60 @@
+"""`export`: a scene as programs for other solvers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from convexrough.cli.options import PATH, json_option
+from convexrough.cli.speech import DONE, blamed_on, echo, progress, say_aside, written
+
+
+@click.command()
+@click.argument("scene", type=PATH)
+@click.option("--format", "formats", type=click.Choice(["cbf", "json", "mps", "npz"]),
+              multiple=True, help="Only this; may be repeated.")  # fmt: skip
+@click.option("--bristles", metavar="M", type=click.IntRange(1), default=64, show_default=True,
+              help="Of each asperity, in the quadratic program.")  # fmt: skip
+@click.option("--out", metavar="DIR", type=PATH, help="Folder for programs.")
+@click.option("--force", is_flag=True, help="Replace results in a folder in use.")
+@json_option
+def export(
+    scene: Path, formats: tuple[str, ...], bristles: int, out: Path | None, force: bool,
+    as_json: bool,
+) -> int:  # fmt: skip
+    """Write a scene as programs for other solvers: cones, their dual, and rows of bristles.
+
+    cbf, json (of Clarabel) and npz have the cone program, which is the contact law itself, and its
+    dual, which bounds the energy; mps and npz (of qpsolvers) the quadratic program of bristles.
+    index.json says what leads back from a solution, and what the least objective is.
+
+    Programs go to the folder SCENE-programs unless --out names another.
+    """
+    from convexrough.programs.folder import FORMATS, write_programs
+    from convexrough.run.results import results_folder
+    from convexrough.run.scene_file import read_scene
+
+    file = read_scene(scene)
+    folder = out or Path(f"{scene.stem}-programs")
+    control: dict[str, Any] = {"approach": file.approach, "load": file.load}
+    stating = progress(f"stating {len(file.scene):,} asperities")
+    with results_folder(folder, force=force) as new, blamed_on(scene), stating:
+        files, index = write_programs(
+            new,
+            scene.stem,
+            file.scene,
+            formats=formats or tuple(FORMATS),
+            bristles=bristles,
+            **control,
+        )
+    lines = [
+        f"{name}: {about['form']}, {about['variables']:,} variables, least objective "
+        f"{about['objective']:.12g}"
+        for name, about in index["programs"].items()
+    ]
+    echo(index, [*lines, *written(folder, files)], as_json)
+    for name, reason in index["left_out"].items():
+        say_aside("warning", f"{name}: left out: {reason}")
+    return DONE

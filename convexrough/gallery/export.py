@@ -1,0 +1,61 @@
+"""The gallery as a folder: an index for people and for programs, and the programs of each case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from convexrough import gallery
+from convexrough.gallery.pack import packed
+from convexrough.progress import tell
+from convexrough.tabular.columns import markdown
+from convexrough.version import __version__
+from convexrough.whole import to_json
+
+HEADING = ["case", "what is hard", "files", "asperities", "touching", "variables", "condition"]
+HEADING += ["spread", "proved"]
+
+INTRODUCTION = """# Hard contact problems, with answers
+
+Each row is a contact of a sphere with asperities as programs for solvers. Loads are the first
+variables times `force_unit`, of the asperities that `index.json` names; it has the scenes, the
+answers to 50 digits, and why a program was left out.
+
+- `.cones.json`: `clarabel.load_from_file`; the contact law itself, no approximation
+- `.cbf`: the same with a linear objective, for readers of the Conic Benchmark Format
+- `.bristles.npz`: `qpsolvers.Problem.load`; its loads are off by up to about `off` of the largest
+
+condition: of the Hessian at the answer, scaled to a diagonal of 1. spread: smallest over largest
+load. proved: how far the proof reaches that the answer is the only one.
+"""
+
+
+def exported(names: Iterable[str]) -> Iterator[tuple[str, bytes]]:
+    """The files of these cases by their names, and last index.md and index.json."""
+    index: dict[str, Any] = {}
+    for name in names:
+        tell(name)
+        about, files = packed(gallery.case(name))
+        yield from files.items()
+        index[name] = about
+    document = {"schema": 1, "version": __version__, "cases": index}
+    table = [HEADING, *(_row(name, about) for name, about in index.items())]
+    yield "index.md", "\n".join([INTRODUCTION, *markdown(table, left=3), ""]).encode()
+    yield "index.json", f"{to_json(document)}\n".encode()
+
+
+def _row(name: str, about: dict[str, Any]) -> list[str]:
+    programs = about["programs"]
+    condition = about["condition"]
+    variables = dict.fromkeys(str(each["variables"]) for each in programs.values())
+    return [
+        name,
+        about["why"],
+        ", ".join(file.removeprefix(f"{name}.") for file in programs) or "none",
+        str(about["asperities"]),
+        str(about["touching"]),
+        ", ".join(variables) or "-",
+        "not convex" if condition is None else f"{condition:.3g}",
+        f"{about['spread']:.1g}",
+        about["certificate"]["scope"],
+    ]

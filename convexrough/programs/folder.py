@@ -1,0 +1,76 @@
+"""All programs of a scene as files in one folder, with an index."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from convexrough.errors import ConvexroughError, InputError
+from convexrough.normal.problem import NormalProblem
+from convexrough.programs.program import FORMS, WRITERS, stated
+from convexrough.scene.scene import Scene
+from convexrough.solvers import Newton
+from convexrough.version import __version__
+from convexrough.whole import replacing
+
+#: Endings of the files, and what reads them.
+FORMATS = {
+    "cbf": "cones and their dual in the Conic Benchmark Format: MOSEK, PICOS, SCIP-SDP, ...",
+    "json": "the same for clarabel.load_from_file",
+    "mps": "rows of bristles, QUADOBJ: HiGHS (which has no second-order cones), Gurobi, CPLEX, ...",
+    "npz": "all: sparse matrices of the cones; bristles for qpsolvers.Problem.load, dense",
+}
+
+
+def write_programs(
+    folder: Path,
+    name: str,
+    scene: Scene,
+    *,
+    approach: float | None = None,
+    load: float | None = None,
+    formats: Collection[str] = tuple(FORMATS),
+    bristles: int = 64,
+) -> tuple[list[Path], dict[str, Any]]:
+    """Write name.form.ending for each form and format, and last index.json; return both.
+
+    A program is left out, with the reason in the index, where it is not the contact law. Raises
+    InputError with all reasons where nothing is left, and FileError.
+    """
+    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
+    own = Newton().solve(problem).loads
+    about: dict[str, Any] = {}
+    left_out: dict[str, str] = {}
+    written: list[Path] = []
+    for form in FORMS:
+        endings = [ending for ending in WRITERS[form] if ending in formats]
+        try:
+            program = stated(problem, own, form, bristles) if endings else None
+        except ConvexroughError as error:
+            left_out[form] = str(error)
+            continue
+        for ending in endings:
+            assert program is not None
+            path = folder / f"{name}.{form}.{ending}"
+            try:
+                program.save(path)
+            except InputError as error:
+                left_out[path.name] = str(error)
+                continue
+            written.append(path)
+            about[path.name] = program.about()
+    if not written:
+        raise InputError("programs", found="; ".join(left_out.values()), expected="one at least")
+    index = {
+        "schema": 1,
+        "version": __version__,
+        "prescribed": {"approach": approach, "load": load},
+        "asperities": len(scene),
+        "programs": about,
+        "left_out": left_out,
+    }
+    with replacing(path := folder / "index.json") as temporary:
+        temporary.write_text(json.dumps(index, indent=2) + "\n", encoding="utf-8")
+    return [*written, path], index

@@ -1,0 +1,173 @@
+"""Programs as files of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF, and MPS.
+
+CBF is written here: of the Python packages that write it, MOSEK and COPT are commercial, and that
+of PICOS (2.6) fails on every problem. What is written is read back by each library in the tests.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from convexrough import checks
+from convexrough.arrays import Array
+from convexrough.solvers.programs import ConeProgram, QuadraticProgram
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+
+
+def qpsolvers_npz(program: QuadraticProgram) -> bytes:
+    """What qpsolvers.Problem.load reads: min x'Px/2 + q'x, G x <= h, A x = b; dense, compressed.
+
+    Rows with two equal sides are the equations; the others have a lower side alone.
+    """
+    width, height = len(program.linear), len(program.lower)
+    checks.fits_in_memory("asperities", 1, 24.0 * width * (width + height))
+    upper = program.quadratic.toarray()
+    rows = program.constraints.toarray()
+    equal = program.lower == program.upper
+    none = np.array(None)  # as Problem.save writes what is not there
+    file = io.BytesIO()
+    np.savez_compressed(
+        file,
+        P=upper + np.triu(upper, 1).T,
+        q=program.linear,
+        G=-rows[~equal],
+        h=-program.lower[~equal],
+        A=rows[equal],
+        b=program.lower[equal],
+        lb=none,
+        ub=none,
+    )
+    return file.getvalue()
+
+
+def clarabel_json(program: ConeProgram) -> bytes:
+    """What clarabel.load_from_file reads; its Python package (0.11) has nothing that writes it."""
+    data = {
+        "P": _columns(program.quadratic),
+        "q": program.linear.tolist(),
+        "A": _columns(program.constraints),
+        "b": program.constant.tolist(),
+        "cones": [
+            {"ZeroConeT": program.equalities},
+            *[{"SecondOrderConeT": 3}] * program.cones,
+        ],
+    }
+    return json.dumps(data).encode()
+
+
+def _columns(matrix: csc_matrix) -> dict[str, Any]:
+    matrix.sort_indices()
+    return {
+        "m": matrix.shape[0],
+        "n": matrix.shape[1],
+        "colptr": matrix.indptr.tolist(),
+        "rowval": matrix.indices.tolist(),
+        "nzval": matrix.data.tolist(),
+    }
+
+
+def cone_npz(program: ConeProgram) -> bytes:
+    """The parts of a cone program, each sparse matrix by columns as scipy's `csc_array` takes it.
+
+    P_data, P_indices, P_indptr (upper triangle); likewise A; q, b; and `equalities`.
+    """
+    parts: dict[str, Any] = {}
+    for name, matrix in (("P", program.quadratic), ("A", program.constraints)):
+        for part in ("data", "indices", "indptr"):
+            parts[f"{name}_{part}"] = getattr(matrix, part)
+    file = io.BytesIO()
+    np.savez_compressed(
+        file, **parts, q=program.linear, b=program.constant, equalities=program.equalities
+    )
+    return file.getvalue()
+
+
+def mps(program: QuadraticProgram) -> bytes:
+    """Free MPS with the section QUADOBJ, as HiGHS, Gurobi, CPLEX and others read it.
+
+    Rows with two equal sides are equations; the others have a lower side alone. No variable has
+    bounds of its own.
+    """
+    equal = program.lower == program.upper
+    quadratic, constraints = program.quadratic.tocoo(), program.constraints.tocsc()
+    lines = ["NAME contact", "ROWS", " N energy"]
+    lines += [f" {'E' if each else 'G'} r{i}" for i, each in enumerate(equal)]
+    lines.append("COLUMNS")
+    for j, cost in enumerate(program.linear.tolist()):
+        lines.append(f" x{j} energy {cost!r}")
+        where = slice(*constraints.indptr[j : j + 2])
+        entries = zip(constraints.indices[where], constraints.data[where].tolist(), strict=True)
+        lines += [f" x{j} r{i} {entry!r}" for i, entry in entries]
+    lines.append("RHS")
+    lines += [f" rhs r{i} {side!r}" for i, side in enumerate(program.lower.tolist()) if side]
+    lines.append("BOUNDS")
+    lines += [f" FR bounds x{j}" for j in range(len(program.linear))]
+    lines.append("QUADOBJ")
+    lines += [f" x{i} x{j} {entry!r}" for i, j, entry in _entries(quadratic)]
+    return "\n".join([*lines, "ENDATA", ""]).encode()
+
+
+def cbf(program: ConeProgram) -> bytes:
+    """The program in the Conic Benchmark Format, version 1, with a linear objective.
+
+    x'Px/2 is a variable t of its own, the last one, with P = F'F and
+
+        t >= |Fx|^2 / 2    as    t + 1/2 >= |(t - 1/2, Fx)|,
+
+    so the objective is q'x + t. Constraints are cones that hold an affine function of (x, t).
+    """
+    width = len(program.linear)
+    factor = _factor(program.quadratic)
+    quadratic = len(factor) + 2
+    first = len(program.constant)  # row of the cone of t
+    entries = [
+        *_entries(-program.constraints.tocoo()),
+        (first, width, 1.0),
+        (first + 1, width, 1.0),
+    ]
+    entries += [
+        (first + 2 + i, int(j), float(factor[i, j]))
+        for i in range(len(factor))
+        for j in np.flatnonzero(factor[i])
+    ]
+    constant = [*program.constant.tolist(), 0.5, -0.5]
+    cones = [("L=", program.equalities), *[("Q", 3)] * program.cones, ("Q", quadratic)]
+    costs = [*enumerate(program.linear.tolist()), (width, 1.0)]
+    blocks = [
+        ["VER", "1"],
+        ["OBJSENSE", "MIN"],
+        ["VAR", f"{width + 1} 1", f"F {width + 1}"],
+        ["CON", f"{first + quadratic} {len(cones)}", *(f"{cone} {size}" for cone, size in cones)],
+        ["OBJACOORD", *_counted(costs)],
+        ["ACOORD", *_counted(entries)],
+        ["BCOORD", *_counted(list(enumerate(constant)))],
+    ]
+    return "\n\n".join("\n".join(block) for block in blocks).encode() + b"\n"
+
+
+def _factor(quadratic: csc_matrix) -> Array:
+    """F with F'F = P, by eigenvalues: P may have some that are 0 but for rounding."""
+    upper = quadratic.toarray()
+    used = np.flatnonzero(upper.diagonal())
+    small = upper[np.ix_(used, used)]
+    values, vectors = np.linalg.eigh(small + np.triu(small, 1).T)
+    factor = np.zeros((len(used), quadratic.shape[0]))
+    factor[:, used] = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    return factor
+
+
+def _entries(matrix: Any) -> Iterator[tuple[int, int, float]]:
+    yield from zip(matrix.row.tolist(), matrix.col.tolist(), matrix.data.tolist(), strict=True)
+
+
+def _counted(entries: list[tuple[Any, ...]]) -> list[str]:
+    """How many are not 0, and those, a line each; repr of each number reads back the same."""
+    lines = [" ".join(map(repr, entry)) for entry in entries if entry[-1] != 0]
+    return [str(len(lines)), *lines]

@@ -1,0 +1,222 @@
+"""From a scene to its programs: the cones, their dual, and the rows of bristles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.errors import InputError
+from convexrough.normal.problem import NormalProblem
+from convexrough.programs.formats import cbf, clarabel_json, cone_npz, mps, qpsolvers_npz
+from convexrough.record import Record
+from convexrough.scene.scene import Scene
+from convexrough.solvers import Newton, TooDenseError
+from convexrough.solvers.bristles import LARGEST_S, BristleProgram
+from convexrough.solvers.cone_boxes import Boxes
+from convexrough.solvers.conic import LiftedProgram
+from convexrough.solvers.programs import ConeProgram, QuadraticProgram
+from convexrough.whole import replacing
+
+Form: TypeAlias = Literal["cones", "dual", "bristles"]
+FORMS: tuple[Form, ...] = get_args(Form)
+
+#: What writes each form, by the ending of its files.
+_OF_CONES: dict[str, Callable[[Any], bytes]] = {"cbf": cbf, "json": clarabel_json, "npz": cone_npz}
+WRITERS: dict[Form, dict[str, Callable[[Any], bytes]]] = {
+    "cones": _OF_CONES,
+    "dual": _OF_CONES,
+    "bristles": {"npz": qpsolvers_npz, "mps": mps},
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Program(Record):
+    """A contact as a program in standard form, in the contact's own units.
+
+    form        : "cones", "dual" or "bristles"
+    what        : the same in words
+    data        : P, q, A and the rest: a ConeProgram or a QuadraticProgram
+    asperities  : (m,) that the program is about, by their indices; all others carry nothing
+    force_unit  : [force] of the loads
+    energy_unit : [force length] of the objective
+    objective   : its least value, in energy_unit; of the dual the greatest bound, times -1
+    constant    : what is added to the objective for the energy, in energy_unit: nothing under
+        approach control, and the work of the level that the program counts from under load control
+    off         : about how far an exact solution is from the contact's loads, over the largest
+    """
+
+    form: Form
+    what: str
+    data: ConeProgram | QuadraticProgram
+    asperities: Indices
+    count: int
+    force_unit: float
+    energy_unit: float
+    objective: float
+    constant: float
+    off: float
+
+    def loads(self, values: ArrayLike) -> Array:
+        """(n,) [force] of all asperities of the scene, from a solver's numbers.
+
+        values : its x; of the dual the multipliers of the equations, in their order. Their sign is
+            that of the solver's convention, and is not looked at.
+        """
+        m = len(self.asperities)
+        given = np.asarray(values, dtype=np.float64).ravel()
+        if len(given) < m:
+            raise InputError("values", found=f"{len(given)} numbers", expected=f"at least {m}")
+        own = np.abs(given[:m]) if self.form == "dual" else np.maximum(given[:m], 0.0)
+        loads = np.zeros(self.count)
+        loads[self.asperities] = self.force_unit * own
+        return loads
+
+    def energy(self, objective: float) -> float:
+        """[force length] of a solver's objective: of the dual, a lower bound on the energy."""
+        sign = -1.0 if self.form == "dual" else 1.0
+        return self.energy_unit * (sign * objective + self.constant)
+
+    def save(self, path: Path | str) -> None:
+        """Write a file for other libraries; its ending says which.
+
+        cones, dual : .cbf, .json (of Clarabel), .npz (sparse matrices by columns)
+        bristles    : .mps, .npz (of qpsolvers; dense)
+        """
+        path, valid = Path(path), WRITERS[self.form]
+        if (ending := path.suffix.removeprefix(".")) not in valid:
+            expected = f"one of .{', .'.join(valid)} for the form {self.form}"
+            raise InputError(str(path), found=f"the ending {path.suffix!r}", expected=expected)
+        content = valid[ending](self.data)
+        with replacing(path) as temporary:
+            temporary.write_bytes(content)
+
+    def about(self) -> dict[str, Any]:
+        """What to know of it beside its numbers, for an index of files."""
+        data = self.data
+        return {
+            "form": self.what,
+            "variables": len(data.linear),
+            "constraints": data.constraints.shape[0],
+            "nonzeros": int(data.quadratic.nnz + data.constraints.nnz),
+            "force_unit": self.force_unit,
+            "energy_unit": self.energy_unit,
+            "asperities": self.asperities.tolist(),
+            "objective": self.objective,
+            "constant": self.constant,
+            "off": self.off,
+        }
+
+
+def program(
+    scene: Scene,
+    form: Form = "cones",
+    *,
+    approach: float | None = None,
+    load: float | None = None,
+    bristles: int = 64,
+) -> Program:
+    """A scene as a program in standard form, with what leads back from its solution.
+
+    form     : "cones" (the contact law itself), "dual" (a bound on its energy) or "bristles" (a
+        quadratic program, off by about 0.4 / bristles^2 of the largest load)
+    approach [length] or load [force] : what is prescribed, exactly one
+
+    >>> program = cr.program(scene, approach=5e-5)
+    >>> program.data.cones
+    148
+
+    Raises TooDenseError where the solution lies outside the boxes in which the program is exact,
+    and SolverError where there is none to compare with.
+    """
+    checks.instance("scene", scene, Scene)
+    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
+    return stated(problem, Newton().solve(problem).loads, form, bristles)
+
+
+def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Program:
+    """The program of a problem whose loads are known, (n,) in its own units."""
+    if form not in FORMS:
+        expected = f"a form of program; {checks.nearest(str(form), FORMS)}"
+        raise InputError("form", found=repr(form), expected=expected)
+    level = problem.ceiling if problem.load is not None else 0.0
+    make = partial(
+        Program,
+        form=form,
+        count=len(problem.scene),
+        force_unit=problem.units.force,
+        energy_unit=problem.units.force * problem.units.length,
+        constant=level * (problem.load or 0.0),
+    )
+    if form == "bristles":
+        rows = BristleProgram.accept(problem, bristles, form)
+        if len(beyond := np.flatnonzero(rows.cut & (own >= rows.box))):
+            ratios = problem.shells[beyond] / problem.stiffness(own[beyond], beyond)
+            raise TooDenseError(form, problem.candidates[beyond], ratios, LARGEST_S)
+        return make(
+            what=f"quadratic, {bristles} bristles an asperity",
+            data=rows.apply(),
+            asperities=frozen(np.array(problem.candidates)),
+            constant=0.0,
+            objective=problem.energy(own, problem.influence.apply(own)),
+            off=_bristle_error(rows, own),
+        )
+    boxes = _boxes(problem, own)
+    cones = LiftedProgram.accept(problem, boxes).apply()
+    kind = f"second-order cones, {5 if boxes.five else 4} an asperity"
+    least = _objective(cones, boxes, own)
+    dual = form == "dual"
+    return make(
+        what=f"the dual of {kind}" if dual else kind,
+        data=cones.dual() if dual else cones,
+        asperities=frozen(problem.candidates[boxes.members]),
+        objective=-least if dual else least,
+        off=0.0,
+    )
+
+
+def _boxes(problem: NormalProblem, own: Array) -> Boxes:
+    """Four cones an asperity where the solution is in their boxes, else five."""
+    for five in (False, True):
+        boxes = Boxes.choose(problem, five=five)
+        if not (beyond := boxes.cut & (own[boxes.members] >= boxes.loads)).any():
+            return boxes
+    theta = problem.shells / problem.stiffness(own)
+    raise boxes.too_dense(problem, "cones", np.where(beyond, theta[boxes.members], 0.0))
+
+
+def _objective(program: ConeProgram, boxes: Boxes, own: Array) -> float:
+    """The least objective: that of the powers of the solution's contact radii."""
+    p = own[boxes.members]
+    t = np.cbrt(p / boxes.loads)
+    powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]
+    x = np.concatenate((p, *powers[0 if boxes.five else 1 :]))
+    upper = program.quadratic
+    square = x @ (upper @ x) - 0.5 * x @ (upper.diagonal() * x)
+    return float(square + program.linear @ x)
+
+
+def _bristle_error(rows: BristleProgram, own: Array) -> float:
+    """About how far an exact solution is from the contact's, over the largest load.
+
+    A row of m bristles is off by 0.375 B / m^2 at worst, B the load of its box; the others answer
+    to that, by no more than one over the least eigenvalue of the scaled Hessian.
+    """
+    row = 0.375 * float(rows.box.max() / own.max()) / rows.m**2
+    return row / float(scaled_eigenvalues(rows.problem, own)[0])
+
+
+def scaled_eigenvalues(problem: NormalProblem, own: Array) -> Array:
+    """Of the energy's Hessian over the touching ones, scaled to a diagonal of 1; least first."""
+    touching = np.flatnonzero(own)
+    root = np.sqrt(1.0 / problem.stiffness(own[touching], touching))
+    scaled = problem.influence.matrix[np.ix_(touching, touching)] * root * root[:, None]
+    np.fill_diagonal(scaled, 1.0)
+    return np.asarray(np.linalg.eigvalsh(scaled))

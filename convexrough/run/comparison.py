@@ -1,0 +1,83 @@
+"""What `compare` says: for programs, and in aligned lines for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from convexrough.compare import Comparison, Entry
+from convexrough.run.stage import Summary, unit_of
+from convexrough.run.stages.normal import COUNTS
+from convexrough.run.summary import headed
+from convexrough.tabular.columns import aligned, bound
+from convexrough.tabular.units import UnitNames
+
+HEADING = ["solver", "disagreement", "load error", "duality gap", "certificate", "words",
+           "iterations", "seconds", "MB"]  # fmt: skip
+
+
+def comparison_summary(comparison: Comparison) -> Summary:
+    """The summary of a comparison, in the scene's units."""
+    rows = [_entry(entry) for entry in comparison.entries]
+    return headed(compare=rows, contradictions=list(comparison.contradictions))
+
+
+def _entry(entry: Entry) -> Summary:
+    said = ("solver", "outcome", "message", "disagreement", "different_words", "memory")
+    row: Summary = {name: getattr(entry, name) for name in said}
+    if (contact := entry.contact) is not None:
+        proof = contact.certificate
+        row |= {word: int((contact.status == word).sum()) for word in COUNTS}
+        row |= {"approach": contact.approach, "load": contact.load}
+        row |= {"largest_load": float(contact.loads.max())}
+        row |= {name: getattr(proof, name) for name in ("scope", "load_error", "duality_gap")}
+        names = ("iterations", "seconds", "influence")
+        row |= {name: getattr(contact, name) for name in names}
+    return row
+
+
+def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
+    """Aligned lines for people."""
+    rows = [_cells(row) for row in summary["compare"]]
+    first = summary["compare"][0]
+    lines, work = [], unit_of("duality_gap", units)
+    if first["outcome"] == "answered":
+        words = ", ".join(f"{first[word]} {word}" for word in COUNTS if first[word])
+        lines.append(f"asperities         {words}")
+    lines += [
+        f"disagreement       with {first['solver']}, over the largest load, as is the load error",
+        f"duality gap        {f'in {work}, ' if work else ''}from the loads alone",
+        "MB                 by which the memory of the process rose while the solver worked",
+        "",
+        *aligned([HEADING, *rows], left=1),
+    ]
+    for row in summary["compare"]:
+        lines += ["", row["message"]] if row["message"] else []
+    return lines
+
+
+def _cells(row: Summary) -> list[str]:
+    if row["outcome"] != "answered":
+        return [row["solver"], row["outcome"], *["-"] * (len(HEADING) - 2)]
+    error, largest, memory = row["load_error"], row["largest_load"], row["memory"]
+    relative = error / largest if largest else (math.inf if error else 0.0)
+    different, undecided = row["different_words"], row["undecided"]
+    said = {None: "-", 0: "same"}.get(different, f"{different} differ")
+    words = f"{said}, {undecided} undecided" if undecided else said
+    return [row["solver"], _two(row["disagreement"]), bound(relative), _two(row["duality_gap"]),
+            row["scope"], words, str(row["iterations"]), _two(row["seconds"]),
+            "-" if memory is None else f"{memory / 1e6:.1f}"]  # fmt: skip
+
+
+def comparison_warnings(summary: Summary) -> Iterator[str]:
+    """What a user must not overlook."""
+    yield from (f"contradiction: {each}" for each in summary["contradictions"])
+    rows = summary["compare"]
+    yield from (f"{it['solver']}: {it['outcome']}" for it in rows if it["outcome"] != "answered")
+    answered = [row for row in rows if row["outcome"] == "answered"]
+    if not any(row["scope"] != "none" and not row["undecided"] for row in answered):
+        yield "not certified: no answer has a proved word for every asperity"
+
+
+def _two(value: float) -> str:
+    return f"{value:.2g}" if math.isfinite(value) else "-"

@@ -1,0 +1,167 @@
+"""[cycle]: steady cycles between two shear forces, what they cost, and their loops."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from convexrough.contact import Contact
+from convexrough.errors import InputError
+from convexrough.friction.cycle import Loop, cycles, loops
+from convexrough.run.stage import Columns, Result, Stage, Summary, limit, numbers_of
+from convexrough.run.values import Fractions, Mistake, Whole, expected
+from convexrough.scene.rings import one_of_each_ring
+from convexrough.tabular.units import UnitNames
+
+#: Asperities whose loops are kept, at most, unless they are named.
+MOST_LOOPS = 12
+
+#: Points of a loop, at most and at least, and touching asperities times points that are affordable:
+#: each takes a friction state of all of them.
+MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, 600_000
+
+Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
+Chosen = Annotated[
+    Literal["all"] | list[Whole], expected('"all" or a list of indices of asperities, from 0')
+]
+
+#: Numbers that a cycle has by these names.
+OWN = ("force_amplitude", "displacement_amplitude", "displacement_error", "secant_stiffness",
+       "loss_factor", "loss", "loss_error", "loss_normalised", "smooth_normalised",
+       "balance_defect", "sliding", "partial", "undecided")  # fmt: skip
+
+
+class Cycle(Stage):
+    """Maxima and minima of steady cycles, as fractions of f P.
+
+    minimum     : as many; default: the negatives of the maxima
+    loop_points : of each loop, about; default: what is affordable
+    loop_asperities : whose loops to keep: indices or "all"; default: one at each distance from the
+        axis, of at most 12 distances
+    """
+
+    name = "cycle"
+    numbers = (*OWN, "loss_over_smooth", "partial_slip_loss", "sliding_loss")
+    labels = ("maximum", "minimum")
+
+    maximum: Fractions
+    minimum: Fractions | None = None
+    loop_points: Points | None = None
+    loop_asperities: Chosen | None = None
+
+    @property
+    def lowest(self) -> list[float]:
+        """The minimum of each cycle."""
+        return [-value for value in self.maximum] if self.minimum is None else self.minimum
+
+    def mistakes_within(self) -> Iterator[Mistake]:
+        if (n := len(self.lowest)) != len(self.maximum):
+            yield "minimum", f"found {n} values, expected {len(self.maximum)}, as in maximum"
+            return
+        for i, (low, high) in enumerate(zip(self.lowest, self.maximum, strict=True)):
+            if not low < high:
+                yield f"maximum[{i}]", f"found {high}, expected a number above its minimum, {low}"
+
+    def fits(self, count: int) -> None:
+        """Whether there are the asperities whose loops are asked for. Raises InputError."""
+        asked = self.loop_asperities
+        for place, index in enumerate(asked if isinstance(asked, list) else ()):
+            if index >= count:
+                what = f"[cycle] loop_asperities[{place}]"
+                raise InputError(what, found=index, expected=f"an index from 0 to {count - 1}")
+
+    def compute(self, contact: Contact) -> Cycled:
+        f_p = limit(contact)
+        found = cycles(contact, f_p * np.array(self.maximum), f_p * np.array(self.lowest))
+        return Cycled(self, contact, tuple(found))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Cycled(Result):
+    """The cycles."""
+
+    stage: Cycle
+    title = "steady cycles"
+    digits = 6
+    printed: ClassVar[Mapping[str, str]] = {
+        "maximum": "max/(fP)",
+        "minimum": "min/(fP)",
+        "force_amplitude": "Qa",
+        "displacement_amplitude": "Xa",
+        "secant_stiffness": "Qa/Xa",
+        "loss": "W",
+        "loss_factor": "W/(pi Qa Xa)",
+        "loss_normalised": "W/W0",
+        "smooth_normalised": "smooth W/W0",
+        "sliding": "slide",
+    }
+
+    def rows(self) -> list[Summary]:
+        found = []
+        ends = zip(self.stage.maximum, self.stage.lowest, strict=True)
+        for (high, low), cycle in zip(ends, self.found, strict=True):
+            row = {"maximum": high, "minimum": low} | numbers_of(cycle, OWN)
+            row["loss_over_smooth"] = cycle.loss_normalised / (cycle.smooth_normalised or math.nan)
+            row["partial_slip_loss"] = float(cycle.partial_slip_losses.sum())
+            found.append(row | {"sliding_loss": float(cycle.sliding_losses.sum())})
+        return found
+
+    @cached_property
+    def loops(self) -> list[Loop]:
+        """Of each cycle, of some asperities."""
+        stage, contact = self.stage, self.contact
+        touching = max(1, int((contact.loads > 0).sum()))
+        affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
+        chosen: ArrayLike | None = None  # of all
+        if stage.loop_asperities is None:
+            distances = contact.scene.asperities.distances
+            chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)
+        elif stage.loop_asperities != "all":
+            chosen = stage.loop_asperities
+        return loops(self.found, stage.loop_points or affordable, None, chosen)
+
+    def prepare(self, *, figures: bool) -> None:
+        _ = self.loops
+
+    def tables(self) -> dict[str, Columns]:
+        """With the points of loops, macroscopic ("total") and of some asperities."""
+        parts: list[tuple[float, float, str, Any, Any]] = []
+        for row, loop in zip(self.known, self.loops, strict=True):
+            ends = (row["maximum"], row["minimum"])
+            parts.append((*ends, "total", loop.forces, loop.displacements))
+            own = zip(
+                loop.asperities, loop.asperity_forces.T, loop.asperity_displacements.T, strict=True
+            )
+            parts += [(*ends, str(i), forces, moved) for i, forces, moved in own]
+        columns = dict(zip(("maximum", "minimum", "curve", "force", "displacement"),
+                           zip(*parts, strict=True), strict=True))  # fmt: skip
+        sizes = [len(each) for each in columns["force"]]
+        loop_table = {
+            name: np.concatenate(it) if name in ("force", "displacement") else np.repeat(it, sizes)
+            for name, it in columns.items()
+        }
+        return {**super().tables(), "loop": loop_table}
+
+    @property
+    def smooth(self) -> bool:
+        """There is a smooth reference, whose scale is W0."""
+        return not math.isnan(self.known[0]["smooth_normalised"])
+
+    def headings(self) -> Mapping[str, str]:
+        over = {key: it for key, it in self.printed.items() if not key.endswith("_normalised")}
+        return self.printed if self.smooth else over
+
+    def lines(self, units: UnitNames) -> list[str]:
+        said = "no smooth reference, so no W/W0: a flat base, or a cylinder"
+        return [*super().lines(units), *([] if self.smooth else [said])]
+
+    def figures(self, **units: Any) -> Mapping[str, Any]:
+        from convexrough.plots import cycle_figures  # matplotlib: only when it draws
+
+        return cycle_figures(self.found, loops=self.loops, **units)

@@ -1,0 +1,172 @@
+"""[gradient]: the derivative of one number by everything in the scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from convexrough.contact import Contact
+from convexrough.errors import InputError, SolverError
+from convexrough.friction.cycle import cycle
+from convexrough.friction.shear import shear
+from convexrough.gradients.gradient import Gradient as Slopes
+from convexrough.gradients.gradient import Holding
+from convexrough.run.stage import Columns, Single, Stage, Summary, limit
+from convexrough.run.values import Mistake, Share, expected
+from convexrough.tabular.units import UnitNames
+
+#: What a scene file may ask the gradient of, and its letter.
+LETTERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
+
+#: What it may ask it by, asperity by asperity, and the word for one of them.
+EACH = {"heights": "height", "tip_radii": "tip_radius", "positions": "position"}
+
+#: What is one number for the whole scene.
+SHARED = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load", "approach",
+          "maximum", "minimum", "force")  # fmt: skip
+
+
+class Gradient(Stage):
+    """Of what, and by what.
+
+    of       : "loss" of the cycle between +-fraction f P, "displacement" under fraction f P,
+        "approach" or "load"
+    by       : which columns the table has;  holding : default: what is prescribed
+    """
+
+    name = "gradient"
+    frictional = False
+    numbers = (
+        *("value", "largest_by_height", "height_error", "balance_defect"),
+        *(f"by.{name}" for name in SHARED),
+    )
+
+    of: Annotated[str, expected(f"one of: {', '.join(LETTERS)}", LETTERS.__contains__)]
+    fraction: Share | None = None
+    by: Annotated[
+        list[str],
+        expected(f"a list of some of: {', '.join(EACH)}", lambda it: bool(it) and {*it} <= {*EACH}),
+    ] = Field(list(EACH))
+    holding: Annotated[Holding, expected('"load" or "approach"')] | None = None
+
+    @property
+    def sheared(self) -> bool:
+        """Whether it is asked of a shear force."""
+        return self.of in ("loss", "displacement")
+
+    def mistakes_within(self) -> Iterator[Mistake]:
+        if self.sheared and self.fraction is None:
+            yield "fraction", f"missing, needed with the {self.of}"
+        if not self.sheared and self.fraction is not None:
+            yield "fraction", f"found {self.fraction}, expected none with the {self.of}"
+
+    def compute(self, contact: Contact) -> Differentiated:
+        """The gradient, or why there is none."""
+        try:
+            return Differentiated(self, contact, (self._gradient(contact),))
+        except InputError as error:
+            return Differentiated(self, contact, (), str(self._in_the_file(error)))
+        except SolverError as error:
+            return Differentiated(self, contact, (), str(error))
+
+    def _gradient(self, contact: Contact) -> Slopes:
+        if not self.sheared:
+            return contact.gradient(**{self.of: 1.0}, holding=self.holding)
+        force = (self.fraction or 0.0) * limit(contact)
+        if self.of == "displacement":
+            return shear(contact, force=force).gradient(displacement=1.0, holding=self.holding)
+        return cycle(contact, maximum=force).gradient(holding=self.holding)
+
+    def _in_the_file(self, error: InputError) -> InputError:
+        """About a force: by the key of the file that it comes from."""
+        if error.what not in ("force", "maximum"):
+            return error
+        found = f"{self.fraction:g}, a force of {error.found}"
+        return InputError("[gradient] fraction", found=found, expected=error.expected)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Differentiated(Single):
+    """The gradient, or `none_because`."""
+
+    stage: Gradient
+    none_because: str = ""
+
+    def rows(self) -> list[Summary]:
+        """Numbers of the whole, and which asperity matters most; or why there are none."""
+        asked = self.stage
+        if not self.found:
+            return [{"of": asked.of, "none_because": self.none_because}]
+        (gradient,) = self.found
+        largest = {}
+        for name in asked.by:
+            slopes = getattr(gradient, name)
+            sizes = np.linalg.norm(slopes, axis=1) if slopes.ndim == 2 else np.abs(slopes)
+            at = int(np.argmax(sizes))
+            largest[name] = {"slope": slopes[at].tolist(), "asperity": at}
+        most = int(np.argmax(np.abs(gradient.heights)))
+        return [{
+            "of": asked.of,
+            **({"fraction": asked.fraction} if asked.sheared else {}),
+            "holding": gradient.holding,
+            "value": gradient.value,
+            "by": {name: it for name in SHARED if (it := getattr(gradient, name)) is not None},
+            "largest_by_height": float(gradient.heights[most]),
+            "largest_at": most,
+            "largest": largest,
+            "height_error": float(gradient.height_errors.max()),
+            "balance_defect": gradient.balance_defect,
+        }]  # fmt: skip
+
+    def tables(self) -> dict[str, Columns]:
+        """One row for each asperity."""
+        if not self.found:
+            return {}
+        (gradient,), by = self.found, self.stage.by
+        x, y = self.contact.scene.asperities.positions.T
+        columns = {"x": x, "y": y}
+        for name in ("heights", "tip_radii"):
+            if name in by:
+                columns[f"by_{EACH[name]}"] = getattr(gradient, name)
+                columns[f"by_{EACH[name]}_error"] = getattr(gradient, f"{EACH[name]}_errors")
+        if "positions" in by:
+            columns |= dict(zip(("by_x", "by_y"), gradient.positions.T, strict=True))
+        return {"gradient": columns}
+
+    def doubts(self) -> Iterator[str]:
+        if not self.found:
+            yield f"no gradient of the {self.stage.of}: there is none for this scene"
+
+    def lines(self, units: UnitNames) -> list[str]:
+        said = self.known[0]
+        if not self.found:
+            return [f"gradient of the {said['of']}: none, {said['none_because']}"]
+        held, under = f"{said['holding']} held", ""
+        if "fraction" in said:
+            under, held = f" at Q/(fP) = {said['fraction']:g}", f"{held}, and so is the force"
+        rows = [("value", f"{said['value'] + 0.0:.10g}")]  # no -0
+        rows += [(f"by {name}", f"{slope + 0.0:.8g}") for name, slope in said["by"].items()]
+        for name, most in said["largest"].items():
+            known = f", {_known(said['height_error'])}" if name == "heights" else ""
+            slopes = np.ravel(most["slope"]) + 0.0
+            text = ", ".join(f"{slope:.8g}" for slope in slopes)
+            text = f"({text})" if len(slopes) > 1 else text
+            rows.append((f"by {EACH[name]}", f"up to {text}  (asperity {most['asperity']}{known})"))
+        lines = [f"  {name:<20}{text}" for name, text in rows]
+        return [f"gradient of the {said['of']}{under}, {held}", *lines]
+
+    def figures(self, **units: Any) -> Mapping[str, Any]:
+        from convexrough.plots import gradient_figures  # matplotlib: only when it draws
+
+        drawn = [gradient_figures(it, of=LETTERS[self.stage.of], **units) for it in self.found]
+        return drawn[0] if drawn else {}
+
+
+def _known(error: float) -> str:
+    """Two digits of a proved bound, never below it."""
+    return f"all known to {1.05 * error:.2g}" if math.isfinite(error) else "no bound"

@@ -1,0 +1,47 @@
+"""[history]: shear forces one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from convexrough.contact import Contact
+from convexrough.friction.path import history
+from convexrough.run.stage import Columns, Stage, Steps, limit
+from convexrough.run.values import Fractions
+
+
+class History(Stage):
+    """Any sequence of shear forces from 0, as fractions of f P."""
+
+    name = "history"
+    numbers = ("force", "displacement", "loss", "loss_error")
+
+    fractions: Fractions
+
+    def compute(self, contact: Contact) -> Followed:
+        past = history(contact, forces=limit(contact) * np.array(self.fractions))
+        return Followed(self, contact, (past,))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Followed(Steps):
+    """The states after each force."""
+
+    stage: History
+    printed: ClassVar[Mapping[str, str]] = {
+        "fraction": "Q/(fP)",
+        "displacement": "displacement",
+        "loss": "loss",
+    }
+
+    def columns_of_steps(self) -> Columns:
+        return {"fraction": np.array(self.stage.fractions), **super().columns_of_steps()}
+
+    def figures(self, **units: Any) -> Mapping[str, Any]:
+        from convexrough.plots import history_figures  # matplotlib: only when it draws
+
+        return history_figures(self.found[0], fine=self.fine, **units)

@@ -1,0 +1,205 @@
+"""[normal]: what is pressed, and what is proved of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from convexrough import plausibility
+from convexrough.arrays import Array
+from convexrough.contact import Contact, closest_changes
+from convexrough.errors import SolverError
+from convexrough.normal.certificate import Certificate
+from convexrough.run.stage import Columns, Single, Stage, Summary, unit_of
+from convexrough.run.values import Finite, Positive
+from convexrough.tabular.columns import bound
+from convexrough.tabular.units import UnitNames
+
+#: Loads of this part of the largest, and greater, are looked at for what the geometry does to them.
+HEAVY = 0.1
+
+#: Relative difference between the geometries that is worth a word.
+DIFFERENT = 0.01
+
+PROOF = ("scope", "convexity_number", "load_error", "gap_error", "duality_gap")
+COUNTS = ("contact", "open", "undecided")
+FOUND = ("candidates", "influence", "solver", "iterations", "seconds", "model_error")
+SCOPES = {
+    "global": "global: the scene has exactly one solution",
+    "local": "local: exactly one solution with contact radii near these",
+    "none": "none: nothing is proved",
+}
+INFLUENCES = {
+    "dense": "dense: a matrix",
+    "lattice": "lattice: Fourier transforms",
+    "scattered": "scattered: Fourier transforms on a mesh",
+}
+
+
+class Normal(Stage):
+    """What is prescribed: the approach of the two bodies [length], or the load [force]."""
+
+    name = "normal"
+    frictional = False
+    alternatives = ("approach", "load")
+    numbers = (
+        *("asperities", *COUNTS, "approach", "approach_error", "load", "largest_load"),
+        *(f"certificate.{name}" for name in PROOF[1:]),
+        *("candidates", "iterations", "seconds", "model_error", "crowding", "covered", "extent"),
+        *("steepness", "mean_pressure", "beyond_hardness", "mismatch", "contact_modulus"),
+    )
+
+    approach: Finite | None = None
+    load: Positive | None = None
+
+    def compute(self, contact: Contact) -> Pressed:
+        return Pressed(self, contact, (contact,))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pressed(Single):
+    """The pressed contact."""
+
+    def rows(self) -> list[Summary]:
+        contact = self.contact
+        found = {name: getattr(contact, name) for name in FOUND}
+        judged = judged_loads(contact.certificate, contact.loads)
+        return [judged | found | limits_of(contact)]
+
+    def tables(self) -> dict[str, Columns]:
+        contact, asperities = self.contact, self.contact.scene.asperities
+        x, y = asperities.positions.T
+        columns: Columns = {"x": x, "y": y}
+        columns |= {"height": asperities.heights, "tip_radius": asperities.tip_radii}
+        columns |= contact.columns("loads", "contact_radii", "gaps", "status")
+        return {"asperities": columns | contact.certificate.columns("load_errors")}
+
+    def doubts(self) -> Iterator[str]:
+        yield from doubts_of(self.known[0])
+
+    def figures(self, **units: Any) -> Mapping[str, Any]:
+        from convexrough.plots import press_figures  # matplotlib: only when it draws
+
+        return press_figures(self.contact, **units)
+
+    def lines(self, units: UnitNames) -> list[str]:
+        return describe(self.known[0], units)
+
+
+def judged_loads(certificate: Certificate, loads: Array) -> Summary:
+    """What is proved of loads (n,) [force], whoever found them."""
+    return {
+        "asperities": len(loads),
+        **{word: int((certificate.status == word).sum()) for word in COUNTS},
+        "approach": certificate.approach,
+        "approach_error": certificate.approach_error,
+        "load": float(loads.sum()),
+        "largest_load": float(loads.max()),
+        "certificate": {name: getattr(certificate, name) for name in PROOF},
+    }
+
+
+def doubts_of(normal: Summary) -> Iterator[str]:
+    """What keeps loads from being certified."""
+    if normal["certificate"]["scope"] == "none":
+        yield "not certified: these loads come without any proof"
+    elif normal["undecided"]:
+        yield f"not certified: {normal['undecided']} of the asperities undecided"
+
+
+def cautions(normal: Summary, units: UnitNames) -> Iterator[str]:
+    """What a user should know of the model, which no proof is about."""
+    named = units.force and units.length
+    yield from plausibility.doubts(normal, f"{units.force}/{units.length}²" if named else "")
+
+
+def limits_of(contact: Contact) -> Summary:
+    """How far the model holds: keys of `plausibility.limits_of`, and
+
+    geometry        : where asperities meet the base
+    contact_modulus : [force / length^2]
+    closest_change  : the largest change of a load, relative to itself, in the geometry "closest";
+        None where that is the geometry, or where it is not found
+    """
+    scene, change = contact.scene, None
+    if scene.geometry == "summit" and contact.loads.any():
+        heavy = contact.loads >= HEAVY * contact.loads.max()
+        with suppress(SolverError):
+            changes = closest_changes(contact)[heavy] / contact.loads[heavy]
+            change = float(np.abs(changes).max())
+    return {
+        **plausibility.limits_of(contact),
+        "geometry": scene.geometry,
+        "contact_modulus": scene.material.contact_modulus,
+        "closest_change": change,
+    }
+
+
+def describe(normal: Summary, units: UnitNames) -> list[str]:
+    """Aligned lines for people, of judged loads or of a contact."""
+    proof = normal["certificate"]
+    able = f"  ({normal['candidates']} could touch)" if "candidates" in normal else ""
+    width = len(str(normal["asperities"]))
+    relative = _ratio(proof["load_error"], normal["largest_load"])
+    crowding = normal.get("crowding", 0.0)
+    model = f" (of a model that does not hold: crowding {crowding:.3g})" if crowding > 1 else ""
+
+    def known(name: str) -> str:
+        return f"{bound(proof[name])} {unit_of(name, units)}".rstrip()
+
+    lines = [
+        ("asperities", f"{normal['asperities']}{able}"),
+        *((f"  {word}", f"{normal[word]:>{width}}") for word in COUNTS),
+        ("approach", f"{normal['approach']:.10g} {units.length}".rstrip()),
+        ("load", f"{normal['load']:.10g} {units.force}".rstrip()),
+        ("certificate", SCOPES[proof["scope"]] + model),
+        ("convexity number", f"{proof['convexity_number']:.4g}  (convex below 1)"),
+        ("load error", f"{known('load_error')}{relative}"),
+        ("gap error", known("gap_error")),
+        ("duality gap", known("duality_gap")),
+    ]
+    if "solver" in normal:
+        steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
+        beta, model_error = _neglected(normal), normal["model_error"]
+        lines += [
+            ("model error", f"{model_error:.2g}  (from point forces in place of pressures)"),
+            ("crowding", f"{crowding:.3g}  (contact discs overlap above 1)"),
+            *([("bodies", beta)] if beta else []),
+            ("geometry", _described_geometry(normal)),
+            ("contact modulus", plausibility.described_modulus(normal["contact_modulus"], units)),
+            ("solver", f"{normal['solver']}, {steps}"),
+            ("influence", INFLUENCES[normal["influence"]]),
+        ]
+    return [f"{name:<18}{text}" for name, text in lines]
+
+
+def _neglected(normal: Summary) -> str:
+    """What is left out of two different bodies, with its size."""
+    if not (beta := normal["mismatch"]):
+        return ""
+    return (
+        f"Dundurs' beta = {beta:.3g}, neglected: pressing would shear the surfaces by some "
+        f"{abs(100 * beta):.2g} % of the pressure"
+    )
+
+
+def _described_geometry(normal: Summary) -> str:
+    """Its name, and how far the other one is apart, where that is worth a word."""
+    change, name = normal["closest_change"] or 0.0, str(normal["geometry"])
+    if change <= DIFFERENT:
+        return name
+    return (
+        f'{name}: with "closest", nearer to boundary elements, loads change by up to about '
+        f"{100 * change:.2g} %"
+    )
+
+
+def _ratio(error: float, largest: float) -> str:
+    if largest == 0 or not math.isfinite(error):
+        return ""
+    return f"  ({bound(error / largest)} of the largest load)"

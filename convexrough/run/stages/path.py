@@ -1,0 +1,247 @@
+"""[path] and [steady]: normal load and shear that vary together, once and for ever."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from convexrough import checks
+from convexrough.contact import Contact
+from convexrough.friction.cycle import steady
+from convexrough.friction.path import load_path
+from convexrough.friction.phases import PhaseLosses, phase_losses
+from convexrough.friction.shapes import elliptic_path
+from convexrough.run.stage import (
+    WORDS,
+    Columns,
+    Result,
+    Single,
+    Stage,
+    Steps,
+    Summary,
+    numbers,
+    plain,
+    titled,
+)
+from convexrough.run.values import Finite, Mistake, NonNegative, Positive, Table, expected
+from convexrough.tabular.units import UnitNames
+
+COUNTS = tuple(word for word in WORDS if word != "contact")
+
+INCREASE = "indentations increase with the load: "
+
+
+class Ellipse(Table):
+    """A path of load P + A cos t and shear Q + B sin(t + phase), on chords."""
+
+    load: Positive
+    load_amplitude: Finite = 0.0
+    force: Finite = 0.0
+    force_amplitude: Finite
+    phase: Finite = 0.0
+    chords: Annotated[int, expected("a whole number, at least 6", lambda value: value >= 6)] = 96
+
+
+class _Points(Stage):
+    """The points of a path, in multiples of `reference`, or an ellipse."""
+
+    loads: list[NonNegative] | None = None
+    forces: list[Finite] | None = None
+    ellipse: Ellipse | None = None
+    reference: Positive = 1.0
+
+    def mistakes_within(self) -> Iterator[Mistake]:
+        loads, forces = self.loads, self.forces
+        if self.ellipse is not None:
+            if (loads, forces) != (None, None):
+                yield "ellipse", "found beside loads or forces, expected one of the two ways"
+        elif loads is None or forces is None:
+            yield "loads, forces", "missing, both are needed where there is no ellipse"
+        elif len(loads) != len(forces) or not loads:
+            found = f"{len(loads)} and {len(forces)} values"
+            yield "loads, forces", f"found {found}, expected as many of both, at least one"
+
+    def points(self, contact: Contact) -> dict[str, Any]:
+        """P and Q [force] at the points."""
+        if self.ellipse is not None:
+            friction = checks.friction(contact.scene.friction)
+            loads, forces = elliptic_path(friction=friction, **self.ellipse.model_dump())
+        else:
+            loads, forces = np.array(self.loads), np.array(self.forces)
+        return {"loads": self.reference * loads, "forces": self.reference * forces}
+
+
+class Path(_Points):
+    """A path of load and shear, from no load."""
+
+    name = "path"
+    numbers = (
+        *("load", "force", "approach", "displacement", "displacement_error", "loss", "loss_error"),
+        *("front", *COUNTS),
+    )
+
+    def compute(self, contact: Contact) -> Pathed:
+        with self.blamed():
+            found = load_path(contact.scene, **self.points(contact), influence=contact.influence)
+        return Pathed(self, contact, (found,))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pathed(Steps):
+    """The states at the points of a path."""
+
+    title = "load path"
+    printed: ClassVar[Mapping[str, str]] = {
+        "load": "P",
+        "force": "Q",
+        "displacement": "displacement",
+        "loss": "loss",
+        "stuck": "stuck",
+        "partial": "partial",
+        "sliding": "slide",
+    }
+
+    def summary(self) -> Summary:
+        (path,) = self.found
+        return super().summary() | {"order": path.order, "presses": path.presses}
+
+    def tables(self) -> dict[str, Columns]:
+        """The points, and asperities at each of them."""
+        (path,) = self.found
+        m, n = path.asperity_forces.shape
+        x, y = path.scene.asperities.positions.T
+        names = ("asperity_loads", "asperity_forces", "asperity_force_errors",
+                 "asperity_displacements", "drifts", "status")  # fmt: skip
+        each = {
+            name.removeprefix("asperity_"): it.ravel() for name, it in path.columns(*names).items()
+        }
+        places = {"point": np.repeat(np.arange(m), n), "x": np.tile(x, m), "y": np.tile(y, m)}
+        return {**super().tables(), "path_asperities": places | each}
+
+    def doubts(self) -> Iterator[str]:
+        (path,) = self.found
+        if unsure := int((path.status == "undecided").sum()):
+            yield f"not certified: {unsure} words in path undecided"
+        yield from unproved_order(self, path.order)
+
+    def lines(self, units: UnitNames) -> list[str]:
+        return [
+            *super().lines(units),
+            f"indentations increase with the load: {self.found[0].order}",
+        ]
+
+    def figures(self, **units: Any) -> Mapping[str, Any]:
+        from convexrough.plots import path_figures  # matplotlib: only when it draws
+
+        return path_figures(self.found[0], fine=self.fine, **units)
+
+
+class Steady(_Points):
+    """A closed path, repeated.
+
+    phases, factors : of an ellipse: its loss at other phases [rad], and with amplitudes times these
+    """
+
+    name = "steady"
+    numbers = (*("level", "force_level", "loss", "loss_error", "loss_first", *COUNTS),)
+    needs: ClassVar[Mapping[str, str]] = {"phases": "ellipse", "factors": "phases"}
+
+    phases: Annotated[list[Finite], expected("a list of finite numbers", bool)] | None = None
+    factors: Annotated[list[Positive], expected("a list of positive numbers", bool)] = Field([1.0])
+
+    def compute(self, contact: Contact) -> Settled:
+        scene, influence = contact.scene, contact.influence
+        with self.blamed():
+            found = [steady(scene, **self.points(contact), influence=influence)]
+            return Settled(self, contact, (*found, *self._losses(contact)))
+
+    def _losses(self, contact: Contact) -> Iterator[PhaseLosses]:
+        if self.phases and self.ellipse is not None:
+            shape = self.ellipse.model_dump(exclude={"phase", "chords"})
+            yield phase_losses(
+                contact.scene,
+                **{name: self.reference * size for name, size in shape.items()},
+                phases=self.phases,
+                factors=self.factors,
+                chords=self.ellipse.chords,
+                influence=contact.influence,
+            )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Settled(Single):
+    """What a closed path costs, and losses at other phases where they were asked for."""
+
+    printed: ClassVar[Mapping[str, str]] = {
+        "level": "stuck level",
+        "loss": "loss",
+        "loss_error": "error",
+        "partial": "partial",
+        "sliding": "slide",
+        "intermittent": "intermittent",
+    }
+
+    def rows(self) -> list[Summary]:
+        first = Result(self.stage, self.contact, self.found[:1])
+        return Result.rows(first)
+
+    def summary(self) -> Summary:
+        found = self.found[0]
+        said = self.known[0] | {"order": found.order, "presses": found.presses}
+        for losses in self.found[1:]:
+            lists = {name: plain(values) for name, values in _by_phase(losses).items()}
+            said |= {"phase_losses": lists | {"order": losses.order}}
+        return said
+
+    def tables(self) -> dict[str, Columns]:
+        x, y = self.contact.scene.asperities.positions.T
+        columns = self.found[0].columns("slips", "stick_radii", "status")
+        tables = {"steady": {"x": x, "y": y, **columns}}
+        for losses in self.found[1:]:
+            tables["phase_losses"] = _by_phase(losses)
+        return tables
+
+    def doubts(self) -> Iterator[str]:
+        if unsure := self.known[0]["undecided"]:
+            yield f"not certified: {unsure} words in steady undecided"
+        for each in self.found:
+            yield from unproved_order(self, each.order)
+
+    def lines(self, units: UnitNames) -> list[str]:
+        said = [
+            *super().lines(units),
+            f"indentations increase with the load: {self.found[0].order}",
+        ]
+        for losses in self.found[1:]:
+            columns = _by_phase(losses)
+            printed = {name: name.replace("_", " ") for name in ("phase", "factor", "loss")}
+            printed |= {"smooth": "smooth sphere"}
+            rows = list(zip(*(columns[name].tolist() for name in printed), strict=True))
+            said += ["", titled("loss against phase", printed, units)]
+            if len(rows) > 20:
+                said.append(f"(the last 20 of {len(rows)} ellipses; all are in phase_losses.csv)")
+            said += numbers(list(printed.values()), rows[-20:])
+        return said
+
+    def figures(self, **units: Any) -> Mapping[str, Any]:
+        from convexrough.plots import phase_figures, steady_figures  # only when it draws
+
+        figures = dict(steady_figures(self.found[0], **units))
+        for losses in self.found[1:]:
+            figures |= phase_figures(losses, **units)
+        return figures
+
+
+def _by_phase(losses: PhaseLosses) -> Columns:
+    names = ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
+    return losses.columns(*names)
+
+
+def unproved_order(result: Result, order: str | None) -> Iterator[str]:
+    """That a proof rests on an order which is not proved."""
+    if order is not None and not order.startswith("proved"):
+        yield f"not proved: the order of indentations, on which [{result.name}] rests"

@@ -1,0 +1,106 @@
+"""[shakedown]: how far a path may be scaled before somebody slides for ever."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from convexrough.contact import Contact
+from convexrough.melan.shakedown import Theory, shakedown
+from convexrough.run.stage import Columns, Single, Stage, Summary
+from convexrough.run.stages.path import unproved_order
+from convexrough.run.values import Finite, Force, Mistake, Positive, expected
+from convexrough.tabular.units import UnitNames
+
+Kind = Annotated[Theory, expected('"exact", "elastic" or "vector"')]
+
+
+class Shakedown(Stage):
+    """Mean load and shear force, and the amplitudes that are scaled, in multiples of `reference`.
+
+    kind : "exact" (default), "elastic", or "vector": then forces are pairs [x, y]
+    """
+
+    name = "shakedown"
+    numbers = ("factor", "lower", "upper", "gross")
+
+    loads: Positive
+    forces: Force = 0.0
+    load_amplitudes: list[Finite] | None = None
+    force_amplitudes: list[Force]
+    kind: Kind = "exact"
+    reference: Positive = 1.0
+
+    def mistakes_within(self) -> Iterator[Mistake]:
+        if self.load_amplitudes and len(self.load_amplitudes) != len(self.force_amplitudes):
+            found = f"found {len(self.load_amplitudes)} values"
+            yield "load_amplitudes", f"{found}, expected {len(self.force_amplitudes)}"
+        pairs = self.kind == "vector"
+        expected = 'a pair [x, y] with kind = "vector"' if pairs else "a number with this kind"
+        if isinstance(self.forces, list) != pairs and self.forces != 0.0:
+            yield "forces", f"found {self.forces}, expected {expected}"
+        for i, force in enumerate(self.force_amplitudes):
+            if isinstance(force, list) != pairs:
+                yield f"force_amplitudes[{i}]", f"found {force}, expected {expected}"
+
+    def compute(self, contact: Contact) -> Limit:
+        swings = self.load_amplitudes or [0.0] * len(self.force_amplitudes)
+        with self.blamed():
+            found = shakedown(
+                contact.scene,
+                loads=self.reference * self.loads,
+                forces=self.reference * np.array(self.forces),
+                load_amplitudes=self.reference * np.array(swings),
+                force_amplitudes=self.reference * np.array(self.force_amplitudes),
+                kind=self.kind,
+                influence=contact.influence,
+            )
+        return Limit(self, contact, (found,))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Limit(Single):
+    """The limit, its bounds, and what proves them."""
+
+    stage: Shakedown
+    digits = 12
+    printed: ClassVar[Mapping[str, str]] = {
+        "factor": "factor",
+        "lower": "proved above",
+        "upper": "and below",
+        "gross": "gross sliding",
+    }
+
+    def summary(self) -> Summary:
+        (found,) = self.found
+        return {"kind": found.kind, **self.known[0], "proved": found.proved, "order": found.order}
+
+    def tables(self) -> dict[str, Columns]:
+        """The state at rest and the mechanism; with vectors their components, of each vertex."""
+        (found,) = self.found
+        x, y = found.scene.asperities.positions.T
+        columns = {"x": x, "y": y, "factor": found.factors}
+        if found.kind != "vector":
+            return {self.name: columns | {"witness": found.witness, "slip": found.mechanism}}
+        columns |= {f"witness_{name}": found.witness[:, k] for k, name in enumerate("xy")}
+        for v, slips in enumerate(found.mechanism):
+            columns |= {f"slip_{v}_{name}": slips[:, k] for k, name in enumerate("xy")}
+        return {self.name: columns}
+
+    def doubts(self) -> Iterator[str]:
+        (found,) = self.found
+        yield from unproved_order(self, found.order)
+        if not found.proved:
+            yield "not proved: any bounds on the limit of [shakedown]"
+
+    def lines(self, units: UnitNames) -> list[str]:
+        _, *table = super().lines(units)
+        return [f"shakedown  ({self.stage.kind})", *table]
+
+    def figures(self, **units: Any) -> Mapping[str, Any]:
+        from convexrough.plots import shakedown_figures  # matplotlib: only when it draws
+
+        return shakedown_figures(self.found[0], **units)

@@ -1,0 +1,281 @@
+"""The tables of a scene file as one model: what each key may hold, and every mistake in words.
+
+`read_scene` imports this when a file is read, and not before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
+
+from pydantic import Discriminator, Field, Tag, ValidationError, create_model
+
+from convexrough.checks import nearest
+from convexrough.errors import InputError
+from convexrough.influence import KINDS, Kind
+from convexrough.run.stage import Stage
+from convexrough.run.stages import STAGES, Normal
+from convexrough.run.values import (
+    Mistake,
+    NonNegative,
+    Positive,
+    Radius,
+    Ratio,
+    Switch,
+    Table,
+    Text,
+    TipRadius,
+    Whole,
+    expected,
+    phrased,
+)
+from convexrough.solvers import SOLVERS
+from convexrough.tabular.units import UnitNames, force_of, known_unit, parsed
+
+#: [Pa] moduli of solids: from gels to diamond, with room.
+SOFTEST, HARDEST = 1e3, 1e13
+
+Geometry = Annotated[Literal["summit", "closest"], expected('"summit" or "closest"')]
+Pattern = Annotated[Literal["hexagonal", "square"], expected('"hexagonal", "square" or "file"')]
+
+
+class Sphere(Table):
+    radius: Radius
+
+
+class Material(Table):
+    """Both bodies are of this."""
+
+    alternatives = ("contact_modulus", "youngs_modulus")
+    contact_modulus: Positive | None = None
+    youngs_modulus: Positive | None = None
+    poisson_ratio: Ratio
+    hardness: Positive | None = None
+
+
+class Body(Table):
+    youngs_modulus: Positive
+    poisson_ratio: Ratio
+    hardness: Positive | None = None
+
+
+class Bodies(Table):
+    """Two bodies that differ."""
+
+    elsewhere = ("two bodies", frozenset(Material.model_fields))
+    sphere: Body
+    base: Body
+
+
+class Summits(Table):
+    """Asperities from a file."""
+
+    elsewhere = (
+        "this pattern",
+        frozenset(("spacing", "within", "height_std", "tip_radius_cv", "seed")),
+    )
+    pattern: Literal["file"]
+    path: Text
+    tip_radius: TipRadius | None = None
+    columns: dict[str, Text] = Field(default_factory=dict)
+    geometry: Geometry = "closest"
+
+
+class Lattice(Table):
+    """Asperities in a pattern."""
+
+    needs: ClassVar[Mapping[str, str]] = {"height_std": "seed", "tip_radius_cv": "seed"}
+    elsewhere = ("this pattern", frozenset(Summits.model_fields))
+    pattern: Pattern
+    spacing: Positive
+    tip_radius: TipRadius
+    within: NonNegative | None = None
+    height_std: NonNegative = 0.0
+    tip_radius_cv: NonNegative = 0.0
+    seed: Whole | None = None
+    geometry: Geometry = "closest"
+
+
+class Friction(Table):
+    coefficient: Positive
+
+
+class Solver(Table):
+    name: Annotated[str, expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)] = "newton"
+    influence: (
+        Annotated[Kind, expected(f"one of: {', '.join(KINDS)}", KINDS.__contains__)] | None
+    ) = None
+
+
+class Units(Table):
+    length: Text = ""
+    force: Text = ""
+    pressure: Text = ""
+    convert: Switch = False
+
+    @property
+    def names(self) -> UnitNames:
+        """The force is that of the pressure on a square, where only these are named."""
+        pressure, length = (parsed(name) if name else None for name in (self.pressure, self.length))
+        made = force_of(pressure, length) if pressure and length else ""
+        return UnitNames(self.length.strip(), self.force.strip() or made)
+
+    def mistakes_within(self) -> Iterator[Mistake]:
+        for kind in ("length", "force", "pressure"):
+            try:
+                known_unit(kind, getattr(self, kind), kind)
+            except InputError as error:
+                expects = f"{error.expected}; without [units] no unit is looked at"
+                yield kind, f"found {error.found}, expected {expects}"
+                return
+        pressure, length, force = map(parsed, (self.pressure, self.length, self.force))
+        if pressure and not length:
+            yield "length", "missing, needed with pressure"
+        elif pressure and length and not (made := force_of(pressure, length)):
+            expects = "one that makes a force with a name"
+            yield "pressure", f"found {self.pressure}, expected {expects}"
+        elif pressure and length and force and force.size != (pressure * length**2).size:
+            makes = f"as {self.pressure} and {self.length} make"
+            yield "force", f"found {self.force}, expected {made}, {makes}"
+
+
+def _is_bodies(table: Any) -> str:
+    both = isinstance(table, dict) and not table.keys().isdisjoint(Bodies.model_fields)
+    return "(bodies)" if both else "(one)"
+
+
+def _is_file(table: Any) -> str:
+    return "(file)" if isinstance(table, dict) and table.get("pattern") == "file" else "(lattice)"
+
+
+#: Tables without which there is no scene.
+REQUIRED: dict[str, type[Table]] = {
+    "sphere": Sphere,
+    "material": Material,
+    "asperities": Lattice,
+    "normal": Normal,
+}
+
+
+class Study(Table):
+    """All tables of a scene file; those of stages are added to it."""
+
+    sphere: Sphere
+    material: Annotated[
+        Annotated[Material, Tag("(one)")] | Annotated[Bodies, Tag("(bodies)")],
+        Discriminator(_is_bodies),
+    ]
+    asperities: Annotated[
+        Annotated[Lattice, Tag("(lattice)")] | Annotated[Summits, Tag("(file)")],
+        Discriminator(_is_file),
+    ]
+    normal: Normal
+    friction: Friction | None = None
+    solver: Solver = Solver()
+    units: Units = Units()
+
+    @property
+    def stages(self) -> dict[str, Stage]:
+        """Those that are asked for, in the order of results."""
+        found = {name: getattr(self, name) for name in STAGES}
+        return {name: stage for name, stage in found.items() if stage is not None}
+
+    @classmethod
+    def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
+        """Tables that are unknown or missing, and what one of them asks of another."""
+        for name, keys_within in keys.items():
+            if name == "sweep":
+                yield name, "[sweep]: many scenes, which `convexrough sweep` computes"
+            elif name not in cls.model_fields:
+                a_table = isinstance(keys_within, dict)
+                what = f"[{name}]: unknown table" if a_table else f"{name}: in no table"
+                yield name, f"{what}, {nearest(name, cls.model_fields)}"
+        if "friction" not in keys:
+            needing = [name for name in STAGES if name in keys and STAGES[name].frictional]
+            asked = keys.get("gradient")
+            of = asked.get("of") if isinstance(asked, dict) else None
+            if needing:
+                yield "friction", f"missing table, needed with [{needing[0]}]"
+            elif of in ("loss", "displacement"):
+                yield "friction", f"missing table, needed with the {of} of [gradient]"
+        yield from _unbounded(*(keys.get(name) for name in ("asperities", "normal", "sphere")))
+
+    def mistakes_within(self) -> Iterator[Mistake]:
+        """A modulus that no solid has, where units are named."""
+        material, unit = self.material, self.units.names.unit("pressure")
+        if not isinstance(material, Material) or unit is None:
+            return
+        name = "youngs_modulus" if material.contact_modulus is None else "contact_modulus"
+        value = getattr(material, name)
+        if not SOFTEST <= (pascals := value * float(unit.size)) <= HARDEST:
+            found = f"found {value:g} {unit.name}, which is {pascals:.3g} Pa"
+            solid = f"expected {SOFTEST:g} to {HARDEST:g} Pa, as solids have"
+            said = f"[material] {name}: {found}, {solid}; without [units] no unit is looked at"
+            yield "material", said
+
+
+def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:
+    """A list of tip radii, or a base that bends away, says how many asperities there are."""
+    if not isinstance(lattice, dict) or lattice.get("pattern") == "file" or "within" in lattice:
+        return
+    radius = sphere.get("radius") if isinstance(sphere, dict) else None
+    if math.inf in (radius if isinstance(radius, list) else [radius]):
+        yield (
+            "asperities",
+            ("[asperities] within: missing, needed with a flat base or a cylinder, without an end"),
+        )
+    elif (
+        isinstance(lattice.get("tip_radius"), list)
+        and isinstance(normal, dict)
+        and "load" in normal
+    ):
+        yield (
+            "asperities",
+            ("[asperities] within: missing, needed with a list of tip radii under a given load"),
+        )
+
+
+@lru_cache(4)
+def _model(stages: tuple[type[Stage], ...]) -> type[Study]:
+    fields: dict[str, Any] = {
+        each.name: (each | None, None) for each in stages if each is not Normal
+    }
+    return create_model("Study", __base__=Study, **fields)
+
+
+def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
+    """The tables of a parsed file, or None and everything that is wrong, in its order."""
+    model = _model(tuple(STAGES.values()))
+    try:
+        return model.model_validate(dict(contents)), []
+    except ValidationError as error:
+        places = {name: place for place, name in enumerate(contents)}
+        errors = sorted(
+            error.errors(), key=lambda each: places.get(str(each["loc"][0]), len(places))
+        )
+        return None, [_said(model, each) for each in errors]
+
+
+T = TypeVar("T", bound=Table)
+
+
+def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list[str]]:
+    """One table, or None and everything that is wrong in it."""
+    try:
+        return model.model_validate(keys), []
+    except ValidationError as error:
+        return None, [phrased({**each, "loc": (name, *each["loc"])}) for each in error.errors()]
+
+
+def _said(model: type[Study], error: Any) -> str:
+    """One line; what is said of whole tables names them itself."""
+    table, *inner = error["loc"]
+    if error["type"] == "missing" and not inner:
+        keys = ", ".join(REQUIRED[str(table)].model_fields)
+        return f"[{table}]: missing table, its keys are: {keys}"
+    if error["type"] == "told" and not inner:
+        own = error["msg"]
+        return own if table in own.split(":")[0] else f"[{table}]: {own}"
+    return phrased(error)

@@ -1,0 +1,206 @@
+"""A map pressed whole, by boundary elements: what its asperities stand for.
+
+Square or oblong pixels of uniform pressure on an elastic half-space, with the contact law over
+pixels instead of asperities:
+
+    p >= 0,    g = K p - h >= 0,    p g = 0,
+
+where h is how far the undeformed bodies would overlap at this approach and K is the half-space.
+Pressure only ever pushes the surfaces apart, so a pixel with h <= 0 stays open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy import fft, ndimage
+from scipy.spatial import cKDTree
+
+from convexrough import checks
+from convexrough.arrays import Array, frozen
+from convexrough.contact import Contact
+from convexrough.errors import InputError, SolverError
+from convexrough.record import Along, Table
+from convexrough.surface.surface import Surface
+
+#: Steps of conjugate gradients, and the part of the overlap to which gaps are right.
+STEPS, ACCURACY = 2000, 1e-4
+
+
+class HalfSpace:
+    """Pressures on pixels to displacements at their centres, both bodies together.
+
+    A pixel of uniform unit pressure displaces the surface by (1 / (pi E*)) times the integral of
+    1/r over it, which Love (1929) has in closed form. The product with all pixels is a convolution:
+    one Fourier transform on a grid twice as wide, so that nothing wraps around.
+    """
+
+    def __init__(
+        self, shape: tuple[int, int], pixel: tuple[float, float], contact_modulus: float
+    ) -> None:
+        self.shape = shape
+        self.padded = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in shape)
+        steps = [np.minimum(np.arange(n), n - np.arange(n)) for n in self.padded]
+        sizes = zip(steps, pixel[::-1], strict=True)
+        edges = [(np.arange(each.max() + 2) - 0.5) * size for each, size in sizes]
+        y, x = edges[0][:, None], edges[1]
+        corner = x * np.arcsinh(y / abs(x)) + y * np.arcsinh(x / abs(y))  # d2/dxdy of it is 1/r
+        influence = np.diff(np.diff(corner, axis=0), axis=1) / (np.pi * contact_modulus)
+        # An even kernel has a real transform.
+        self.symbol = fft.rfft2(influence[np.ix_(*steps)], workers=1).real.copy()
+
+    def displacement(self, pressure: Array) -> Array:
+        """K p; rows known to be zero, or not wanted, are not transformed."""
+        (rows, columns), (down, across) = self.shape, self.padded
+        waves = fft.fft(fft.rfft(pressure, across, axis=1, workers=1), down, axis=0, workers=1)
+        waves *= self.symbol
+        lines = fft.ifft(waves, axis=0, overwrite_x=True, workers=1)[:rows]
+        return np.asarray(fft.irfft(lines, across, axis=1, workers=1)[:, :columns])
+
+
+def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float = ACCURACY) -> Array:
+    """The pressure that solves the contact law, by conjugate gradients on the touching pixels.
+
+    Polonsky and Keer (Wear 231, 1999) at a given approach: step, cut negative pressures to zero,
+    and let pixels back in where the bodies overlap; the directions start afresh when one comes in.
+    Ends when |g| <= accuracy * max h where p > 0 and g >= -accuracy * max h where p = 0 < h.
+    """
+    allowed = overlap > 0
+    pressure = np.where(allowed, start, 0.0)
+    gap = half_space.displacement(pressure) - overlap
+    direction = np.zeros_like(gap)
+    previous = np.inf
+    for _ in range(STEPS):
+        touching = pressure > 0
+        if np.where(touching, abs(gap), -gap)[allowed].max() <= accuracy * overlap.max():
+            return pressure
+        gradient = np.where(touching, gap, 0.0)
+        square = float(np.vdot(gradient, gradient))
+        direction = np.where(touching, gradient + square / previous * direction, 0.0)
+        change = half_space.displacement(direction)
+        step = float(np.vdot(gradient, direction) / np.vdot(change, direction))
+        trial = pressure - step * direction
+        pressure = np.maximum(trial, 0.0)
+        entering = allowed & (pressure == 0) & (gap < 0)
+        pressure[entering] = -step * gap[entering]
+        previous = np.inf if entering.any() else square
+        if entering.any() or trial.min() < 0:
+            gap = half_space.displacement(pressure) - overlap
+        else:
+            gap -= step * change
+    raise SolverError(
+        f"pressures not found to {accuracy:g} of the overlap in {STEPS} steps",
+        solver="boundary elements",
+        advice="press less deep, or on a smoother map",
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Whole(Table):
+    """A map pressed whole, beside the asperities that stand for it, at the same approach.
+
+    contact   : of the asperities
+    pressures : (ny, nx) [force/length^2] of the pixels
+    loads     : (n,) [force] of the pixels that are nearest to each asperity
+    load [force], area [length^2] : of all;  pieces : of pixels in contact that touch each other
+    resolution : how much the load changes where pixels are twice as wide, over the load: about
+        four times what the pixels of the map are off by, where these resolve the tips
+    """
+
+    _along: ClassVar[Along] = {("asperity",): ("loads",), ("row", "column"): ("pressures",)}
+
+    contact: Contact
+    pressures: Array
+    loads: Array
+    load: float
+    area: float
+    pieces: int
+    resolution: float
+
+    def compared(self) -> list[tuple[str, float, float]]:
+        """What it is, of the asperities, and of the whole map."""
+        model = self.contact
+        area = float((np.pi * model.contact_radii**2).sum())
+        touching = int(np.count_nonzero(model.loads))
+        heaviest = float(model.loads.max()), float(self.loads.max())
+        return [
+            ("load", model.load, self.load),
+            ("area of contact", area, self.area),
+            ("contacts", touching, self.pieces),
+            ("largest load", *heaviest),
+        ]
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        for name, model, whole in self.compared():
+            yield name, f"{whole:.6g}; of the asperities {model:.6g}, {model / whole - 1:+.1%}"
+        yield "resolution", f"{self.resolution:.2g}"
+
+
+def press_whole(surface: Surface, contact: Contact) -> Whole:
+    """Press a map as a contact of its summits was, with every pixel an element.
+
+    The base is that of the contact's scene about the middle of the map, at the contact's approach.
+    Raises InputError where no pixel touches, or contact reaches the edge of the map.
+
+    >>> scan = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1)
+    >>> on_summits = cr.press(cr.Scene(1e4, scan.summits(), cr.Material(1.0, 0.3)), load=10.0)
+    >>> whole = cr.surface.press_whole(scan, on_summits)
+    >>> print(f"{on_summits.load / whole.load - 1:+.0%}")
+    +6%
+    """
+    checks.instance("surface", surface, Surface)
+    checks.instance("contact", contact, Contact)
+    pressures, load = _pressed(surface, contact, 1)
+    touching = pressures > 0
+    edges = (touching[0], touching[-1], touching[:, 0], touching[:, -1])
+    if any(edge.any() for edge in edges):
+        found = "contact at the edge of the map"
+        raise InputError("map", found=found, expected="a larger map, or a smaller approach or load")
+    row, column = np.nonzero(touching)
+    x, y = _places(surface, 1)
+    area = surface.pixel[0] * surface.pixel[1]
+    tree = cKDTree(contact.scene.contact_points)
+    _, nearest = tree.query(np.column_stack((x[column], y[row])))
+    loads = np.bincount(nearest, pressures[touching] * area, len(contact.loads))
+    _, pieces = ndimage.label(touching, structure=np.ones((3, 3)))
+    return Whole(
+        contact=contact,
+        pressures=frozen(pressures),
+        loads=frozen(loads.astype(np.float64)),
+        load=load,
+        area=len(row) * area,
+        pieces=int(pieces),
+        resolution=abs(_pressed(surface, contact, 2)[1] / load - 1.0),
+    )
+
+
+def _places(surface: Surface, every: int) -> tuple[Array, Array]:
+    """x of the columns and y of the rows."""
+    (rows, columns), (dx, dy) = surface.heights.shape, surface.pixel
+    x, y = (np.arange(columns) - (columns - 1) / 2) * dx, (np.arange(rows) - (rows - 1) / 2) * dy
+    return x[::every], y[::every]
+
+
+def _pressed(surface: Surface, contact: Contact, every: int) -> tuple[Array, float]:
+    """Pressures of every so many pixels along each side, and their load."""
+    x, y = _places(surface, every)
+    overlap = contact.approach + surface.heights[::every, ::every]
+    for radius, axes in contact.scene.curved:
+        for axis in np.arange(2)[axes]:
+            overlap = overlap - (y[:, None] ** 2 if axis else x**2) / (2.0 * radius)
+    row, column = (np.flatnonzero((overlap > 0).any(axis=axis)) for axis in (1, 0))
+    if len(row) == 0:
+        raise InputError("map", found="no pixel that touches", expected="a larger approach or load")
+    box = np.s_[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
+    inside = overlap[box]
+    checks.fits_in_memory("pixels of the map", inside.size, 200)
+    pixel = (surface.pixel[0] * every, surface.pixel[1] * every)
+    modulus = contact.scene.material.contact_modulus
+    half_space = HalfSpace((inside.shape[0], inside.shape[1]), pixel, modulus)
+    width = max(inside.shape) * max(pixel)
+    pressures = np.zeros_like(overlap)
+    pressures[box] = touch(half_space, inside, modulus * inside / width)
+    return pressures, float(pressures.sum()) * pixel[0] * pixel[1]

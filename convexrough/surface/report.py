@@ -1,0 +1,276 @@
+"""What `summits` says of a surface: for people, for programs, and in tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from convexrough.contact import Contact
+from convexrough.surface import Provability, Summits, Surface, Whole, crowded, model_errors
+from convexrough.surface.provability import TOO_FAR
+from convexrough.tabular.columns import aligned
+from convexrough.version import __version__
+
+#: Columns of summits.csv beside x, y, height and tip_radius, which a scene file reads.
+COLUMNS = ("x", "y", "heights", "tip_radii", "prominences", "largest_curvatures",
+           "smallest_curvatures", "eccentricities", "elliptic_loads", "deviations")  # fmt: skip
+
+#: How the units of columns follow from that of length.
+LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
+LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature"), "1/{}")
+
+#: Crowded pairs that the terminal names before it says how many more there are.
+MOST_LISTED = 10
+
+#: Part of a map's half width from which on contact is too near to its edge.
+NEAR_EDGE = 0.9
+
+#: Part by which a statistic may differ from that of the moments without a word.
+UNLIKE = 0.2
+
+
+@dataclass(frozen=True)
+class Scanned:
+    """A surface, all its summits, those that pruning leaves, and what comes of pressing on them.
+
+    curve, contact : None where nobody said how they are pressed; contact also where none was found
+    whole : the map by boundary elements, where asked
+    """
+
+    surface: Surface
+    maxima: Summits
+    summits: Summits
+    curve: Provability | None = None
+    contact: Contact | None = None
+    whole: Whole | None = None
+
+    @property
+    def certified(self) -> bool:
+        """Nothing was pressed, or what was is proved."""
+        return self.curve is None or (self.contact is not None and self.contact.certificate.holds)
+
+
+def surface_summary(scanned: Scanned) -> dict[str, Any]:
+    """What `--json` prints, in the unit of the map."""
+    surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
+    moments = surface.moments
+    summary: dict[str, Any] = {
+        "schema": 1,
+        "version": __version__,
+        "surface": {
+            "source": surface.source,
+            "shape": list(origin.shape),
+            "pixel": list(surface.pixel),
+            "unit": surface.unit,
+            "removed": [
+                asdict(each) | {"radius": _finite(each.radius)} for each in surface.removed
+            ],
+            "filled": surface.filled,
+            "max_height": surface.max_height,
+            "rms_height": surface.rms_height,
+            "rms_slope": surface.rms_slope,
+        },
+        "summits": {
+            "count": len(summits),
+            "maxima": origin.maxima,
+            "pruned": origin.pruned,
+            "at_edge": origin.at_edge,
+            "without_top": origin.without_top,
+            "prune": origin.prune,
+            "threshold": origin.threshold,
+            "fit": origin.fit,
+        },
+        "statistics": {
+            "all": scanned.maxima.statistics._asdict(),
+            "pruned": summits.statistics._asdict(),
+            "moments": {
+                name: getattr(moments, name)
+                for name in (*scanned.maxima.statistics._fields, "m0", "m2", "m4", "bandwidth")
+            },
+        },
+    }
+    if scanned.curve is not None:
+        summary["provability"] = [_without_nan(row) for row in curve_rows(scanned.curve)]
+        summary["trusted_from"] = _finite(scanned.curve.trusted_from)
+    if scanned.contact is not None:
+        pairs, values = crowded(scanned.contact)
+        summary["crowded"] = [
+            {"summits": pair, "crowding": value}
+            for pair, value in zip(pairs.tolist(), values.tolist(), strict=True)
+        ]
+        summary["strained"] = np.flatnonzero(model_errors(scanned.contact) > TOO_FAR).tolist()
+    if scanned.whole is not None:
+        summary["whole"] = {
+            name: {"asperities": model, "whole": whole}
+            for name, model, whole in scanned.whole.compared()
+        } | {"resolution": scanned.whole.resolution}
+    return summary
+
+
+def summit_columns(summits: Summits) -> dict[str, Any]:
+    """The table that a scene file reads, with units in its header."""
+    unit, columns = summits.origin.unit, summits.columns(*COLUMNS)
+    named = {
+        f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name: values
+        for name, values in columns.items()
+    }
+    return named | {"row": summits.pixels[:, 0], "column": summits.pixels[:, 1]}
+
+
+def curve_rows(curve: Provability) -> list[dict[str, Any]]:
+    """A row for each pruning, as in the JSON and the table of the curve."""
+    names = ("prune", "heights", "summits", "contacts", "undecided", "scope", "crowding",
+             "model_error", "approaches", "loads", "trusted")  # fmt: skip
+    called = {"heights": "height", "approaches": "approach", "loads": "load"}
+    columns = [getattr(curve, name).tolist() for name in names]
+    keys = [called.get(name, name) for name in names]
+    return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def _without_nan(row: dict[str, Any]) -> dict[str, Any]:
+    return {key: _finite(it) if isinstance(it, float) else it for key, it in row.items()}
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def describe_surface(scanned: Scanned) -> list[str]:
+    """Aligned lines for people."""
+    surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
+    unit = f" {surface.unit}" if surface.unit else ""
+    rows, columns = origin.shape
+    dx, dy = surface.pixel
+    tips = summits.tip_radii
+    left_out = [f"{origin.pruned:,} pruned"]
+    left_out += [f"{origin.at_edge:,} at the edge"] if origin.at_edge else []
+    left_out += [f"{origin.without_top:,} without a top"] if origin.without_top else []
+    off = float(np.median(summits.deviations))
+    lines = [
+        ("surface", surface.source),
+        ("pixels", f"{columns:,} by {rows:,}, each {dx:.6g} by {dy:.6g}{unit}"),
+        ("removed", "; ".join(map(str, surface.removed)) or "nothing"),
+        *((("holes filled", f"{surface.filled:,}"),) if surface.filled else ()),
+        ("heights", f"Sz {surface.max_height:.4g}{unit}, Sq {surface.rms_height:.4g}{unit}, "
+                    f"rms slope {surface.rms_slope:.3g}"),
+        ("pruning", f"{100 * origin.prune:.3g} % of Sz, {origin.threshold:.4g}{unit}  (Wolf)"),
+        ("summits", f"{len(summits):,}  (of {origin.maxima:,} maxima: {', '.join(left_out)})"),
+        ("tip radius", f"median {np.median(tips):.4g}{unit}, {tips.min():.4g} to {tips.max():.4g}"
+                       f"  (paraboloids over {origin.fit} by {origin.fit} pixels)"),
+        ("eccentricity", f"median {np.median(summits.eccentricities):.2f}, largest "
+                         f"{summits.eccentricities.max():.2f}  (as ellipses they would carry up to "
+                         f"{100 * (summits.elliptic_loads.max() - 1):.2g} % more)"),
+        ("off a sphere", f"rms, median {off:.2g}{unit}, largest {summits.deviations.max():.2g}"),
+        ("bandwidth", f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
+                      f"m2 {surface.moments.m2:.4g}, m4 {surface.moments.m4:.4g})"),
+    ]  # fmt: skip
+    described = [f"{name:<18}{text}" for name, text in lines]
+    described += ["", *_describe_statistics(scanned)]
+    if scanned.curve is not None:
+        described += ["", *_describe_curve(scanned.curve, surface.unit)]
+    if scanned.contact is not None:
+        described += _describe_crowded(scanned.contact)
+    if scanned.whole is not None:
+        table = [["the same approach", "asperities", "whole map", "difference"]]
+        for name, model, whole in scanned.whole.compared():
+            table.append([name, f"{model:.6g}", f"{whole:.6g}", f"{model / whole - 1:+.1%}"])
+        described += ["", *aligned(table, left=1)]
+        change = f"{100 * scanned.whole.resolution:.2g} %"
+        described.append(f"{'resolution':<18}pixels twice as wide change the load by {change}")
+    return described
+
+
+def _describe_statistics(scanned: Scanned) -> list[str]:
+    """Counted, and expected of a Gaussian surface with the same moments."""
+    maxima, left = scanned.maxima.statistics, scanned.summits.statistics
+    moments, unit = scanned.surface.moments, scanned.surface.unit
+    units = (f" [1/{unit}²]", f" [1/{unit}]", f" [{unit}]", f" [{unit}]") if unit else [""] * 4
+    names = ("density", "mean curvature", "mean height", "height std")
+    table = [["statistics", "all maxima", "after pruning", "by moments"]]
+    for field, name, each in zip(maxima._fields, names, units, strict=True):
+        values = (getattr(maxima, field), getattr(left, field), getattr(moments, field))
+        table.append([name + each, *(f"{value:.4g}" for value in values)])
+    return aligned(table, left=1)
+
+
+def _describe_curve(curve: Provability, unit: str) -> list[str]:
+    height = f"height [{unit}]" if unit else "height"
+    table = [["pruning", height, "summits", "contacts", "undecided", "proof", "crowding",
+              "model error", "trusted"]]  # fmt: skip
+    for row in curve_rows(curve):
+        table.append([
+            f"{100 * row['prune']:.3g} %", f"{row['height']:.4g}", f"{row['summits']:,}",
+            f"{row['contacts']:,}", f"{row['undecided']:,}", row["scope"],
+            f"{row['crowding']:.3g}", f"{row['model_error']:.2g}",
+            ("yes" if row["trusted"] else "no") if row["contacts"] else "-",
+        ])  # fmt: skip
+    first = curve.trusted_from
+    said = "at no pruning" if np.isnan(first) else f"from a pruning of {100 * first:.3g} % on"
+    if not curve.contacts.any():
+        said = "nothing, as nothing touches"
+    return [*aligned(table), "", f"{'to be trusted':<18}{said}"]
+
+
+def _describe_crowded(contact: Contact) -> list[str]:
+    """Which summits are in the way of trust."""
+    pairs, values = crowded(contact)
+    lines = []
+    if len(pairs):
+        lines.append(f"{'overlapping':<18}{len(pairs):,} pairs, by row of the table from 0:")
+        x, y = contact.scene.asperities.positions.T
+        table = [["summits", "", "crowding", "x", "y"]]
+        for (i, j), value in list(zip(pairs.tolist(), values, strict=True))[:MOST_LISTED]:
+            table.append([str(i), str(j), f"{value:.3g}", f"{x[i]:.6g}", f"{y[i]:.6g}"])
+        lines += [f"    {line}" for line in aligned(table)]
+        if (more := len(pairs) - MOST_LISTED) > 0:
+            lines.append(f"    and {more:,} more: --json has all")
+    strained = np.flatnonzero(model_errors(contact) > TOO_FAR)
+    if len(strained):
+        named = ", ".join(map(str, strained[:MOST_LISTED]))
+        rest = f" and {others:,} more" if (others := len(strained) - MOST_LISTED) > 0 else ""
+        lines.append(f"{'model error':<18}above {TOO_FAR:.0%} at summits {named}{rest}")
+    return lines
+
+
+def doubts_of_surface(scanned: Scanned) -> Iterator[str]:
+    """What a user should know, in words with numbers."""
+    surface, summits, contact = scanned.surface, scanned.summits, scanned.contact
+    yield from surface.warnings
+    said, found = surface.moments, scanned.maxima.statistics
+    if (ratio := max(said.slope_ratio, 1 / (said.slope_ratio or 1e-300))) > 2:
+        yield (
+            f"slopes along one axis are {min(ratio, 1e6):.3g} times those along the other: the "
+            "moments are those of a surface with no direction, and tips are ridges"
+        )
+    for name in ("density", "mean_curvature"):
+        counted, expected = getattr(found, name), getattr(said, name)
+        if abs(counted / expected - 1) > UNLIKE:
+            yield (
+                f"{name.replace('_', ' ')} of all maxima is {counted / expected:.2f} of what the "
+                "spectral moments of a Gaussian surface would give"
+            )
+    if scanned.curve is None:
+        return
+    chosen = summits.origin.prune
+    first = scanned.curve.trusted_from
+    if not first <= chosen:
+        more = "no pruning is strong enough" if np.isnan(first) else f"--prune {first:g} is"
+        yield f"at a pruning of {chosen:g} the asperity model is not to be trusted; {more}"
+    if contact is not None and not contact.loads.any():
+        yield (
+            f"at a pruning of {chosen:g} nothing touches: trust is that of a contact, so press "
+            "deeper, or with a load"
+        )
+    if contact is None:
+        yield f"at a pruning of {chosen:g} no solution was found"
+    elif contact.loads.any():
+        points = contact.scene.contact_points[contact.loads > 0]
+        part = float((np.abs(points).max(axis=0) / np.array(surface.size) * 2).max())
+        if part > NEAR_EDGE:
+            yield (
+                f"contact reaches {part:.0%} of the way to the edge of the map: beyond it there "
+                "may be more"
+            )

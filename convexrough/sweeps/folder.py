@@ -1,0 +1,162 @@
+"""The folder of a sweep: a manifest that never changes, and parts, each written once and whole.
+
+A part is a Parquet file of some rows that follow each other, named by its first scene. All have as
+many, so that whoever computes a part, and when, writes the same file.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from convexrough.errors import ExtraError, FileError
+from convexrough.sweeps.batch import Columns, different
+from convexrough.whole import to_json, write_text
+
+MANIFEST, PARTS = "manifest.json", "parts"
+
+
+@dataclass(frozen=True)
+class Folder:
+    """A folder of results."""
+
+    path: Path
+    manifest: Mapping[str, Any]
+
+    def scenes(self, first: int) -> range:
+        """Those of the part that begins with this one."""
+        return range(first, min(first + self.manifest["batch"], self.manifest["scenes"]))
+
+    def parts(self) -> list[range]:
+        """The scenes of each part, in their order; other files are not looked at."""
+        try:
+            names = [each.stem for each in (self.path / PARTS).glob("*.parquet")]
+        except OSError as error:
+            raise _unreadable(self.path / PARTS, error) from error
+        return [self.scenes(int(name)) for name in sorted(names, key=int) if name.isdecimal()]
+
+    def file(self, part: range) -> Path:
+        return self.path / PARTS / f"{part.start:012d}.parquet"
+
+    def write(self, columns: Columns) -> None:
+        """Write a part, whole or not at all."""
+        pyarrow, parquet = arrow()
+        whole = BytesIO()
+        parquet.write_table(pyarrow.table(columns), whole, write_page_checksum=True)
+        write_text(self.file(self.scenes(int(columns["scene"][0]))), whole.getvalue())
+
+    def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
+        """Some columns of a part, default all; FileError where it is damaged."""
+        pyarrow, parquet = arrow()
+        path = self.file(part)
+        try:
+            # Threads of its own could outlive the interpreter, which ends the process by an abort.
+            found = parquet.read_table(
+                path,
+                columns=None if names is None else list(names),
+                use_threads=False,
+                pre_buffer=False,
+                page_checksum_verification=True,
+            )
+        except (OSError, pyarrow.ArrowException) as error:
+            raise FileError(f"{path}: damaged ({error}); --resume computes it again") from error
+        arrays = {name: found[name].to_numpy() for name in found.column_names}
+        return {  # text of pyarrow comes as objects
+            name: values.astype(np.str_) if values.dtype == object else values
+            for name, values in arrays.items()
+        }
+
+    def missing(self, wanted: Iterable[range]) -> tuple[list[range], str]:
+        """Which parts are to be computed, and what was found; what is damaged is removed."""
+        known, todo = {part.start for part in self.parts()}, []
+        scenes = damaged = unfinished = 0
+        for part in wanted:
+            if part.start in known:
+                try:
+                    self.read(part)
+                    scenes += len(part)
+                    continue
+                except FileError:
+                    self.file(part).unlink()
+                    damaged += 1
+            todo.append(part)
+        mine = {self.file(part).name for part in todo}
+        for left in (self.path / PARTS).glob(".*.unfinished"):
+            if left.name[1:].rsplit(".", 2)[0] in mine:
+                left.unlink(missing_ok=True)
+                unfinished += 1
+        said = f"found {scenes:,} scenes"
+        said += f", {damaged:,} damaged parts removed" if damaged else ""
+        return todo, said + (f", {unfinished:,} unfinished files removed" if unfinished else "")
+
+
+def open_folder(path: Path) -> Folder:
+    """A folder that holds a sweep; FileError if it does not."""
+    try:
+        manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
+        if not isinstance(manifest, dict) or manifest.get("schema") != 2:
+            raise ValueError("no sweep of this version")
+    except FileNotFoundError as error:
+        raise FileError(f"{path}: no sweep: there is no {MANIFEST}") from error
+    except (OSError, ValueError) as error:
+        raise _unreadable(path / MANIFEST, error) from error
+    return Folder(path, manifest)
+
+
+def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
+    """The folder of this sweep, made where it is not there.
+
+    Raises FileError where it holds another sweep, or other things, or cannot be written.
+    """
+    if overwrite and (path / MANIFEST).exists():
+        for part in (path / PARTS).glob("*.parquet"):
+            part.unlink(missing_ok=True)
+        (path / MANIFEST).unlink()
+    if not (path / MANIFEST).exists():
+        try:
+            (path / PARTS).mkdir(parents=True, exist_ok=True)
+            # A manifest may come while this looks: of another process, of the same sweep or not.
+            strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
+        except OSError as error:
+            raise FileError(f"{path}: cannot hold results: {error.strerror or error}") from error
+        if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
+            raise FileError(f"{path}: holds {strangers[0]}, and no sweep; --out takes another")
+        if not (path / MANIFEST).exists():
+            write_text(path / MANIFEST, to_json(manifest) + "\n")
+    folder = open_folder(path)
+    there = folder.manifest
+    if there["sweep"] != manifest["sweep"]:
+        raise FileError(
+            f"{path}: holds another sweep, {_named(there)}; this is {_named(manifest)}; "
+            f"--force overwrites it, --out takes another folder"
+        )
+    if other := different(there["versions"]):
+        raise FileError(f"{path}: was begun with {other}; rows would not be of one kind")
+    return folder
+
+
+def _named(manifest: Mapping[str, Any]) -> str:
+    return (
+        f"{manifest['scenes']:,} scenes of {manifest['source']} by version {manifest['version']}, "
+        f"hash {manifest['sweep'][:16]}"
+    )
+
+
+def arrow() -> tuple[Any, Any]:
+    """pyarrow and its Parquet."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise ExtraError("parquet") from error
+    return pyarrow, pyarrow.parquet
+
+
+def _unreadable(path: Path, error: Exception) -> FileError:
+    return FileError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}")

@@ -1,0 +1,109 @@
+"""What a sweep computes: its scenes, the columns of its table, and the size of its parts."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from convexrough.errors import InputError
+from convexrough.sweeps.batch import FAILURES, VERSIONS, Batch
+from convexrough.sweeps.measures import Column, chosen, unit
+from convexrough.sweeps.scenes import Source, Tables
+from convexrough.tabular.units import UnitNames
+from convexrough.version import __version__
+
+#: Scenes of a batch, at most; asperities in it, about; and batches of a small sweep.
+MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
+
+#: Scenes that are tried for what can be measured, where the first ones fail.
+TRIED = 5
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a sweep computes.
+
+    size     : scenes of each batch, and part;  left_out : stages of which nothing is measured
+    identity : the SHA-256 of all that its numbers depend on
+    said     : what it was read from, for its manifest;  units : as its file names them
+    """
+
+    source: Source
+    columns: tuple[Column, ...]
+    left_out: tuple[str, ...]
+    size: int
+    identity: str
+    said: Mapping[str, Any]
+    units: UnitNames
+
+    @property
+    def parts(self) -> int:
+        """How many."""
+        return -(-self.source.count // self.size)
+
+    def part(self, number: int) -> range:
+        first = number * self.size
+        return range(first, min(first + self.size, self.source.count))
+
+    def batch(self, part: range) -> Batch:
+        return Batch(self.source.part(part), self.columns, part)
+
+    def manifest(self) -> dict[str, Any]:
+        """What a folder says of its sweep; the same whenever it is made.
+
+        each : scenes that differ by their seed alone
+        """
+        grid = self.source.grid if isinstance(self.source, Tables) else None
+        labels = list(self.source.labels(range(0)))
+        numbers = {key: key for key in labels} | {it.name: it.number for it in self.columns}
+        return {
+            "schema": 2,
+            "version": __version__,
+            "sweep": self.identity,
+            "scenes": self.source.count,
+            "each": 1 if grid is None else grid.each,
+            "batch": self.size,
+            "columns": ["scene", *labels, "status", "message", *(it.name for it in self.columns)],
+            "drawn": [] if grid is None else [draw.key for draw in grid.draws],
+            "not_measured": list(self.left_out),
+            "units": {name: it for name, end in numbers.items() if (it := unit(end, self.units))},
+            **self.said,
+            "versions": VERSIONS,
+        }
+
+
+def planned(
+    source: Source,
+    measures: Sequence[str],
+    said: Mapping[str, Any],
+    units: UnitNames,
+    **given: Any,
+) -> Plan:
+    """The plan of scenes; the first of them says what can be measured, and how large they are.
+
+    given : all that their numbers depend on, but for what is measured and this package
+
+    Raises InputError where a measure is not there, and what the first scenes raise if all fail.
+    """
+    press = source.part(range(tried := min(source.count, TRIED))).opened()
+    for number in range(tried):
+        try:
+            contact, stages = press(number)
+            columns = chosen(contact, stages, measures)
+            break
+        except FAILURES as error:
+            if number == tried - 1:
+                if isinstance(error, InputError) and not error.where:
+                    raise error.within(str(said["source"])) from error
+                raise
+    used = {"normal", *(column.stage for column in columns)}
+    left_out = tuple(name for name in stages if name not in used)
+    few = -(-source.count // LEAST_BATCHES)
+    size = max(1, min(MOST_SCENES, MOST_ASPERITIES // len(contact.scene), few))
+    contents = {"version": __version__, "measure": list(measures), **given}
+    text = json.dumps(contents, sort_keys=True, default=repr)
+    identity = hashlib.sha256(text.encode()).hexdigest()
+    return Plan(source, columns, left_out, size, identity, said, units)

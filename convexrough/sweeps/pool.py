@@ -1,0 +1,179 @@
+"""Who computes the batches: processes here, Dask workers anywhere, or any executor."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager, suppress
+from itertools import islice
+from types import ModuleType
+from typing import Any
+
+from convexrough.errors import ExtraError, InputError, WorkerError
+from convexrough.sweeps.batch import VERSIONS, Batch, Columns, Rows, compute, different
+from convexrough.threads import cores
+
+#: Batches that an executor is given at once; for each process here: more are lost with one.
+AT_ONCE, EACH = 1000, 2
+
+#: Batches whose worker died after which no worker lives.
+MOST_LOST = 64
+
+Lost = list[tuple[Batch, BaseException]]
+
+
+def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
+    """The rows of batches, as they come.
+
+    A batch whose worker died is computed again, alone, after the others. Raises WorkerError where
+    its worker dies again, or where nobody is left to compute.
+    """
+    lost = yield from _together(iter(batches), executor)
+    dead: Lost = []
+    for batch, _ in lost:
+        dead += yield from _together(iter((batch,)), executor)
+    if dead:
+        which = ", ".join(str(batch) for batch, _ in dead)
+        raise WorkerError(f"the process that computed scenes {which} died, twice") from dead[0][1]
+
+
+def _together(batches: Iterator[Batch], executor: Executor) -> Generator[Columns, None, Lost]:
+    """The rows of batches, in any order; and those whose workers died."""
+    most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
+    pending: dict[Future[Rows], Batch] = {}
+    lost: Lost = []
+    try:
+        while True:
+            for batch in islice(batches, most - len(pending)):
+                pending[executor.submit(compute, batch)] = batch
+            if not pending:
+                return lost
+            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                batch = pending.pop(future)
+                try:
+                    rows = future.result()
+                except _lost() as error:
+                    lost.append((batch, error))
+                    if len(lost) > MOST_LOST:
+                        raise WorkerError(f"workers die as soon as they live: {error}") from error
+                    continue
+                if rows.versions != VERSIONS:
+                    raise WorkerError(f"a worker has other versions: {different(rows.versions)}")
+                yield rows.columns
+    except BrokenExecutor as error:  # it takes nothing more, and is not ours to start anew
+        raise WorkerError(f"the executor is of no use any more: {error}") from error
+    except CancelledError as error:
+        raise WorkerError("a batch was dropped: is its scheduler gone?") from error
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def _lost() -> tuple[type[BaseException], ...]:
+    """What a future raises where workers died with its batch: those of Dask have an error more."""
+    distributed = sys.modules.get("distributed")
+    return (BrokenExecutor, *((distributed.KilledWorker,) if distributed else ()))
+
+
+class Processes(Executor):
+    """Processes of this machine, new ones where some died.
+
+    They are started as new interpreters, so that no lock or thread is inherited.
+    """
+
+    def __init__(self, workers: int | None = None) -> None:
+        self.workers = workers or cores()
+        self._context = multiprocessing.get_context("spawn")
+        self._held, self._leash = self._context.Pipe(duplex=False)
+        self._pool = self._begun()
+
+    def _begun(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(
+            self.workers, self._context, initializer=_end_with, initargs=(self._held,)
+        )
+
+    def submit(self, function: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+        with _sheltered():
+            try:
+                return self._pool.submit(function, *given, **named)
+            except BrokenExecutor:
+                self._pool = self._begun()
+                return self._pool.submit(function, *given, **named)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = True) -> None:
+        """Ends the processes at once, whatever they are about."""
+        self._leash.close()
+        self._pool.shutdown(wait, cancel_futures=cancel_futures)
+
+
+def _end_with(held: Any) -> None:
+    """A process of ours ends with whoever started it, however that ends, and not by an interrupt.
+
+    held : one end of a pipe whose other end nobody else has
+    """
+
+    def watch() -> None:
+        with suppress(EOFError, OSError):
+            held.recv_bytes()
+        os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def _sheltered() -> Iterator[None]:
+    """New processes do not run the user's script, which need not be guarded, and no interrupt.
+
+    A terminal interrupts them, too, and what is blocked here they have blocked for ever.
+    """
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    masks = hasattr(signal, "pthread_sigmask")  # not everywhere
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
+    try:
+        yield
+    finally:
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        sys.modules["__main__"] = script
+
+
+@contextmanager
+def dask(address: str) -> Iterator[Executor]:
+    """The workers of a Dask scheduler, which may come and go.
+
+    address : of the scheduler, "tcp://host:port"; or its file, "scheduler.json"; or "local" for a
+        cluster of its own on this machine
+
+    Raises ExtraError where Dask is not installed, and InputError where nobody answers.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ExtraError("dask") from error
+    try:
+        if address == "local":
+            client = Client(n_workers=cores(), threads_per_worker=1, dashboard_address=None)
+        elif address.endswith(".json"):
+            client = Client(scheduler_file=address)
+        else:
+            client = Client(address)
+    except (OSError, ValueError, TimeoutError) as error:
+        expected = 'a scheduler of Dask that answers, its file, or "local"'
+        raise InputError("scheduler", found=f"{address} ({error})", expected=expected) from error
+    with client:
+        yield client.get_executor(pure=False)

@@ -1,0 +1,144 @@
+"""Where the scenes of a sweep come from, and how each is pressed: tables of a file, or objects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array
+from convexrough.contact import Contact, press, solve
+from convexrough.errors import SceneFileError
+from convexrough.normal.problem import NormalProblem
+from convexrough.run.scene_file import READ, Layouts, build_scene
+from convexrough.scene.scene import Scene
+from convexrough.solvers import named
+from convexrough.sweeps.grid import Grid
+from convexrough.sweeps.measures import Stages
+
+if TYPE_CHECKING:
+    from convexrough.run.study import Study
+
+#: Layouts of asperities that are kept for the scenes to come.
+KEPT = 8
+
+#: From the number of a scene to its contact, and what is asked of it.
+Press = Callable[[int], tuple[Contact, Stages]]
+
+#: What stands in the column of seeds where nothing is random.
+NO_SEED = -1
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Scenes of a grid over the keys of a scene file.
+
+    path : of the file, for messages and for what paths in it are relative to
+    """
+
+    grid: Grid
+    path: Path
+
+    @property
+    def count(self) -> int:
+        return self.grid.count
+
+    def labels(self, numbers: range) -> dict[str, NDArray[Any]]:
+        """The columns that say which scenes these are: what is swept, and the seed."""
+        points = [self.grid.point(number) for number in numbers]
+        known = self.grid.tables.get("asperities", {}).get("seed", NO_SEED)
+        seeds = [known if each.seed is None else each.seed for each in points]
+        swept: dict[str, NDArray[Any]] = {}
+        for key in self.grid.keys:
+            values = [each.values[key] for each in points]
+            if self.grid.is_number(key):
+                swept[key] = np.array(values, dtype=np.float64)
+            else:  # lists as they stand in the file
+                swept[key] = np.array([it if isinstance(it, str) else repr(it) for it in values])
+        return swept | {"seed": np.array(seeds, dtype=np.int64)}
+
+    def part(self, numbers: range) -> Tables:
+        """What a worker needs to know for these numbers, which stay the same."""
+        return self
+
+    def opened(self) -> Press:
+        """How to press scenes; those one after the other share what they have in common."""
+        layouts = Layouts(*map(lru_cache(KEPT), READ))
+        last: dict[str, Any] = {}
+
+        def press_one(number: int) -> tuple[Contact, Stages]:
+            study = self._study(number, last)
+            scene, highest = build_scene(self.path, study, layouts)
+            problem = NormalProblem.assemble(
+                scene,
+                approach=study.normal.approach,
+                load=study.normal.load,
+                influence=study.solver.influence,
+                highest=highest,
+            )
+            return solve(problem, named(study.solver.name)), study.stages
+
+        return press_one
+
+    def _study(self, number: int, last: dict[str, Any]) -> Study:
+        """The tables of a scene; of those that differ by a seed alone, checked once."""
+        from convexrough.run.study import Lattice, validate
+
+        point = self.grid.point(number)
+        if last.get("values") != point.values:
+            study, mistakes = validate(self.grid.with_values(*point))
+            if study is None:
+                raise SceneFileError(str(self.path), mistakes)
+            last.update(values=point.values, study=study)
+        known: Study = last["study"]
+        if point.seed is None or not isinstance(known.asperities, Lattice):
+            return known
+        layout = known.asperities.model_copy(update={"seed": point.seed})
+        return known.model_copy(update={"asperities": layout})
+
+
+@dataclass(frozen=True)
+class Objects:
+    """Scenes made in Python, each with its approach [length] or load [force].
+
+    first : the number of the first of them
+    """
+
+    scenes: Sequence[Scene]
+    controls: Array
+    by_load: bool
+    stages: Stages
+    first: int = 0
+
+    @property
+    def count(self) -> int:
+        return len(self.scenes)
+
+    def labels(self, numbers: range) -> dict[str, NDArray[Any]]:
+        key = "normal.load" if self.by_load else "normal.approach"
+        given = [self.controls[number - self.first] for number in numbers]
+        seeds = np.full(len(numbers), NO_SEED, dtype=np.int64)
+        return {key: np.array(given, dtype=np.float64), "seed": seeds}
+
+    def part(self, numbers: range) -> Objects:
+        places = slice(numbers.start - self.first, numbers.stop - self.first)
+        scenes, controls = self.scenes[places], self.controls[places]
+        return replace(self, scenes=scenes, controls=controls, first=numbers.start)
+
+    def opened(self) -> Press:
+        def press_one(number: int) -> tuple[Contact, Stages]:
+            place = number - self.first
+            scene, control = self.scenes[place], float(self.controls[place])
+            pressed = press(scene, load=control) if self.by_load else press(scene, approach=control)
+            return pressed, self.stages
+
+        return press_one
+
+
+#: The scenes of a sweep, by their numbers from 0.
+Source: TypeAlias = Tables | Objects

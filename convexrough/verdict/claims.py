@@ -1,0 +1,295 @@
+"""Forces that somebody claims, from a file: one per asperity of a scene, in its order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.errors import InputError, TableError
+from convexrough.scene.neighbours import nearest_distances
+from convexrough.scene.scene import Scene
+from convexrough.surface.grid import steps
+from convexrough.tabular.table import Reading, Table, few, read_table
+from convexrough.tabular.text import bare
+from convexrough.verdict.verdict import NOISE, rounded_up
+
+#: Positions in a file may be off by this part of the least spacing, unless a tolerance is given:
+#: five digits are enough, and every asperity still has one nearest row.
+POSITION_TOLERANCE = 1e-2
+
+#: Asperities at which a shift is tried, where rows are missing.
+MOST_TRIED = 1000
+
+#: Names of columns that can only number asperities.
+SURELY_INDEX = ("index", "asperity")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manner(Reading):
+    """How a file of forces is read.
+
+    sign      : -1 where compression is negative
+    tolerance : [length] by which positions may be off; default: 1 % of the least spacing
+    missing_open : asperities without a row are open
+    nodes     : rows are nodes or pixels, which add up at their nearest asperity
+    """
+
+    sign: int = 1
+    tolerance: float | None = None
+    missing_open: bool = False
+    nodes: bool = False
+    scalable: bool = True
+
+
+PLAIN = Manner()
+
+
+class Claimed(NamedTuple):
+    """Forces in the order of the scene's asperities.
+
+    status : (n,) what the file calls them, where it does
+    note   : how they were read, on a line;  explained : column by column
+    """
+
+    values: Array
+    status: NDArray[np.str_] | None
+    note: str
+    explained: list[str]
+
+
+def read_loads(path: Path, scene: Scene, how: Manner, floor: float = 0.0) -> Claimed:
+    """Loads [force] from a file; negative ones only as far as noise up to the floor.
+
+    Rows with positions are matched by them, then by an index; others are in the scene's order. A
+    column pressure, with an area or on a regular grid, is summed at the nearest asperities.
+
+    Raises TableError with every mistake, and FileError.
+    """
+    return _read(path, scene, "load", how, floor)
+
+
+def read_shear_forces(path: Path, scene: Scene, how: Manner) -> Claimed:
+    """The same for shear forces: a column force, and status where there is one."""
+    return _read(path, scene, "force", how, np.inf)
+
+
+def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Claimed:
+    table = read_table(
+        path,
+        required=(name,),
+        optional=("x", "y"),
+        instead={"load": ("pressure", "area")},
+        text=("status",) if name == "force" else (),
+        unnamed=((name,), ("x", "y", name)),
+        how=how,
+    )
+    columns, mistakes = table.columns, list[str]()
+    given = [each for each in ("x", "y") if each in columns]
+    if len(given) == 1:
+        mistakes.append(f"columns: found only {given[0]}, expected x and y")
+    summed = how.nodes or name not in columns
+    if summed and not given:
+        mistakes.append("columns: found neither x nor y, expected both, of nodes or pixels")
+    if mistakes:
+        raise TableError(str(path), mistakes)
+    values = columns[name] if name in columns else columns["pressure"] * _areas(path, columns)
+    if name == "load":
+        values = how.sign * values
+    place = _Placing(scene, table, how)
+    owners = place.nearest(values) if summed else place.owners()
+    forces = np.bincount(owners, values, minlength=len(scene)).astype(np.float64)
+    if summed:
+        place.mistakes += _negative(forces, floor, lambda i, what: f"load of asperity {i}{what}")
+    else:
+        said = f", column {name}"
+        place.mistakes += _negative(values, floor, lambda i, what: table.mistake(i, said + what))
+    if place.mistakes:
+        raise TableError(str(path), few(place.mistakes))
+    status = columns.get("status")
+    if status is not None:
+        status = frozen(_spread(status, owners, "open", len(scene)))
+    units = [f"{each} [{unit}]" for each, unit in table.units.items()]
+    note = ", ".join(filter(None, [table.style, *units, place.how]))
+    return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), place.how])
+
+
+def _negative(loads: Array, floor: float, mistake: Callable[[int, str], str]) -> Iterator[str]:
+    """Loads below what noise may be; `mistake` says where one is."""
+    if not len(bad := np.flatnonzero(loads < -floor)):
+        return
+    hint, largest, least = "", float(loads.max()), -float(loads[bad].min())
+    if largest <= floor:
+        yield "column load: no load is positive, expected compression to be: --sign -1"
+        return
+    if least <= NOISE * largest:
+        hint = f"; --floor {rounded_up(least)} counts noise as 0"
+    for i in bad:
+        found = f": found {float(loads[i])!r}, expected a number that is not negative{hint}"
+        yield mistake(int(i), found)
+
+
+def _spread(values: NDArray[Any], owners: Indices, rest: str, count: int) -> NDArray[Any]:
+    result = np.full(count, rest, dtype=np.result_type(values, np.array(rest)))
+    result[owners] = values
+    return result
+
+
+def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
+    """Of nodes, or of the pixels of a regular grid."""
+    if "area" in columns:
+        return columns["area"]
+    try:
+        (_, dx), (_, dy) = (steps(path, name, columns[name]) for name in ("x", "y"))
+    except InputError as error:
+        expected = f"a column 'area', or x and y on a regular grid: {error.what} {error.found}"
+        mistake = f"columns: found pressure without areas, expected {expected}"
+        raise TableError(str(path), [mistake]) from error
+    return dx * dy
+
+
+def _explained(table: Table) -> Iterator[str]:
+    """What each column is taken for."""
+    yield f"rows: {len(table.rows):,}{f', {table.style}' if table.style else ''}"
+    for name, called in table.called.items():
+        unit = f" in {table.units[name]}" if name in table.units else ""
+        times = f", times {table.factors[name]:.15g}" if name in table.factors else ""
+        yield f"{name}: column {bare(called)}{unit}{times}"
+    if table.others:
+        yield f"not looked at: {', '.join(table.others)}"
+
+
+class _Placing:
+    """Which asperity each row of a table belongs to, how that was found, and what is wrong."""
+
+    def __init__(self, scene: Scene, table: Table, manner: Manner) -> None:
+        self.scene, self.table, self.manner = scene, table, manner
+        self.mistakes: list[str] = []
+        self.how = "in the scene's order"
+        columns = table.columns
+        self.points = np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
+
+    def owners(self) -> Indices:
+        """Of rows that are asperities."""
+        count, rows = len(self.scene), len(self.table.rows)
+        found = np.arange(rows) if self.points is None else self._matched(self.points)
+        by = "positions"
+        if self.points is None:
+            by = ""
+            for name, index in self.table.indices.items():
+                if (numbered := self._numbered(name, index)) is not None:
+                    found, by = numbered, f"column {name or 'without a name'}"
+                    break
+        if rows != count and not (rows < count and by and self.manner.missing_open):
+            advice = "; --nodes adds up rows at their nearest asperity" if rows > count else ""
+            if rows < count and by:
+                advice = "; --missing-open takes the others for open"
+            expected = f"expected {count}, one per asperity of the scene{advice}"
+            self.mistakes.insert(0, f"rows: found {rows}, {expected}")
+        return found
+
+    def nearest(self, values: Array) -> Indices:
+        """Of rows that are nodes or pixels; those with a load must be near one."""
+        assert self.points is not None
+        distances, owners = _nearest(self.scene.contact_points, self.points)
+        apart = np.full(len(self.scene), self.scene.sphere_radius)
+        if len(self.scene) > 1:
+            apart = nearest_distances(self.scene.asperities.positions)
+        for i in np.flatnonzero((values != 0) & (distances > apart[owners])):
+            found = (
+                f"a load at {self.points[i].tolist()}, {distances[i]:g} from the nearest asperity"
+            )
+            self._refuse(i, found, f"less than to its neighbour, {apart[owners[i]]:.3g}")
+        self.how = f"{len(owners):,} nodes summed at their nearest asperities"
+        return owners
+
+    def _refuse(self, row: Any, found: str, expected: str) -> None:
+        self.mistakes.append(self.table.mistake(int(row), f": found {found}, expected {expected}"))
+
+    def _numbered(self, name: str, index: NDArray[np.intp]) -> Indices | None:
+        """The asperities that a column numbers from 0 or from 1; None where it does not."""
+        count, least, most = len(self.scene), int(index.min()), int(index.max())
+        values, times = np.unique(index, return_counts=True)
+        sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.manner.missing_open)
+        wrong = ""
+        if times.max() > 1:
+            wrong = f"{values[times.argmax()]} twice, expected each asperity once"
+        elif least > 0 and most < count:
+            wrong = f"{least} to {most}: from 0 or from 1? Expected x and y, or a row of asperity 0"
+            wrong = wrong.replace(f"{least} to", f"numbers from {least} to")
+        elif most - (first := min(least, 1)) >= count:
+            wrong = f"{most}, expected at most {count - 1 + first}, the last asperity"
+        else:
+            self.how = f"in the order of column {name or '1'}, from {first}"
+            return index - first
+        if sure:
+            self.mistakes.append(f"column {name}: found {wrong}")
+        return None
+
+    def _matched(self, points: Array) -> Indices:
+        """The asperity at each point; each must be there once."""
+        positions = self.scene.asperities.positions
+        spacing = float(self.scene.asperities.tip_radii[0])
+        if len(positions) > 1:
+            spacing = float(nearest_distances(positions).min())
+        given = self.manner.tolerance
+        allowed = POSITION_TOLERANCE * spacing if given is None else given
+        distances, owners = _nearest(positions, points)
+        far = distances > allowed
+        self.how = f"matched by position, to {distances.max():.2g}"
+        if far.mean() > 0.5 and (moved := self._moved(points, allowed)):
+            self.mistakes.append(f"positions: {moved}")
+        for i in np.flatnonzero(far):
+            found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"
+            self._refuse(i, found, f"a position of the scene to {allowed:.3g}")
+        _, first, back = np.unique(owners, return_index=True, return_inverse=True)
+        for i in np.flatnonzero((first[back] != np.arange(len(owners))) & ~far):
+            found = f"the same position as in {self.table.rows[first[back[i]]]}"
+            self._refuse(i, found, "each asperity once")
+        return owners
+
+    def _moved(self, points: Array, allowed: float) -> str:
+        """What was done to all points, where undoing it puts them on asperities."""
+        positions = self.scene.asperities.positions
+
+        def fits(points: Array) -> bool:
+            distances, owners = _nearest(positions, points)
+            return bool(distances.max() <= allowed) and len(np.unique(owners)) == len(owners)
+
+        x, y = (bare(self.table.called[name]) for name in ("x", "y"))
+        exchange = f"--column x={y} --column y={x}"
+        if fits(points[:, ::-1]):
+            return f"x and y are exchanged: {exchange}"
+        for signs, names in (([-1, 1], "x"), ([1, -1], "y"), ([-1, -1], "xy")):
+            if fits(points * signs):
+                ways = " ".join(f"--scale {name}=-1" for name in names)
+                verb = "has" if len(names) == 1 else "have"
+                return f"{' and '.join(names)} {verb} the other sign: {ways}"
+        for power in (*range(-9, 0), *range(1, 10)):
+            if fits(points * 10.0**-power):
+                ways = " ".join(f"--scale {name}={10.0**-power:g}" for name in "xy")
+                return (
+                    f"found them 10^{power} times as far out as the scene's, expected the scene's "
+                    f"unit of length: {ways}"
+                )
+        tried: Sequence[Any] = positions[:MOST_TRIED] - points[0]
+        if len(points) == len(positions):
+            tried = [positions.mean(axis=0) - points.mean(axis=0)]
+        for shift in tried:
+            if fits(points[:20] + shift) and fits(points + shift):
+                rounded = np.round(-shift / allowed) * allowed
+                there = ", ".join(f"{each:.4g}" for each in rounded + 0.0)
+                return f"all are shifted by [{there}], expected them from the axis of the sphere"
+        return ""
+
+
+def _nearest(positions: Array, points: Array) -> tuple[Array, Indices]:
+    from scipy.spatial import cKDTree  # 0.1 s to import: only when rows have positions
+
+    distances, owners = cKDTree(positions).query(points)
+    return np.asarray(distances), np.asarray(owners)

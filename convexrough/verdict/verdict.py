@@ -1,0 +1,223 @@
+"""`verify`: compare claimed loads with what is proved about the solution.
+
+Loads make three claims: the asperities with a load above the floor touch, the others do not, and
+the loads are correct. `certify` bounds the errors of the loads; this module compares the claimed
+set with the proved statuses. Where the loads are too inaccurate to prove every status, Newton's
+method continues from them to a solution, and the certificate of that solution shows which
+asperities are wrong. `friction.verdict` does the same for shear forces.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from convexrough import checks
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.contact import Contact, solve
+from convexrough.drawn import Drawn
+from convexrough.errors import InputError, SolverError
+from convexrough.influence.coupling import Kind
+from convexrough.normal.certificate import Certificate, certify_on
+from convexrough.normal.claims import Claim
+from convexrough.normal.problem import NormalProblem
+from convexrough.record import Along, Table
+from convexrough.scene.scene import Scene
+
+#: A load so small beside the largest is taken for noise, in hints only.
+NOISE = 1e-6
+
+#: Distances, over the size of the array, that count as 0; the error that a correction may leave.
+SAME_PLACE, CORRECTED = 1e-9, 1e-3
+
+#: How a force is called that is 10 to this power too large.
+PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Verdict(Claim, Table, Drawn):
+    """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
+
+    loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"
+    within      : largest error allowed, as a fraction of the largest load; None: as accurate as
+        needed to prove every status from the loads alone
+    total_prescribed : [force] None under a prescribed approach
+    certificate : of the loads as given, those up to the floor counted as 0
+    solution    : the solution that Newton's method finds from them, with its own certificate; None
+        where it is not needed or not found
+
+    >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
+    >>> verdict.holds, verdict.decided_alone
+    (True, True)
+    """
+
+    _shown = ("holds", "wrongly_open", "wrongly_loaded", "undecided", "suspects")
+    _along: ClassVar[Along] = {("asperity",): ("status", "claimed", "loads", "errors")}
+
+    scene: Scene
+    loads: Array
+    floor: float
+    within: float | None
+    total_prescribed: float | None
+    certificate: Certificate
+    solution: Contact | None = None
+
+    @property
+    def values(self) -> Array:
+        """(n,) [force] the loads."""
+        return self.loads
+
+    @cached_property
+    def claimed(self) -> NDArray[np.bool_]:
+        """(n,) true where the asperity is claimed to touch."""
+        return frozen(self.loads > self.floor)
+
+    @cached_property
+    def wrongly_open(self) -> Indices:
+        """(m,) claimed open, and proved to touch."""
+        return frozen(np.flatnonzero(~self.claimed & (self.status == "contact")))
+
+    @cached_property
+    def wrongly_loaded(self) -> Indices:
+        """(m,) claimed to touch, and proved to be open."""
+        return frozen(np.flatnonzero(self.claimed & (self.status == "open")))
+
+    @property
+    def wrong(self) -> dict[str, Indices]:
+        """Indices of the wrong claims, by kind."""
+        return {
+            "claimed open, proved to touch": self.wrongly_open,
+            "claimed to touch, proved open": self.wrongly_loaded,
+        }
+
+    @property
+    def errors_alone(self) -> Array:
+        """(n,) [force] bounds from the certificate of the loads, plus the loads counted as 0."""
+        ignored = np.where(self.claimed, 0.0, np.abs(self.loads))
+        return frozen(self.certificate.load_errors + ignored)
+
+    def nearby(self) -> tuple[Array, Array] | None:
+        """The solution's loads and bounds."""
+        found = self.solution
+        return None if found is None else (found.loads, found.certificate.load_errors)
+
+    def hints(self, force_unit: str = "N") -> Iterator[str]:
+        """What loads that are wrong may come from."""
+        small = self.loads[self.wrongly_loaded]
+        if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
+            yield (
+                f"{len(small):,} of the loads, on asperities proved open, are at most {noise:.2g}, "
+                f"{noise / self.largest:.1g} of the largest: --floor {rounded_up(noise)} counts "
+                "them as open"
+            )
+        expected = self.total_prescribed
+        if expected is None and self.solution is not None:
+            expected = self.solution.load
+        if expected and (power := power_of_ten(self.total_given / expected)):
+            prefix = PREFIXES.get(power)
+            example = f", as {prefix}{force_unit} for {force_unit}" if prefix else ""
+            yield f"the loads are 10^{power} times what they should be: another unit{example}?"
+        if self.solution is not None and (moved := self._moved(self.solution.loads)):
+            yield f"the loads are right with {moved}"
+
+    def _moved(self, true: Array) -> str:
+        """What exchange of asperities, that leaves the array as it is, makes the loads right."""
+        from scipy.spatial import cKDTree  # 0.1 s to import: only when loads are wrong
+
+        points = self.scene.asperities.positions
+        tree, size = cKDTree(points), float(np.abs(points).max())
+        for said, moved in (
+            ("x and y exchanged", points[:, ::-1]),
+            ("the other sign of x", points * [-1, 1]),
+            ("the other sign of y", points * [1, -1]),
+            ("the other sign of x and y", -points),
+        ):
+            distances, partners = map(np.asarray, tree.query(moved))
+            off = np.abs(self.loads[partners] - true).max()
+            if (
+                distances.max() <= SAME_PLACE * size
+                and off <= CORRECTED * np.abs(self.loads - true).max()
+            ):
+                return said
+        return ""
+
+
+def rounded_up(value: float) -> str:
+    """One digit, not below the value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return f"{math.ceil(value / power * (1 - 1e-12)) * power:.0e}"
+
+
+def power_of_ten(ratio: float) -> int:
+    """The power of ten that a ratio is to 1 %; 0 where it is none."""
+    if not (ratio > 0 and math.isfinite(ratio)):
+        return 0
+    exact = math.log10(ratio)
+    return round(exact) if abs(exact - round(exact)) < 0.005 else 0
+
+
+def verify(
+    scene: Scene,
+    loads: ArrayLike,
+    *,
+    approach: float | None = None,
+    load: float | None = None,
+    within: float | None = None,
+    floor: float = 0.0,
+    influence: Kind | None = None,
+) -> Verdict:
+    """Hold loads that came from anywhere against the contact law.
+
+    loads : (n,) [force] in the order of the scene's asperities
+    approach [length] or load [force] : what is prescribed, exactly one
+    within : loads must be proved this near, in parts of the largest load
+    floor  : [force] a load up to this counts as 0, and claims that its asperity is open; so does
+        noise below 0 that is no larger
+    influence : how to couple the asperities; None for the cheapest exact way
+
+    Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.
+
+    >>> claimed = contact.loads.copy()
+    >>> claimed[3] = 0.0
+    >>> verdict = cr.verify(scene, claimed, approach=5e-5)
+    >>> verdict.holds, verdict.wrongly_open.tolist()
+    (False, [3])
+    """
+    checks.instance("scene", scene, Scene)
+    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
+    return verify_on(problem, loads, within=within, floor=floor)
+
+
+def verify_on(
+    problem: NormalProblem,
+    loads: ArrayLike,
+    *,
+    within: float | None = None,
+    floor: float = 0.0,
+) -> Verdict:
+    """`verify` for a problem already assembled; its arguments are as there."""
+    floor = checks.non_negative("floor", floor)
+    within = None if within is None else checks.positive("within", within)
+    given = checks.array("loads", loads, length=len(problem.scene))
+    if (given < -floor).any():
+        first = int(np.argmax(given < -floor))
+        expected = "a load that is not negative; a floor lets noise up to its size count as 0"
+        raise InputError(f"loads[{first}]", found=given[first], expected=expected)
+    claimed = np.where(given > floor, given, 0.0)
+    total = None if problem.load is None else problem.load * problem.units.force
+    certificate = certify_on(problem, claimed)
+    verdict = Verdict(problem.scene, given, floor, within, total, certificate)
+    if verdict.holds:
+        return verdict
+    for start in (claimed, None):  # from inaccurate loads it may not converge
+        try:
+            return replace(verdict, solution=solve(problem, start=start))
+        except SolverError:
+            continue
+    return verdict  # with the certificate of the loads alone

@@ -1,0 +1,174 @@
+"""Many scenes at once against the same ones one by one: word by word, digit by digit."""
+
+import pickle
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+from path_scenes import shaded
+from scenes import MATERIAL, NAMED, random_scenes
+
+import convexrough as cr
+from convexrough import many
+
+F = 0.5
+PAPER = replace(NAMED["paper"][0], friction=F)
+
+
+def rough(count: int, *, tips: float = 0.0, geometry: Any = "summit") -> list[cr.Scene]:
+    drawn = [
+        PAPER.asperities.roughened(height_std=1e-6, tip_radius_cv=tips, seed=k)
+        for k in range(count)
+    ]
+    return [replace(PAPER, asperities=each, geometry=geometry) for each in drawn]
+
+
+def scattered(count: int) -> list[cr.Scene]:
+    rng = np.random.default_rng(5)
+    x, y = np.meshgrid(np.arange(-4, 5), np.arange(-4, 5))
+    grid = 0.0026 * np.column_stack((x.ravel(), y.ravel()))
+    places = [grid + rng.uniform(-2e-4, 2e-4, grid.shape) for _ in range(count)]
+    return [cr.Scene(1.0, cr.Asperities(each, 0.02), MATERIAL, F) for each in places]
+
+
+#: What differs from scene to scene -> (scenes, approaches).
+SETS = {
+    "heights": (rough(6), 5e-5),
+    "approaches": (rough(4), [5e-5, 1e-5, 2e-6, 7e-5]),
+    "tips": (rough(4, tips=0.1), 5e-5),
+    "places by tips": (rough(3, tips=0.1, geometry="closest"), 5e-5),
+    "places": (scattered(4), 5e-5),
+    "bases": (
+        [
+            replace(each, sphere_radius=radius)
+            for each, radius in zip(rough(3), [1.0, 2.0, (1.0, 1.5)], strict=True)
+        ],
+        5e-5,
+    ),
+    "frictions": ([replace(each, friction=0.1 * k + 0.2) for k, each in enumerate(rough(3))], 5e-5),
+    "one": (rough(1), 5e-5),
+}
+
+
+def assert_same(contacts: cr.Contacts, k: int, one: cr.Contact) -> None:
+    """Words and digits; and bounds that are as good, each as it is said of one contact."""
+    assert_array_equal(contacts.status[k], one.status)
+    assert_array_equal(contacts.asperity_loads[k], one.loads)
+    proof, ulp = one.certificate, 2.0**-53
+    assert contacts.approaches[k] == one.approach
+    assert contacts.loads[k] == one.load
+    assert (contacts.asperity_load_errors[k] <= 2 * proof.load_errors + 1e-28 * one.load).all()
+    assert contacts.approach_errors[k] <= 2 * proof.approach_error + ulp * abs(one.approach)
+    assert contacts.load_errors[k] <= 1.1 * proof.load_errors.sum() + 8 * ulp * one.load + 1e-300
+
+
+@pytest.mark.parametrize("by_load", [False, True])
+@pytest.mark.parametrize("name", SETS)
+def test_scenes_together_are_those_alone(name: str, by_load: bool) -> None:
+    scenes, approaches = SETS[name]
+    apart = np.broadcast_to(approaches, len(scenes))
+    alone = [cr.press(each, approach=a) for each, a in zip(scenes, apart, strict=True)]
+    if by_load:
+        alone = [cr.press(each.scene, load=each.load) for each in alone]
+        contacts = cr.press_many(scenes, load=[each.prescribed_load for each in alone])
+    else:
+        contacts = cr.press_many(scenes, approach=approaches)
+    assert len(contacts.alone) == 0
+    limits = np.array([each.scene.friction * each.load for each in alone])
+    for share in (1e-3, 0.37, 0.999):
+        cycles = contacts.cycles(share * limits, -0.4 * share * limits)
+        for k, one in enumerate(alone):
+            assert_same(contacts, k, one)
+            cycle = cr.cycle(one, maximum=share * limits[k], minimum=-0.4 * share * limits[k])
+            assert cycles.order[k] == cycle.order == "proved"
+            assert_array_equal(cycles.status[k], cycle.status)
+            assert cycles.losses[k] == cycle.loss
+            assert cycles.loss_errors[k] <= 2 * cycle.loss_error
+            assert cycles.displacement_amplitudes[k] == cycle.displacement_amplitude
+            assert cycles.displacement_errors[k] <= 2 * cycle.displacement_error
+
+
+@settings(max_examples=15, deadline=None)
+@given(random_scenes(crowding=1.2, most=10), st.integers(0, 2**32 - 1))
+def test_random_scenes(drawn: tuple[cr.Scene, float], seed: int) -> None:
+    """Also of scenes where nothing touches, or that the rows do not prove."""
+    scene, approach = drawn
+    rng = np.random.default_rng(seed)
+    scenes = [
+        replace(scene, asperities=scene.asperities.with_tips(scene.asperities.tip_radii, heights))
+        for heights in scene.asperities.heights + rng.uniform(-0.3, 0.3, (3, 1)) * approach
+    ]
+    contacts = cr.press_many(scenes, approach=approach)
+    for k, each in enumerate(scenes):
+        one = cr.press(each, approach=approach)
+        assert_array_equal(contacts.status[k], one.status)
+        doubt = one.certificate.load_errors + contacts.asperity_load_errors[k]
+        assert (np.abs(contacts.asperity_loads[k] - one.loads) <= doubt).all()
+
+
+def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    crowded = cr.press_many([shaded(), shaded()], load=2.96)
+    assert crowded.alone.tolist() == [0, 1]
+    one = cr.press(shaded(), load=2.96)
+    assert_same(crowded, 0, one)
+    cycles = crowded.cycles(0.1)
+    cycle = cr.cycle(one, maximum=0.1)
+    assert cycles.order.tolist() == [cycle.order] * 2
+    assert cycles.losses[0] == cycle.loss
+    scenes = rough(3)
+    lifted = cr.press_many(scenes, approach=[-1.0, 5e-5, 5e-5])
+    assert_same(lifted, 0, cr.press(scenes[0], approach=-1.0))
+    limits = F * lifted.loads
+    ends = lifted.cycles(limits * np.array([0.0, 1.0, 0.0]))  # nothing, gross sliding, no range
+    for k in range(3):
+        assert ends.losses[k] == ends[k].loss
+        assert_array_equal(ends.status[k], ends[k].status)
+    monkeypatch.setattr(many, "MOST", 60)
+    assert cr.press_many(scenes, approach=5e-5).alone.tolist() == [0, 1, 2]
+
+
+def test_batches_may_be_cut_anywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenes = rough(5)
+    whole = cr.press_many(scenes, approach=5e-5)
+    monkeypatch.setattr(many, "MATRICES", 2 * 61**2)
+    parts = cr.press_many(scenes, approach=5e-5)
+    assert_array_equal(whole.asperity_loads, parts.asperity_loads)
+    assert_array_equal(whole.cycles(1e-8).losses, parts.cycles(1e-8).losses)
+
+
+def test_results_are_tables_and_sequences() -> None:
+    contacts = cr.press_many(rough(3), approach=5e-5)
+    assert len(contacts) == 3
+    assert contacts[-1] is contacts[2]
+    assert_array_equal(contacts[1].loads, contacts.asperity_loads[1])
+    cycles = contacts.cycles([1e-8, 2e-8, 3e-8])
+    assert cycles[1].loss == cycles.losses[1]
+    assert cycles.to_xarray()["status"].dims == ("scene", "asperity")
+    assert len(contacts.to_dataframe()) == 3
+    again = pickle.loads(pickle.dumps(contacts))
+    assert_array_equal(again.cycles([1e-8, 2e-8, 3e-8]).losses, cycles.losses)
+    with pytest.raises(IndexError):
+        contacts[3]
+    assert len(cr.press_many([], approach=5e-5)) == 0
+
+
+def test_bad_input() -> None:
+    scenes = rough(2)
+    with pytest.raises(cr.InputError, match=r"scenes\[1\]: found 1 asperities"):
+        cr.press_many([scenes[0], cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), MATERIAL)], load=1.0)
+    with pytest.raises(cr.InputError, match="approach"):
+        cr.press_many(scenes)
+    with pytest.raises(cr.InputError, match="2 values, one per scene"):
+        cr.press_many(scenes, load=[1e-7] * 3)
+    contacts = cr.press_many(scenes, approach=5e-5)
+    with pytest.raises(cr.InputError, match=r"maximum\[1\].*gross sliding"):
+        contacts.cycles([1e-8, 1.0])
+    with pytest.raises(cr.InputError, match=r"maximum\[0\].*at least the minimum"):
+        contacts.cycles(0.0, 1e-8)
+    bare = cr.press_many([replace(each, friction=None) for each in scenes], approach=5e-5)
+    with pytest.raises(cr.InputError, match="friction"):
+        bare.cycles(1e-8)

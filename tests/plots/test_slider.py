@@ -1,0 +1,293 @@
+"""The slider page: what is in the file, and what a browser makes of it."""
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+from scene_files import HEXAGONAL, scene_text
+
+import convexrough as cr
+from convexrough.paper import example
+from convexrough.plots import slider
+from convexrough.run.results import slider_page
+from convexrough.run.stages.normal import Normal, Pressed
+from convexrough.tabular.units import UnitNames
+
+UNITS = UnitNames("m", "N")
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+BROWSER = next((found for name in NAMES if (found := shutil.which(name))), None)
+in_browser = pytest.mark.skipif(
+    BROWSER is None, reason=f"no browser to open the page in: none of {', '.join(NAMES)}"
+)
+
+
+def pressed(scene: cr.Scene, approach: float = example.APPROACH) -> cr.Contact:
+    return cr.press(scene, approach=approach)
+
+
+def page_of(contact: cr.Contact, units: UnitNames = UNITS) -> str:
+    return slider_page(pressed_result(contact), units)
+
+
+def pressed_result(contact: cr.Contact) -> Pressed:
+    return Normal(approach=contact.approach).compute(contact)
+
+
+def said(contact: cr.Contact, units: UnitNames = UNITS) -> list[str]:
+    """What a run says of the contact."""
+    return pressed_result(contact).lines(units)
+
+
+def inside(text: str) -> Any:
+    """The data that a page carries."""
+    (found,) = re.findall(r'id="data">(.*?)</script>', text, re.S)
+    return json.loads(found)
+
+
+def data_of(contact: cr.Contact) -> Any:
+    return slider.slider_data(slider.Slides.of(contact), said(contact), UNITS)
+
+
+@pytest.fixture(scope="module")
+def contact() -> cr.Contact:
+    return pressed(example.scene())
+
+
+@pytest.fixture(scope="module")
+def many() -> cr.Contact:
+    rough = cr.Asperities.hexagonal(
+        spacing=0.0004, tip_radius=0.0032, within=0.0102, height_std=3e-7, seed=7
+    )
+    return pressed(cr.Scene(1.0, rough, cr.Material(1.0, 0.3), friction=0.5, geometry="summit"))
+
+
+# What is in the file.
+
+
+def test_the_file_needs_nothing_else_and_is_small(contact: cr.Contact) -> None:
+    text = page_of(contact)
+    assert not re.search(r"https?:|\burl\(|\bimport\b|<link|<img|\bsrc=|fetch\(", text)
+    assert len(text.encode()) < 200_000  # of 1 MB
+
+
+def test_states_are_those_of_shear_and_cycle(contact: cr.Contact) -> None:
+    data, limit = data_of(contact), 0.5 * contact.load
+    states, discs = data["states"], data["discs"]
+    assert states["fraction"] == [round(k / 100, 2) for k in range(101)]
+    a_H = cr.smooth(contact.scene, load=contact.load).contact_radius
+    touching = np.flatnonzero(contact.loads)
+    assert discs["index"] == touching.tolist()
+    radii = contact.contact_radii[touching]
+    assert discs["radius"] == pytest.approx(radii / a_H, rel=1e-4)
+    for k in (0, 7, 50, 83, 100):
+        state = cr.shear(contact, force=states["fraction"][k] * limit)
+        cycle = cr.cycle(contact, maximum=states["fraction"][k] * limit)
+        assert states["length"][k] == float(f"{state.displacement:.5g}")
+        assert states["loss"][k] == float(f"{cycle.loss_normalised:.5g}")
+        assert float(states["displacement_error"][k]) >= cycle.displacement_error
+        assert states["sliding"][k] == (state.status == "sliding").sum()
+        assert states["undecided"][k] == (state.status == "undecided").sum()
+        words = state.status[touching]
+        codes = np.array(data["stick"][k])
+        assert ((codes == 0) == (words == "sliding")).all()
+        assert ((codes == -1) == (words == "undecided")).all()
+        part = words == "partial"
+        stuck = state.stick_radii[touching] / radii
+        assert codes[part] / 1000 == pytest.approx(stuck[part], abs=6e-4)
+
+
+def test_the_certificate_is_the_one_of_the_run(contact: cr.Contact) -> None:
+    lines = data_of(contact)["certificate"]
+    assert lines == said(contact)
+    assert any("global" in line for line in lines)
+
+
+def test_names_of_units_end_no_script(contact: cr.Contact) -> None:
+    text = page_of(contact, UnitNames("</script>", "<b>"))
+    assert text.count("</script>") == 2
+    assert inside(text)["units"] == {"length": "</script>", "force": "<b>"}
+
+
+def test_of_thousands_some_can_be_followed(many: cr.Contact) -> None:
+    text = page_of(many)
+    data = inside(text)
+    assert len(data["discs"]["index"]) == data["touching"] > 1000
+    assert len(data["followed"]["disc"]) == slider.MOST_FOLLOWED
+    assert data["left_out"] == ["200 of the asperities can be followed."]
+    assert len(text.encode()) < 2_000_000
+
+
+# What the command line writes.
+
+
+def test_run_and_paper_write_the_page(command: Any, tmp_path: Path) -> None:
+    more = "[friction]\ncoefficient = 0.5"
+    (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL, more=more))
+    ran = command("run", "a.toml", "--html", "--no-figures")
+    assert (ran.status, "slider.html" in ran.out) == (0, True)
+    assert "slider.html" in json.loads((tmp_path / "a-results/files.json").read_text())["files"]
+    assert command("paper", "--html", "--no-figures").status == 0
+    assert (tmp_path / "paper-results/slider.html").stat().st_size < 1_000_000
+
+
+def test_without_friction_there_is_no_page_and_no_work(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    ran = command("run", "a.toml", "--html")
+    assert ran.status == 2
+    assert "a.toml: friction" in ran.err
+    assert not (tmp_path / "a-results").exists()
+
+
+# In a browser.
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as player:
+        running = player.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield running
+        running.close()
+
+
+class Opened:
+    """A page in the browser, which must ask for nothing and complain of nothing."""
+
+    def __init__(self, browser: Browser, file: Path, **options: Any) -> None:
+        self.context = browser.new_context(viewport={"width": 1400, "height": 900}, **options)
+        self.context.set_default_timeout(5000)
+        self.page: Page = self.context.new_page()
+        self.asked: list[str] = []
+        self.complaints: list[str] = []
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.goto(file.as_uri())
+        self.address = file.as_uri()
+
+    def close(self) -> None:
+        self.context.close()
+        assert self.asked == [self.address]
+        assert self.complaints == []
+
+    def text(self, name: str) -> str:
+        return self.page.locator(f"#{name}").inner_text()
+
+    def number(self, name: str) -> float:
+        """As Python found it; what is shown has its powers of ten typeset."""
+        return float(self.page.locator(f"#{name}").get_attribute("data-value") or "nan")
+
+    def points(self, curve: str) -> np.ndarray[Any, Any]:
+        pairs = self.page.locator(curve).get_attribute("points") or ""
+        return np.array([pair.split(",") for pair in pairs.split()], dtype=float)
+
+
+@pytest.fixture
+def opened(browser: Browser, contact: cr.Contact, tmp_path: Path) -> Iterator[Opened]:
+    (tmp_path / "slider.html").write_text(page_of(contact), encoding="utf-8")
+    shown = Opened(browser, tmp_path / "slider.html")
+    follow(shown, 36)
+    yield shown
+    shown.close()
+
+
+def follow(shown: Opened, index: int) -> None:
+    options = shown.page.locator("#follow option").all_inner_texts()
+    (label,) = [option for option in options if option.startswith(f"{index}:")]
+    shown.page.locator("#follow").select_option(label=label)
+
+
+@in_browser
+def test_in_metres_the_list_has_room_for_both_coordinates(browser: Browser, tmp_path: Path) -> None:
+    tiny = cr.Asperities.hexagonal(spacing=25e-6, tip_radius=2e-4, within=1.02e-4)
+    scene = cr.Scene(0.01, tiny, cr.Material(1e11, 0.3), friction=0.5, geometry="summit")
+    text = page_of(cr.press(scene, approach=5e-7), UnitNames("m", "N"))
+    (tmp_path / "slider.html").write_text(text, encoding="utf-8")
+    shown = Opened(browser, tmp_path / "slider.html")
+    chooser = shown.page.locator("#follow")
+    labels = chooser.locator("option").all_inner_texts()
+    assert "1: (2.5\xa0×\xa010⁻⁵, 0) m" in labels
+    room = chooser.evaluate("""list => {
+        const pen = document.createElement("canvas").getContext("2d");
+        pen.font = getComputedStyle(list).font;
+        const widths = [...list.options].map(each => pen.measureText(each.text).width);
+        return [Math.max(...widths) + 30, list.clientWidth];
+    }""")
+    assert room[0] < room[1]
+    shown.close()
+
+
+def near(values: Any) -> Any:
+    """A point of a loop is v_k - 2 v_i, each of five digits: off by 3 x 5e-5 at most."""
+    return pytest.approx(values, rel=0.0, abs=1.5e-4 * np.abs(values).max())
+
+
+def assert_shown(shown: Opened, contact: cr.Contact, fraction: float, index: int) -> None:
+    """Every number in sight is Python's."""
+    limit = 0.5 * contact.load
+    state = cr.shear(contact, force=fraction * limit)
+    steady = cr.cycle(contact, maximum=fraction * limit)
+    sphere = cr.smooth(contact.scene, load=contact.load)
+    X0 = sphere.displacement(limit)
+    assert float(shown.text("fraction")) == fraction
+    assert shown.number("q") == float(f"{fraction * limit:.5g}")
+    assert shown.number("x") == float(f"{state.displacement:.5g}")
+    assert shown.number("x_part") == float(f"{state.displacement / X0:.5g}")
+    assert shown.number("x_error") >= steady.displacement_error
+    assert shown.number("w") == float(f"{steady.loss_normalised:.5g}")
+    assert shown.number("w_smooth") == float(f"{steady.smooth_normalised:.5g}")
+    slide = (state.status == "sliding").sum()
+    assert shown.text("said").startswith(f"{slide} of 37 slide")
+    assert shown.page.locator("#map circle.sliding").count() == slide
+
+    load = contact.loads[index]
+    assert shown.number("load") == float(f"{load:.5g}")
+    assert shown.number("share") == float(f"{state.forces[index] / (0.5 * load):.5g}")
+    assert shown.number("moved") == float(f"{state.displacements[index] / X0:.5g}")
+    word = {"partial": "partial slip"}.get(state.status[index], state.status[index])
+    assert (shown.text("word"), shown.text("state")) == (contact.status[index], word)
+    stick = state.stick_radii[index] / contact.contact_radii[index]
+    assert shown.number("stick") == pytest.approx(stick, abs=5e-4)
+
+    # The loops: every point of them is where the force is sheared back and forth to it.
+    moved, share = shown.points("#whole .line").T
+    past = cr.history(contact, forces=limit * share.clip(-fraction, fraction))
+    assert moved == near(past.displacements / X0)
+    own_moved, own_share = shown.points("#own .line").T
+    assert own_share == near(past.asperity_forces[:, index] / (0.5 * load))
+    assert own_moved == near(past.asperity_displacements[:, index] / X0)
+    at = shown.page.locator("#whole .now").first.get_attribute("d")
+    assert at == f"M{moved[0]:g} {share[0]:g}h0"
+
+
+@in_browser
+def test_the_keyboard_moves_the_force(opened: Opened, contact: cr.Contact) -> None:
+    opened.page.keyboard.press("Tab")
+    assert opened.page.evaluate("document.activeElement.id") == "force"
+    assert_shown(opened, contact, 0.5, 36)
+    for key, fraction in (("ArrowRight", 0.51), ("ArrowLeft", 0.5), ("PageDown", 0.4)):
+        opened.page.keyboard.press(key)
+        assert_shown(opened, contact, fraction, 36)
+    opened.page.keyboard.press("End")
+    assert_shown(opened, contact, 1.0, 36)
+    opened.page.keyboard.press("Home")
+    assert opened.text("said") == "0 of 37 slide, 37 stick in part"
+    said = opened.page.locator("#force").get_attribute("aria-valuetext")
+    assert said == "Q/(fP) = 0: 0 of 37 slide, 37 stick in part"
+
+
+@in_browser
+def test_an_asperity_is_followed_by_mouse_and_keyboard(opened: Opened, contact: cr.Contact) -> None:
+    opened.page.locator("#map circle.stick").first.click()
+    assert opened.page.locator("h2 .who").inner_text() == "0"
+    assert_shown(opened, contact, 0.5, 0)
+    opened.page.locator("#follow").focus()
+    opened.page.keyboard.press("End")
+    assert opened.page.locator("h2 .who").inner_text() == "36"
+    follow(opened, 7)
+    assert_shown(opened, contact, 0.5, 7)

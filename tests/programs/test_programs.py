@@ -1,0 +1,194 @@
+"""Scenes as programs: each file is read by a library that shares nothing with its writer."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import clarabel
+import highspy
+import numpy as np
+import picos
+import pytest
+import qpsolvers
+import scs
+from picos.modeling.file_in import import_cbf
+from scenes import PAPER_APPROACH
+from scipy import sparse
+
+import convexrough as cr
+from convexrough.programs import FORMS, program
+from convexrough.programs.program import WRITERS
+
+#: The source paper's, its inner 19 asperities.
+SCENE = cr.Scene(
+    1.0,
+    cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0051),
+    cr.Material(contact_modulus=1.0, poisson_ratio=0.3),
+    geometry="summit",
+)
+CONTACT = cr.press(SCENE, approach=PAPER_APPROACH)
+CONTROLS: dict[str, dict[str, float]] = {
+    "approach": {"approach": PAPER_APPROACH},
+    "load": {"load": CONTACT.load},
+}
+each_control = pytest.mark.parametrize("control", CONTROLS)
+
+#: 8 bristles: the method of HiGHS is one of active sets, and takes its time with more.
+FEW = 8
+
+
+def energy(control: str) -> float:
+    """Phi, from its definition: docs/theory/convexity.md, (1)."""
+    scene, P = CONTACT.scene, CONTACT.loads
+    R, modulus = scene.relative_radii, scene.material.contact_modulus
+    local = 0.6 * (9 / (16 * modulus**2 * R)) ** (1 / 3) * P ** (5 / 3)
+    r = np.hypot(*(scene.asperities.positions[:, None] - scene.asperities.positions).T)
+    np.fill_diagonal(r, np.inf)
+    depth = scene.offsets + (PAPER_APPROACH if control == "approach" else 0.0)
+    return float(local.sum() + P @ (1 / (np.pi * modulus * r)) @ P / 2 - depth @ P)
+
+
+def matrix(data: Any, name: str, shape: tuple[int, int]) -> Any:
+    parts = [data[f"{name}_{part}"] for part in ("data", "indices", "indptr")]
+    return sparse.csc_matrix(tuple(parts), shape=shape)
+
+
+def by_clarabel(path: Path) -> tuple[Any, Any, float]:
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-9
+    found = clarabel.load_from_file(str(path), settings).solve()
+    return found.x, found.z, found.obj_val
+
+
+def by_scs(path: Path) -> tuple[Any, Any, float]:
+    data = np.load(path)
+    n, m = len(data["q"]), len(data["b"])
+    given = {"P": matrix(data, "P", (n, n)), "A": matrix(data, "A", (m, n))}
+    given |= {"b": data["b"], "c": data["q"]}
+    equal = int(data["equalities"])
+    cones = {"z": equal, "q": [3] * ((m - equal) // 3)}
+    found = scs.SCS(given, cones, verbose=False, eps_abs=1e-9, eps_rel=1e-9).solve()
+    return found["x"], found["y"], found["info"]["pobj"]
+
+
+def by_cvxopt(path: Path) -> tuple[Any, Any, float]:
+    """Through the reader of CBF of PICOS."""
+    problem, (variables,), *_ = import_cbf(str(path))
+    assert isinstance(problem, picos.Problem)
+    problem.solve(solver="cvxopt", rel_bnb_opt_tol=None, verbosity=0)
+    equations = next(iter(problem.constraints.values()))
+    return np.ravel(variables.value), np.ravel(equations.dual), problem.value
+
+
+def by_highs(path: Path) -> tuple[Any, Any, float]:
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    assert highs.readModel(str(path)) == highspy.HighsStatus.kOk
+    highs.run()
+    solution = highs.getSolution()
+    return solution.col_value, solution.row_dual, highs.getObjectiveValue()
+
+
+def by_qpsolvers(path: Path) -> tuple[Any, Any, float]:
+    problem = qpsolvers.Problem.load(path)
+    P, q = problem.P, problem.q
+    problem.P, problem.G, problem.A = map(sparse.csc_matrix, (P, problem.G, problem.A))
+    x = qpsolvers.solve_problem(problem, "clarabel").x
+    return x, None, float(x @ P @ x / 2 + q @ x)
+
+
+READERS = {"json": by_clarabel, "cbf": by_cvxopt, "mps": by_highs}
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:picos")  # of PICOS' reader, by itself
+@each_control
+@pytest.mark.parametrize(("form", "ending"), [(f, e) for f in FORMS for e in WRITERS[f]])
+def test_files_are_solved_by_others(form: Any, ending: str, control: str, tmp_path: Path) -> None:
+    made = program(SCENE, form, **CONTROLS[control], bristles=FEW)
+    made.save(tmp_path / f"scene.{ending}")
+    npz = by_qpsolvers if form == "bristles" else by_scs
+    x, z, objective = {**READERS, "npz": npz}[ending](tmp_path / f"scene.{ending}")
+    loads = made.loads(z if form == "dual" else x)
+    near = 1e-4 + made.off
+    assert np.abs(loads - CONTACT.loads).max() < near * CONTACT.loads.max()
+    assert made.energy(made.objective) == pytest.approx(energy(control), rel=1e-12)
+    assert made.energy(objective) == pytest.approx(energy(control), rel=1e-6 + made.off)
+
+
+@each_control
+def test_any_point_of_the_dual_bounds_the_energy(control: str) -> None:
+    """Weak duality, at points made feasible by hand: docs/theory/exact-cones.md."""
+    made = program(SCENE, "dual", **CONTROLS[control])
+    data, random = made.data, np.random.default_rng(5)
+    cones = program(SCENE, "cones", **CONTROLS[control]).data
+    n = len(made.asperities)
+    assert made.objective == -program(SCENE, "cones", **CONTROLS[control]).objective
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    best = 0.0
+    for _ in range(5):  # the least at a prescribed v
+        v = np.maximum(random.normal(1.0, 0.5, n), 0.0) * CONTACT.loads.max() / made.force_unit
+        fixed = sparse.hstack((sparse.eye_array(n), sparse.csc_array((n, len(data.linear) - n))))
+        rows = sparse.csc_matrix(sparse.vstack((fixed, data.constraints)))
+        held = [clarabel.ZeroConeT(n + data.equalities)]
+        held += [clarabel.SecondOrderConeT(3)] * cones.cones
+        b = np.concatenate((v, data.constant))
+        found = clarabel.DefaultSolver(data.quadratic, data.linear, rows, b, held, settings).solve()
+        assert str(found.status) in ("Solved", "AlmostSolved")
+        assert made.energy(found.obj_val) < energy(control)
+        best = max(best, found.obj_val)
+    assert best > made.objective
+
+
+def test_a_file_with_one_number_changed_is_found_out(tmp_path: Path) -> None:
+    """The first test can fail: here it does."""
+    made = program(SCENE, "cones", approach=PAPER_APPROACH)
+    made.save(path := tmp_path / "scene.json")
+    data = json.loads(path.read_text())
+    data["q"][0] *= 1.01
+    path.write_text(json.dumps(data))
+    loads = made.loads(by_clarabel(path)[0])
+    assert np.abs(loads - CONTACT.loads).max() > 1e-3 * CONTACT.loads.max()
+
+
+def test_what_is_said_of_a_program() -> None:
+    made = cr.program(SCENE, approach=PAPER_APPROACH)
+    assert "ConeProgram: 114 variables, 19 equations, 76 second-order cones" in repr(made)
+    assert len(repr(made).splitlines()) < 15
+    rows = cr.program(SCENE, "bristles", approach=PAPER_APPROACH)
+    assert repr(rows.data).startswith("QuadraticProgram: ")
+
+
+def test_programs_that_are_not_made(tmp_path: Path) -> None:
+    made = cr.program(SCENE, approach=PAPER_APPROACH)
+    with pytest.raises(cr.InputError, match=r"the ending '\.mps', expected one of \.cbf, \.json"):
+        made.save(tmp_path / "scene.mps")
+    with pytest.raises(cr.InputError, match="found 3 numbers, expected at least 19"):
+        made.loads([1, 2, 3])
+    with pytest.raises(cr.InputError, match=r'form: .* a form of program; did you mean "cones"'):
+        cr.program(SCENE, "cone", approach=PAPER_APPROACH)  # type: ignore[arg-type]
+    above = cr.gallery.case("convexity-end-above")
+    with pytest.raises(cr.solvers.TooDenseError):
+        cr.program(above.scene, **above.control)
+
+
+def test_the_command(command: Any, tmp_path: Path) -> None:
+    command("new", "scene.toml")
+    ran = command("export", "scene.toml", "--bristles", "4")
+    assert (ran.status, ran.err) == (0, "")
+    folder = tmp_path / "scene-programs"
+    index = json.loads((folder / "index.json").read_text())
+    assert {path.name for path in folder.iterdir()} == {*index["programs"], "index.json"}
+    assert len(index["programs"]) == 8
+    assert "least objective -1.78" in ran.out
+    about = index["programs"]["scene.cones.json"]
+    x, _, least = by_clarabel(folder / "scene.cones.json")
+    assert least == pytest.approx(about["objective"], rel=1e-7)
+    assert about["force_unit"] * sum(x[: len(about["asperities"])]) > 0
+    again = command("export", "scene.toml")
+    assert (again.status, "not empty" in again.err) == (2, True)
+    one = command("export", "scene.toml", "--format", "mps", "--out", "one", "--json")
+    assert list(json.loads(one.out)["programs"]) == ["scene.bristles.mps"]
+    wrong = command("export", "scene.toml", "--format", "mpz")
+    assert (wrong.status, "mpz" in wrong.err) == (2, True)

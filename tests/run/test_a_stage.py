@@ -1,0 +1,59 @@
+"""The stage of docs/architecture.md: one file and one registration give all that a stage has."""
+
+import csv
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scene_files import scene_text
+
+import convexrough as cr
+from convexrough.run.stages import STAGES
+
+PAGE = Path(__file__).parents[2] / "docs" / "architecture.md"
+MORE = "[friction]\ncoefficient = 0.5\n[onset]\n"
+
+
+@pytest.fixture(autouse=True)
+def added(monkeypatch: pytest.MonkeyPatch) -> None:
+    (block,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
+    assert block.count("\n") <= 45
+    monkeypatch.setitem(STAGES, "onset", STAGES["shear"])  # taken out again at the end
+    exec(compile(block, str(PAGE), "exec"), {"__name__": "onset"})
+
+
+def test_it_is_computed_written_and_printed(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(more=MORE))
+    ran = command("run", "a.toml", "--no-figures")
+    assert (ran.status, ran.err) == (0, "")
+    rows = json.loads((tmp_path / "a-results" / "summary.json").read_text())["onset"]
+    assert re.search(rf"^onset of sliding\nquantile +Q/\(fP\)\n +0 +{rows[0]['onset']:.7g}$",
+                     ran.out, re.M)  # fmt: skip
+    file = cr.read_scene("a.toml")
+    contact = file.press()
+    onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)
+    with (tmp_path / "a-results" / "onset.csv").open() as table:
+        written = [float(row["onset"]) for row in csv.DictReader(table)]
+    assert written == pytest.approx(onsets, nan_ok=True)
+    assert rows[0] == {"quantile": 0.0, "onset": min(written)}
+    (*_, result) = file.compute(contact)
+    assert result.certified
+    assert list(result.to_dataframe()["onset"]) == pytest.approx(onsets, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (MORE + "quantils = [1]", '[onset] quantils: unknown key, did you mean "quantiles"?'),
+        (MORE + "quantiles = [2.0]", "[onset] quantiles[0]: found 2.0, expected a number from 0"),
+        (MORE.replace("onset", "onst"), '[onst]: unknown table, did you mean "onset"?'),
+        ("[onset]", "[friction]: missing table, needed with [onset]"),
+    ],
+)
+def test_its_mistakes_are_told(command: Any, tmp_path: Path, more: str, said: str) -> None:
+    (tmp_path / "a.toml").write_text(scene_text(more=more))
+    ran = command("run", "a.toml")
+    assert (ran.status, ran.err) == (2, ran.err)
+    assert said in ran.err

@@ -1,0 +1,67 @@
+"""The folder of results as outside programs read it: names of files, columns, and keys."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.figure import Figure
+from scene_files import HEXAGONAL, scene_text
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "folder.json"
+
+#: Every table that a scene file may have.
+EVERYTHING = """
+[friction]
+coefficient = 0.5
+[shear]
+fractions = [0.1, 0.5]
+[cycle]
+maximum = [0.37, 0.5]
+minimum = [-0.37, 0.1]
+[history]
+fractions = [0.6, -0.2]
+[path]
+loads = [3e-7, 3e-7]
+forces = [0.0, 1e-7]
+[steady]
+ellipse = { load = 3e-7, load_amplitude = 5e-8, force_amplitude = 5e-8, chords = 6 }
+phases = [0.5]
+[shakedown]
+loads = 3e-7
+force_amplitudes = [1e-7, -1e-7]
+[gradient]
+of = "loss"
+fraction = 0.5
+"""
+
+
+def keys(value: Any) -> Any:
+    """The keys of objects; of a list those of its first element; of a number or a word nothing."""
+    if isinstance(value, dict):
+        return {key: keys(each) for key, each in value.items()}
+    return [keys(value[0])] if isinstance(value, list) and value else None
+
+
+def test_names_columns_and_keys(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a deliberate change the folder of the test holds what to pin, as found.json."""
+    monkeypatch.setattr(Figure, "savefig", lambda self, path, **_: Path(path).touch())
+    (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + "within = 0.0102", more=EVERYTHING))
+    ran = command("run", "a.toml", "--out", "out", "--html")
+    assert (ran.status, ran.err) == (0, "")
+    found: dict[str, Any] = {"files": sorted(path.name for path in (tmp_path / "out").iterdir())}
+    for path in sorted((tmp_path / "out").glob("*.csv")):
+        with path.open() as file:
+            found[path.name] = next(csv.reader(file))
+    for name in ("summary.json", "files.json"):
+        found[name] = keys(json.loads((tmp_path / "out" / name).read_text()))
+    loads = "out/asperities.csv"
+    claim = ("--shear", "forces.csv", "--shear-force", "0", "--out", "verdict", "--json")
+    (tmp_path / "forces.csv").write_text("force\n" + "0\n" * 61)
+    found["verify"] = keys(json.loads(command("verify", "a.toml", loads, *claim).out))
+    found["compare"] = keys(json.loads(command("compare", "a.toml", "--json").out))
+    (tmp_path / "found.json").write_text(json.dumps(found, indent=1))
+    assert found == json.loads(GOLDEN.read_text())

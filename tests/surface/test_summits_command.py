@@ -1,0 +1,243 @@
+"""`summits` on the command line: what it writes, what it says, and its exit status."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import convexrough as cr
+
+SCENE = """
+[sphere]
+radius = {radius}
+[material]
+contact_modulus = {modulus}
+poisson_ratio = 0.3
+[asperities]
+pattern = "file"
+path = "summits.csv"
+geometry = "closest"
+[normal]
+load = {load}
+[units]
+length = "{unit}"
+"""
+
+
+@pytest.fixture
+def surface(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> cr.surface.Surface:
+    """Its heights are in scan.npz, tilted; scene.toml presses it."""
+    monkeypatch.chdir(tmp_path)
+    surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=256, unit="µm")
+    tilt = 0.01 * np.arange(256)
+    np.savez("scan.npz", heights=surface.heights + tilt, pixel=1.0, unit="µm")
+    Path("scene.toml").write_text(SCENE.format(radius=1e4, modulus=1.0, load=100.0, unit="µm"))
+    return surface
+
+
+def rows(path: str) -> list[dict[str, str]]:
+    with open(path, encoding="utf-8", newline="") as file:
+        names, *cells = csv.reader(file)
+    return [dict(zip([name.partition(" [")[0] for name in names], row, strict=True))
+            for row in cells]  # fmt: skip
+
+
+@pytest.mark.usefixtures("surface")
+def test_a_scan_becomes_a_scene(command: Any) -> None:
+    outcome = command("summits", "scan.npz", "--no-figures")
+    assert outcome.status == 0
+    assert outcome.err.startswith("convexrough: hint: --scene or --radius presses on them")
+    assert outcome.out.endswith("\nwritten here: summits.csv\n")
+    summits = cr.surface.read("scan.npz").summits()
+    table = rows("summits.csv")
+    assert len(table) == len(summits)
+    for name, values in (("x", summits.x), ("y", summits.y), ("height", summits.heights),
+                         ("tip_radius", summits.tip_radii), ("deviation", summits.deviations),
+                         ("elliptic_load", summits.elliptic_loads)):  # fmt: skip
+        assert [float(row[name]) for row in table] == values.tolist()
+    scene = cr.read_scene("scene.toml").scene
+    np.testing.assert_array_equal(scene.asperities.positions, summits.positions)
+    np.testing.assert_array_equal(scene.asperities.tip_radii, summits.tip_radii)
+    lines = outcome.out.splitlines()
+    assert (
+        f"summits           {len(summits):,}  (of {summits.origin.maxima:,} maxima" in outcome.out
+    )
+    assert "removed           plane, slopes 0.01" in outcome.out
+    statistics = next(line for line in lines if line.startswith("density")).split()
+    found = cr.surface.read("scan.npz").summits(0.0).statistics.density
+    assert statistics[:3] == ["density", "[1/µm²]", f"{found:.4g}"]
+    assert statistics[4] == f"{cr.surface.read('scan.npz').moments.density:.4g}"
+
+
+@pytest.mark.usefixtures("surface")
+def test_pressed_as_a_scene_says(command: Any) -> None:
+    outcome = command("summits", "scan.npz", "--scene", "scene.toml", "--json", "--no-figures")
+    assert outcome.status == 0
+    found = json.loads(outcome.out)
+    file = cr.read_scene("scene.toml")  # of the table that was just written
+    contact = cr.press(file.scene, load=file.load)
+    chosen = next(row for row in found["provability"] if row["prune"] == 0.05)
+    assert chosen["contacts"] == (contact.status == "contact").sum()
+    assert chosen["scope"] == contact.certificate.scope
+    assert_allclose(chosen["approach"], contact.approach, rtol=1e-9)
+    assert_allclose(chosen["crowding"], contact.crowding, rtol=1e-9)
+    assert found["crowded"] == []
+    first = found["trusted_from"]
+    trusted = [row["trusted"] for row in found["provability"] if row["prune"] >= first]
+    assert trusted
+    assert all(trusted)
+    assert rows("summits-provability.csv")[0]["prune"] == "0.0"
+    said = command("summits", "scan.npz", "--radius", "1e4", "--load", "100", "--modulus", "1",
+                   "--json", "--no-figures", "--force")  # fmt: skip
+    assert json.loads(said.out) == found
+
+
+@pytest.mark.usefixtures("surface")
+def test_a_scene_in_another_unit(command: Any) -> None:
+    """A map in µm for a scene in m: the table is in m, and the contact the same."""
+    text = SCENE.format(radius=0.01, modulus=1e12, load=100.0, unit="m")
+    Path("metres.toml").write_text(text)
+    options = ("--json", "--no-figures", "--force")
+    one = json.loads(command("summits", "scan.npz", "--scene", "scene.toml", *options).out)
+    small = [float(row["tip_radius"]) for row in rows("summits.csv")]
+    other = json.loads(command("summits", "scan.npz", "--scene", "metres.toml", *options).out)
+    assert_allclose(
+        [float(row["tip_radius"]) for row in rows("summits.csv")], np.array(small) / 1e6
+    )
+    assert other["surface"]["unit"] == "m"
+    for first, second in zip(one["provability"], other["provability"], strict=True):
+        assert first["contacts"] == second["contacts"]
+        assert_allclose(second["approach"], 1e-6 * first["approach"], rtol=1e-6)
+    np.save("nameless.npy", cr.surface.read("scan.npz").heights)
+    nameless = command(
+        "summits", "nameless.npy", "--pixel", "1", "--scene", "metres.toml", *options
+    )
+    assert nameless.status == 2
+    assert "unit: found none, expected --unit, as the scene is in m" in nameless.err
+
+
+def test_not_certified_is_exit_status_three(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A ridge with two tops that are almost one."""
+    monkeypatch.chdir(tmp_path)
+    x, y = np.mgrid[-32:33, -32:33]
+    tops = -1e-5 * (np.minimum(abs(x), 6) ** 2 - 16.0) ** 2
+    np.savez("scan.npz", heights=tops - x**2 / 1e6 - y**2 / 4e3, pixel=1.0, unit="µm")
+    outcome = command("summits", "scan.npz", "--prune", "0", "--radius", "1e4", "--approach", "3",
+                      "--detrend", "none", "--no-figures")  # fmt: skip
+    assert outcome.status == 3
+    assert Path("summits.csv").exists()
+    assert " none " in outcome.out
+    assert "not to be trusted" in outcome.err
+
+
+@pytest.mark.usefixtures("surface")
+def test_nothing_is_overwritten_unasked(command: Any) -> None:
+    Path("summits.csv").write_text("mine")
+    outcome = command("summits", "scan.npz")
+    assert outcome.status == 2
+    assert "summits.csv: is there already; --force replaces it, --out names another" in outcome.err
+    assert Path("summits.csv").read_text() == "mine"
+    assert sorted(path.name for path in Path().iterdir()) == [
+        "scan.npz",
+        "scene.toml",
+        "summits.csv",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("missing.npy",), "missing.npy: cannot be read: No such file"),
+        (("bare.npy",), "bare.npy: pixel: found none, expected its size, as the file does not say"),
+        (("bare.npy", "--pixel", "one"), "--pixel: found 'one', expected a number, or two"),
+        (("bare.npy", "--pixel", "1,30"), "pixel: found 1 by 30, expected sides at most 1 to 10"),
+        (("bare.npy", "--pixel", "-1"), "pixel: found -1.0, expected a positive number"),
+        (
+            ("bare.npy", "--pixel", "1", "--unit", "ly"),
+            "unit: found 'ly', expected a unit",
+        ),
+        (
+            ("bare.npy", "--pixel", "1", "--fit", "99"),
+            "found 40 by 30 pixels, expected at",
+        ),
+        (("bare.npy", "--pixel", "1", "--fit", "4"), "fit: found 4, expected an odd number"),
+        (
+            ("bare.npy", "--pixel", "1", "--prune", "5"),
+            "prune: found 5.0, expected a number",
+        ),
+        (("bare.npy", "--pixel", "1", "--out", "a.txt"), "a.txt: found .txt, expected .csv"),
+        (("bare.npy", "--pixel", "1", "--out", "no/a.csv"), "no/a.csv: no folder no"),
+        (("holes.npy", "--pixel", "1"), "found 3 holes (nan) in 1,200 pixels"),
+        (("flat.npy", "--pixel", "1"), "heights: found 2 everywhere, expected a rough surface"),
+        (("plane.npy", "--pixel", "1"), "heights: found nothing but a plane"),
+        (("small.npy", "--pixel", "1"), "expected rows and columns, at least 3 of each"),
+        (("nano.npy", "--pixel", "1e-6"), "rms slope"),
+        (("scan.npz", "--unit", "mm"), "unit: found mm, expected µm, as the file says"),
+        (("scan.npz", "--pixel", "2"), "pixel: found 2 by 2, expected 1 by 1, as the file says"),
+        (("scan.npz", "--radius", "1"), "--radius needs exactly one of --approach and --load"),
+        (("scan.npz", "--load", "1"), "--radius needs exactly one of"),
+        (("scan.npz", "--radius", "1", "--load", "1"), "--load and --modulus go together"),
+        (("scan.npz", "--scene", "scene.toml", "--radius", "1"), "--scene says how to press"),
+        (("scan.npz", "--scene", "missing.toml"), "missing.toml: cannot be read"),
+        (("scan.npz", "--radius", "-1", "--approach", "1"), "sphere_radius: found -1.0"),
+        (("scan.npz", "--detrend", "cone"), "'cone' is not one of"),
+    ],
+)
+@pytest.mark.usefixtures("surface")
+def test_wrong_input(command: Any, arguments: tuple[str, ...], message: str) -> None:
+    rough = np.random.default_rng(1).standard_normal((30, 40))
+    np.save("bare.npy", rough)
+    np.save("flat.npy", np.full((30, 40), 2.0))
+    np.save("plane.npy", np.add.outer(np.arange(30.0), np.arange(40.0)))
+    np.save("small.npy", rough[:2])
+    np.save("nano.npy", rough)
+    rough[3, 4:7] = np.nan
+    np.save("holes.npy", rough)
+    before = {path.name for path in Path().iterdir()}
+    outcome = command("summits", *arguments)
+    assert outcome.status == 2
+    assert outcome.out == ""
+    assert message in " ".join(outcome.err.split())
+    assert "Traceback" not in outcome.err
+    assert {path.name for path in Path().iterdir()} == before
+
+
+@pytest.mark.usefixtures("surface")
+def test_holes_are_filled_where_asked_and_counted(command: Any) -> None:
+    heights = cr.surface.read("scan.npz").heights.copy()
+    heights[10:14, 20:25] = np.nan
+    np.save("holed.npy", heights)
+    outcome = command("summits", "holed.npy", "--pixel", "1", "--fill", "--no-figures")
+    assert outcome.status == 0
+    assert "holes filled      20" in outcome.out
+
+
+@pytest.mark.usefixtures("surface")
+def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any) -> None:
+    outcome = command("summits", "scan.npz", "--radius", "1e4", "--approach", "-100")
+    assert "warning: at a pruning of 0.05 nothing touches: trust is that of a" in outcome.err
+    assert "to be trusted     nothing, as nothing touches" in outcome.out
+
+
+def test_the_whole_map_beside_its_asperities(command: Any, surface: cr.surface.Surface) -> None:
+    y, x = np.mgrid[:256, :256] - 127.5
+    np.savez("ball.npz", heights=surface.heights - (x**2 + y**2) / 4000, pixel=1.0, unit="µm")
+    pressed = ("--radius", "1e4", "--load", "10", "--modulus", "1", "--no-figures")
+    ran = command("summits", "ball.npz", *pressed, "--whole")
+    assert "of the variance of the heights: " in ran.err
+    assert "--detrend sphere, removes it" in ran.err
+    assert "the same approach  asperities  whole map  difference" in ran.out
+    mended = ("--detrend", "sphere", "--force", "--json", "--whole")
+    ran = command("summits", "ball.npz", *pressed, *mended)
+    assert "variance" not in ran.err
+    found = json.loads(ran.out)["whole"]
+    assert found["load"]["asperities"] == pytest.approx(10.0)
+    assert 0.7 < found["load"]["asperities"] / found["load"]["whole"] < 1.0
+    assert found["resolution"] < 0.01
+    assert "--whole needs --scene or --radius" in command("summits", "ball.npz", "--whole").err

@@ -1,0 +1,213 @@
+"""The same table whoever computes it: processes, threads, Dask, in any order and any batches."""
+
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sweep_files import Deadly, same, sweeping, tables, told
+
+import convexrough as cr
+from convexrough.sweeps import plan
+from convexrough.sweeps.file import plan_of
+from convexrough.sweeps.plan import Plan
+from convexrough.sweeps.pool import Processes, dask
+from convexrough.sweeps.scenes import Tables
+from convexrough.sweeps.sweep import run
+
+#: Whatever ran before in this process, and whichever threads it left, nothing is forked.
+SPAWN = multiprocessing.get_context("spawn")
+
+PLAN = plan_of(tables(sweep={"seeds": 10}), Path("sweep"))
+WHOLE = cr.sweep(tables(sweep={"seeds": 10}), executor=ThreadPoolExecutor(1))
+
+
+class Shuffled(Executor):
+    """Computes every batch before the first is asked for, the last ones first."""
+
+    def __init__(self) -> None:
+        self._given: list[tuple[Future[Any], Any, Any]] = []
+
+    def submit(self, function: Any, /, *arguments: Any, **keys: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self._given.append((future, function, arguments))
+        if len(self._given) == PLAN.parts:
+            for future, function, arguments in reversed(self._given):
+                future.set_result(function(*arguments))
+        return self._given[-1][0]
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_processes(workers: int) -> None:
+    assert same(cr.sweep(tables(sweep={"seeds": 10}), workers=workers), WHOLE)
+
+
+@pytest.mark.parametrize(
+    "executor",
+    [lambda: ThreadPoolExecutor(3), lambda: ProcessPoolExecutor(2, mp_context=SPAWN), Shuffled],
+    ids=["threads", "processes of the user", "the last first"],
+)
+def test_executors(executor: Any) -> None:
+    given = executor()
+    assert same(cr.sweep(tables(sweep={"seeds": 10}), executor=given), WHOLE)
+    given.shutdown()
+
+
+@pytest.mark.parametrize("most", [1, 3, 7, 1000])
+def test_batches(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plan, "MOST_SCENES", most)
+    with ThreadPoolExecutor(1) as here:
+        assert same(cr.sweep(tables(sweep={"seeds": 10}), executor=here), WHOLE)
+
+
+def deadly(whole: Plan, worst: int) -> Plan:
+    assert isinstance(whole.source, Tables)
+    return replace(whole, source=Deadly(whole.source.grid, whole.source.path, worst=worst))
+
+
+def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None:
+    contents = sweeping(seeds=24, over={"asperities.height_std": [1e-6]})
+    whole = plan_of(contents, Path("sweep"))
+    said = "the process that computed scenes 17 to 17 died, twice"
+    with Processes(2) as mine, pytest.raises(cr.WorkerError, match=said):
+        run(deadly(whole, 17), mine, out=tmp_path / "a")
+    assert cr.open_sweep(tmp_path / "a").read()["scene"].tolist() == [*range(17), *range(18, 24)]
+    with ThreadPoolExecutor(1) as here:
+        table = run(whole, here, out=tmp_path / "a", resume=True).table
+        assert same(table, cr.sweep(contents, executor=here))
+
+
+def test_an_executor_that_broke_is_said_to_be() -> None:
+    with (
+        ProcessPoolExecutor(1, mp_context=SPAWN) as mine,
+        pytest.raises(cr.WorkerError, match="of no use any more"),
+    ):
+        run(deadly(PLAN, 3), mine)
+
+
+SCRIPT = """
+import convexrough as cr
+from sweep_files import SMALL
+table = cr.sweep(SMALL, workers=2, out="a")
+print(len(table))
+"""
+
+
+def test_a_script_needs_no_guard(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(SCRIPT)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (0, "16\n", "")
+
+
+LINEAR = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+import convexrough as cr
+from sweep_files import tables
+many = tables(asperities={"spacing": 0.0012, "tip_radius": 0.01},
+              sweep={"seeds": 2, "measure": ["load", "loss", "load_error", "approach"]})
+with ThreadPoolExecutor(2) as here:
+    rows = cr.sweep(many, executor=here).read()
+np.savez(sys.argv[1], **rows)
+"""
+
+
+def test_threads_of_linear_algebra_do_not_matter(tmp_path: Path) -> None:
+    found = []
+    for threads in ("1", "2", "7"):
+        names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+        environment = {**os.environ, **dict.fromkeys(names, threads)}
+        environment["PYTHONPATH"] = os.pathsep.join(sys.path)
+        out = tmp_path / f"{threads}.npz"
+        subprocess.run([sys.executable, "-c", LINEAR, str(out)], env=environment, check=True)
+        found.append(np.load(out))
+    for name in found[0].files:
+        assert found[0][name].tobytes() == found[1][name].tobytes(), name
+        assert found[0][name].tobytes() == found[2][name].tobytes(), name
+
+
+def test_the_threads_are_given_back() -> None:
+    from threadpoolctl import threadpool_info
+
+    from convexrough.threads import one_thread
+
+    def threads() -> set[int]:
+        return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+    before = threads()
+    with one_thread, one_thread:
+        assert threads() == {1}
+    assert threads() == before
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
+    ) as found:
+        yield found
+
+
+def test_dask(cluster: Any) -> None:
+    with dask(cluster.scheduler_address) as engine:
+        assert same(run(PLAN, engine).table, WHOLE)
+
+
+def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
+    contents = tables(sweep={"seeds": 60})
+    plan = plan_of(contents, Path("sweep"))
+    killed: list[int] = []
+
+    def kill(news: str) -> None:
+        if "of 240 scenes" in news and not killed:
+            killed.append(random.choice(workers))
+            os.kill(killed[0], signal.SIGKILL)
+
+    workers = [each.pid for each in cluster.workers.values()]
+    with dask(cluster.scheduler_address) as engine, told(kill):
+        table = run(plan, engine, out=tmp_path / "a").table
+    assert killed
+    with ThreadPoolExecutor(1) as here:
+        assert same(table, cr.sweep(contents, executor=here))
+    assert set(table.read(["status"])["status"]) == {"certified"}
+
+
+def test_a_scheduler_that_does_not_answer() -> None:
+    config = pytest.importorskip("dask").config
+    with (
+        config.set({"distributed.comm.timeouts.connect": "1s"}),
+        pytest.raises(cr.InputError, match=r"scheduler: found tcp://127\.0\.0\.1:9"),
+        dask("tcp://127.0.0.1:9"),
+    ):
+        pass
+    with pytest.raises(cr.InputError, match="scheduler: found nonsense"), dask("nonsense"):
+        pass
+
+
+@pytest.mark.parametrize("spacing", [0.0025, 0.0005], ids=["matrix", "lattice"])
+def test_sharing_changes_no_bit(spacing: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes one after the other, and each as the first of its batch."""
+    lattice = {"spacing": spacing, "tip_radius": 8 * spacing, "within": 0.0102}
+    measured = {"seeds": 3, "measure": ["load", "approach", "load_error", "loss"]}
+    contents = tables(
+        asperities=lattice, sweep=measured | {"over": {"asperities.height_std": [1e-7]}}
+    )
+    with ThreadPoolExecutor(1) as here:
+        shared = cr.sweep(contents, executor=here)
+        monkeypatch.setattr(plan, "MOST_SCENES", 1)
+        assert same(shared, cr.sweep(contents, executor=here))

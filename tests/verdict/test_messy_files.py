@@ -1,0 +1,501 @@
+"""Messy files and slips of units: read right, or refused with the cause named."""
+
+import gzip
+import io
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+import convexrough as cr
+
+COUNT = 12
+RNG = np.random.default_rng(5)
+GRID = np.stack(np.meshgrid(np.arange(4) - 1.4, np.arange(3) - 0.8), axis=-1).reshape(-1, 2)
+PLACES = 5e-5 * (GRID + RNG.uniform(-0.2, 0.2, GRID.shape))
+HEIGHTS = RNG.uniform(-3e-7, 0, COUNT)
+SCENE = """
+[sphere]
+radius = 0.01
+[material]
+{modulus}
+poisson_ratio = 0.3
+[asperities]
+pattern = "file"
+path = "{summits}"
+geometry = "closest"
+tip_radius = 2e-4
+[normal]
+approach = 4e-7
+[units]
+{units}
+"""
+STEEL, METRES = "youngs_modulus = 210e9", 'length = "m"\nforce = "N"'
+Columns = Mapping[str, Iterable[Any]]
+
+
+def lines(columns: Columns, separator: str = ",", decimal: str = ".", header: bool = True) -> str:
+    """A table of text, as any program writes it."""
+    rows = [list(columns)] if header else []
+    rows += [
+        [str(cell).replace(".", decimal) for cell in row]
+        for row in zip(*(np.asarray(each).tolist() for each in columns.values()), strict=True)
+    ]
+    return "".join(separator.join(row) + "\n" for row in rows)  # fmt: skip
+
+
+def sheet(path: Path, *sheets: list[list[Any]]) -> None:
+    book = pytest.importorskip("openpyxl").Workbook()
+    book.remove(book.active)
+    for rows in sheets:
+        page = book.create_sheet()
+        for row in rows:
+            page.append(row)
+    book.save(path)
+
+
+class Case(NamedTuple):
+    """A scene, what it was solved for, and its table of x, y and load in a shuffled order."""
+
+    contact: cr.Contact
+    order: Any
+
+    @property
+    def loads(self) -> Any:
+        return self.contact.loads
+
+    def table(self, names: str = "x y load", **more: Any) -> dict[str, Any]:
+        x, y, load = names.split(" ")
+        points, loads = PLACES[self.order], self.loads[self.order]
+        return {x: points[:, 0], y: points[:, 1], load: loads} | more
+
+    def pixels(self, names: str = "x y pressure") -> dict[str, Any]:
+        """Uniform pressure over a square of nine pixels at each asperity, on one grid."""
+        step = 2e-6
+        nearest = step * np.rint(self.contact.scene.contact_points / step)
+        x, y = (step * np.arange(-60, 61) for _ in range(2))
+        grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        pressure = np.zeros(len(grid))
+        for place, load in zip(nearest, self.loads, strict=True):
+            pressure[np.abs(grid - place).max(axis=1) < 1.5 * step] += load / 9 / step**2
+        return dict(zip(names.split(" "), (*grid.T, pressure), strict=True))
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Case:
+    """In scene.toml, in metres and newtons, with its summits in summits.csv."""
+    write_scene(tmp_path)
+    table = {"x": PLACES[:, 0], "y": PLACES[:, 1], "height": HEIGHTS}
+    (tmp_path / "summits.csv").write_text(lines(table))
+    file = cr.read_scene(tmp_path / "scene.toml")
+    contact = cr.press(file.scene, approach=file.approach)
+    assert 3 < (contact.loads > 0).sum() < COUNT - 3
+    return Case(contact, np.random.default_rng(1).permutation(COUNT))
+
+
+def write_scene(
+    folder: Path, modulus: str = STEEL, units: str = METRES, summits: str = "summits.csv"
+) -> None:
+    text = SCENE.format(modulus=modulus, units=units, summits=summits)
+    (folder / "scene.toml").write_text(text)
+
+
+def text(name: str = "loads.csv", code: str = "utf-8", **how: Any) -> Any:
+    """Writes columns as text."""
+
+    def write(folder: Path, columns: Columns) -> str:
+        content = lines(columns, **how).encode(code)
+        packed = gzip.compress(content) if name.endswith(".gz") else content
+        (folder / name).write_bytes(packed)
+        return name
+
+    return write
+
+
+def mat(folder: Path, **variables: Any) -> str:
+    savemat(folder / "loads.mat", variables)
+    return "loads.mat"
+
+
+def raw(folder: Path, content: str | bytes, name: str = "loads.csv") -> str:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return name
+
+
+def xlsx(folder: Path, *sheets: list[list[Any]]) -> str:
+    sheet(folder / "loads.xlsx", *sheets)
+    return "loads.xlsx"
+
+
+def rows(columns: Columns) -> list[list[Any]]:
+    cells = zip(*(np.asarray(each).tolist() for each in columns.values()), strict=True)
+    return [list(columns), *map(list, cells)]
+
+
+def parquet(folder: Path, columns: Columns) -> str:
+    from pyarrow import parquet, table
+
+    parquet.write_table(table(dict(columns)), folder / "loads.parquet")
+    return "loads.parquet"
+
+
+def npz(folder: Path, columns: Columns) -> str:
+    np.savez(folder / "loads.npz", **{name: np.asarray(each) for name, each in columns.items()})
+    return "loads.npz"
+
+
+def matrix(columns: Columns) -> Any:
+    return np.column_stack([np.asarray(each) for each in columns.values()])
+
+
+def touching(case: Case, columns: Columns) -> dict[str, Any]:
+    """Rows of loaded nodes only."""
+    chosen = case.loads[case.order] > 0
+    return {name: np.asarray(each)[chosen] for name, each in columns.items()}
+
+
+def patches(case: Case) -> dict[str, Any]:
+    """Four nodes about each asperity that touches, with a quarter of its load each."""
+    touched = np.flatnonzero(case.loads)
+    corners = 1e-6 * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+    points = (case.contact.scene.contact_points[touched][:, None] + corners).reshape(-1, 2)
+    return dict(x=points[:, 0], y=points[:, 1], load=np.repeat(case.loads[touched] / 4, 4))
+
+
+def tributary(case: Case) -> dict[str, Any]:
+    """Nodes of a mesh without order, each with its pressure and its area."""
+    nodes = patches(case)
+    area = np.random.default_rng(2).uniform(1e-12, 2e-12, len(nodes["x"]))
+    return {"x": nodes["x"], "y": nodes["y"], "pressure [Pa]": nodes["load"] / area,
+            "area [m²]": area}  # fmt: skip
+
+
+GERMAN = dict(separator=";", decimal=",")
+SHUFFLED = lambda case, start=0, name="index": {  # noqa: E731
+    name: case.order + start, "load": case.loads[case.order]
+}  # fmt: skip
+
+#: Writes a file into a folder, and returns its name, then the options it is read with.
+READ: dict[str, tuple[Callable[[Path, Case], str], str]] = {
+    "gzip": (lambda to, case: text("loads.csv.gz")(to, case.table()), ""),
+    "gzip of German": (lambda to, case: text("a.csv.gz", **GERMAN)(to, case.table()), ""),
+    "Parquet": (lambda to, case: parquet(to, case.table()), ""),
+    "MATLAB's variables": (lambda to, case: mat(to, **case.table()), ""),
+    "MATLAB's matrix": (lambda to, case: mat(to, result=matrix(case.table())), ""),
+    "MATLAB's structure": (lambda to, case: mat(to, result=case.table()), ""),
+    "MATLAB's row of loads": (lambda to, case: mat(to, load=case.loads, more="a note"), ""),
+    "workbook": (lambda to, case: xlsx(to, rows(case.table())), ""),
+    "workbook with a title": (lambda to, case: xlsx(
+        to, [["Run 7"], [], *rows(case.table("x\xa0[m] y\xa0[m] load\xa0[N]"))]), ""),
+    "workbook of text": (lambda to, case: xlsx(
+        to, [[str(cell).replace(".", ",") for cell in row] for row in rows(case.table())]), ""),
+    "workbook's second sheet": (lambda to, case: xlsx(to, [["notes"]], rows(case.table())), ""),
+    "index from 0": (lambda to, case: text()(to, SHUFFLED(case)), ""),
+    "index from 1": (lambda to, case: text()(to, SHUFFLED(case, 1)), ""),
+    "numbers of nodes": (
+        lambda to, case: text(separator="\t")(to, SHUFFLED(case, 1, "Node")), ""),
+    "index in arrays": (lambda to, case: npz(to, SHUFFLED(case, 1, "id")), ""),
+    "loaded nodes by place": (
+        lambda to, case: text()(to, touching(case, case.table())), "--missing-open"),
+    "loaded nodes by index": (lambda to, case: text()(
+        to, {"index": np.flatnonzero(case.loads), "load": case.loads[case.loads > 0]}),
+        "--missing-open"),
+    "compression is negative": (
+        lambda to, case: text()(to, case.table(load=-case.loads[case.order])), "--sign -1"),
+    "another name": (lambda to, case: text()(to, case.table("x y P")), "--column load=P"),
+    "x and y called otherwise": (
+        lambda to, case: text()(to, case.table("X1 X2 load")), "--column x=X1 --column X2=y"),
+    "units below the header": (lambda to, case: raw(
+        to, lines(case.table()).replace("load\n", "load\nm,m,N\n", 1)), ""),
+    "titles above the header": (lambda to, case: raw(
+        to, "Project: plate\nDate;1 May 2026\n\n" + lines(case.table(), ";", ",")), ""),
+    "pixels of a map": (lambda to, case: text()(to, case.pixels()), "--within 1e-9"),
+    "nodes with areas": (lambda to, case: text()(to, tributary(case)), ""),
+    "nodal forces": (lambda to, case: text()(to, patches(case)), "--nodes"),
+    "another unit, scaled": (lambda to, case: text()(
+        to, case.table("x y load\xa0[mN]", **{"load\xa0[mN]": 1e3 * case.loads[case.order]})),
+        "--scale load=0.001"),
+}  # fmt: skip
+
+#: The same for what is refused, and what is said.
+REFUSED: dict[str, tuple[Callable[[Path, Case], str], str]] = {
+    "x and y exchanged": (lambda to, case: text()(to, case.table("y x load")),
+                          "x and y are exchanged: --column x=y --column y=x"),
+    "x mirrored": (lambda to, case: text()(to, case.table(x=-PLACES[case.order, 0])),
+                   "x has the other sign: --scale x=-1"),
+    "shifted": (lambda to, case: text()(to, case.table(x=PLACES[case.order, 0] + 3e-4)),
+                "all are shifted by [0.0003, 0]"),
+    "loaded nodes only": (lambda to, case: text()(to, touching(case, case.table())),
+                          "; --missing-open takes the others for open"),
+    "negative loads": (
+        lambda to, case: text()(to, case.table(load=-case.loads[case.order])),
+        "no load is positive, expected compression to be: --sign -1"),
+    "an index twice": (lambda to, case: text()(
+        to, {"index": [0, *range(COUNT - 1)], "load": case.loads}), "found 0 twice"),
+    "an index from who knows where": (lambda to, case: text()(
+        to, {"index": [3, 4, 5], "load": [1, 2, 3]}), "from 3 to 5: from 0 or from 1?"),
+    "MATLAB's HDF5": (lambda to, case: raw(
+        to, b"MATLAB 7.3 MAT-file".ljust(128) + b"\x89HDF\r\n", "a.mat"), "save(..., '-v7')"),
+    "a workbook called CSV": (
+        lambda to, case: Path(to / xlsx(to, [["load"]])).replace(to / "a.csv").name,
+        "an archive or an Excel workbook; name it .xlsx"),
+    "half a gzip": (
+        lambda to, case: raw(to, gzip.compress(b"load\n1\n" * 999)[:40], "a.csv.gz"),
+        "ended before"),
+    "pressures without areas": (lambda to, case: text()(
+        to, case.table("x y pressure")), "expected a column 'area', or x and y on a regular grid"),
+    "another name, not said": (lambda to, case: text()(to, case.table("x y Fz")),
+                               "expected a column 'load'; --column load=NAME names another"),
+    "a row of totals": (lambda to, case: raw(
+        to, lines(case.table()) + f"Sum,,{case.loads.sum()}\n"), "column x: found 'Sum'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", READ)
+def test_read_right(tmp_path: Path, command: Any, case: Case, name: str) -> None:
+    write, options = READ[name]
+    outcome = command("verify", "scene.toml", write(tmp_path, case), "--json", *options.split())
+    assert (outcome.status, outcome.err) == (0, "")
+    found = [row["load"] for row in json.loads(outcome.out)["asperities"]]
+    np.testing.assert_allclose(found, case.loads, rtol=1e-13)
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refused_with_the_cause(tmp_path: Path, command: Any, case: Case, name: str) -> None:
+    write, cause = REFUSED[name]
+    outcome = command("verify", "scene.toml", write(tmp_path, case))
+    assert (outcome.status, outcome.out) == (2, "")
+    assert cause in outcome.err
+    assert len(outcome.err.splitlines()) <= 11
+
+
+def test_own_results_are_read(command: Any, case: Case) -> None:
+    assert command("run", "scene.toml", "--no-figures", "--out", "found").status == 0
+    outcome = command("verify", "scene.toml", "found/asperities.csv", "--within", "1e-9")
+    assert (outcome.status, outcome.err) == (0, "")
+
+
+# Units
+
+UM = {"X (µm)": 1e6 * PLACES[:, 0], "Y (µm)": 1e6 * PLACES[:, 1]}
+
+#: Header of loads, option, and what is said.
+SLIPS = {
+    "x in mm": ("x\xa0[mm] y\xa0[mm] load", "column x: found mm, expected m", "--scale x=0.001"),
+    "x in µm": ("x\xa0(um) y\xa0(um) load", "column y: found um, expected m", "--scale y=1e-06"),
+    "load in mN": ("x y load\xa0[mN]", "column load: found mN, expected N", "load=0.001"),
+    "load in kN": ("x y load\xa0/\xa0kN", "column load: found kN, expected N", "load=1000"),
+    "load in pounds": ("x y load\xa0[lbf]", "found lbf, expected N", "load=4.4482216152605"),
+    "load in mm": ("x y load\xa0[mm]", "column load: found mm, a unit of length", "of force"),
+    "no unit": ("x y load\xa0[Newtn]", "column load: found 'Newtn'", "--scale load=1"),
+    "x and y differ": ("x\xa0[m] y\xa0[mm] load", "column y: found mm, expected m", "y=0.001"),
+    "x without y": ("x\xa0[m] y\xa0[mm] load", "column y: found mm", "convert = true"),
+}
+
+
+@pytest.mark.parametrize("name", SLIPS)
+def test_units_of_loads(tmp_path: Path, command: Any, case: Case, name: str) -> None:
+    header, *said = SLIPS[name]
+    outcome = command("verify", "scene.toml", text()(tmp_path, case.table(header)))
+    assert (outcome.status, outcome.out) == (2, "")
+    assert all(each in outcome.err for each in said)
+
+
+def test_units_of_a_pressure(tmp_path: Path, command: Any, case: Case) -> None:
+    name = text()(tmp_path, case.pixels("x y pressure\xa0[MPa]"))
+    outcome = command("verify", "scene.toml", name)
+    assert outcome.status == 2
+    assert "column pressure: found MPa, expected N/m²" in outcome.err
+    assert "--scale pressure=1000000" in outcome.err
+    pixels = case.pixels("x y pressure\xa0[MPa]")
+    pixels["pressure\xa0[MPa]"] = 1e-6 * pixels["pressure\xa0[MPa]"]
+    write_scene(tmp_path, units=METRES + "\nconvert = true")
+    assert command("verify", "scene.toml", text()(tmp_path, pixels)).status == 0
+
+
+def test_a_scale_that_is_not_the_units(tmp_path: Path, command: Any, case: Case) -> None:
+    name = text()(tmp_path, case.table("x\xa0[mm] y\xa0[mm] load"))
+    outcome = command("verify", "scene.toml", name, "--scale", "x=1e-6", "--scale", "y=1e-3")
+    assert outcome.status == 2
+    assert "column x: found a factor 1e-06, expected 0.001, as mm are 0.001 m" in outcome.err
+
+
+def test_places_in_another_unit_that_nobody_named(tmp_path: Path, command: Any, case: Case) -> None:
+    table = case.table(x=1e3 * PLACES[case.order, 0], y=1e3 * PLACES[case.order, 1])
+    outcome = command("verify", "scene.toml", text()(tmp_path, table))
+    assert outcome.status == 2
+    assert "10^3 times as far out" in outcome.err
+    assert "--scale x=0.001 --scale y=0.001" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        (UM, "column x: found µm, expected m, the scene's unit; 1 µm is 1e-06 m"),
+        ({"x": PLACES[:, 0], "y": PLACES[:, 1], "height [nm]": 1e9 * HEIGHTS}, "is 1e-09 m"),
+        ({"x [m]": PLACES[:, 0], "y [N]": PLACES[:, 1]}, "found N, a unit of force"),
+    ],
+)
+def test_units_of_summits(
+    tmp_path: Path, command: Any, case: Case, columns: Columns, said: str
+) -> None:
+    (tmp_path / "summits.csv").write_text(lines(columns))
+    outcome = command("run", "scene.toml", "--no-figures")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert said in outcome.err
+    assert ("convert = true" in outcome.err) == ("of force" not in said)
+
+
+def test_units_of_summits_convert_when_asked(tmp_path: Path, case: Case) -> None:
+    (tmp_path / "summits.csv").write_text(lines({**UM, "height [nm]": 1e9 * HEIGHTS}, ";", ","))
+    write_scene(tmp_path, units=METRES + "\nconvert = true")
+    scene = cr.read_scene(tmp_path / "scene.toml").scene
+    np.testing.assert_allclose(scene.asperities.positions, PLACES, rtol=1e-15)
+    np.testing.assert_allclose(scene.asperities.heights, HEIGHTS, rtol=1e-15)
+    (tmp_path / "summits.csv").write_text(lines({**UM, "height": HEIGHTS}))
+    with pytest.raises(cr.InputError, match="column height: found no unit, expected one, as x"):
+        cr.read_scene(tmp_path / "scene.toml")
+
+
+def test_units_of_summits_in_a_sweep(tmp_path: Path, case: Case) -> None:
+    (tmp_path / "summits.csv").write_text(lines({**UM, "height [nm]": 1e9 * HEIGHTS}))
+    write_scene(tmp_path, units=METRES + "\nconvert = true")
+    text = (tmp_path / "scene.toml").read_text()
+    sweep = '[sweep]\nmeasure = ["load"]\n[sweep.over]\n"normal.approach" = [2e-7, 4e-7]\n'
+    (tmp_path / "sweep.toml").write_text(text + sweep)
+    table = cr.sweep(tmp_path / "sweep.toml")
+    np.testing.assert_allclose(table.read()["load"][1], case.contact.load, rtol=1e-12)
+
+
+@pytest.mark.parametrize("named", ['height = "z"', 'z = "height"'])
+def test_summits_by_other_names(tmp_path: Path, case: Case, named: str) -> None:
+    columns = {"x": PLACES[:, 0], "y": PLACES[:, 1], "z": HEIGHTS}
+    (tmp_path / "summits.csv").write_text(lines(columns))
+    scene = (tmp_path / "scene.toml").read_text()
+    named_scene = scene.replace('path = "', f'columns = {{ {named} }}\npath = "')
+    (tmp_path / "scene.toml").write_text(named_scene)
+    heights = cr.read_scene(tmp_path / "scene.toml").scene.asperities.heights
+    np.testing.assert_array_equal(heights, HEIGHTS)
+
+
+def test_units_that_differ_where_the_scene_names_none(tmp_path: Path, case: Case) -> None:
+    write_scene(tmp_path, units="")
+    (tmp_path / "summits.csv").write_text(lines({**UM, "height [nm]": 1e9 * HEIGHTS}))
+    with pytest.raises(cr.InputError, match="column height: found nm, expected µm, as x"):
+        cr.read_scene(tmp_path / "scene.toml")
+    (tmp_path / "summits.csv").write_text(lines(UM))
+    with pytest.raises(cr.InputError, match=r"µm, and a scene without units, expected \[units\]"):
+        cr.read_scene(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize(
+    ("modulus", "units", "said"),
+    [
+        ("youngs_modulus = 210", METRES, "found 210 N/m², which is 210 Pa, expected"),
+        ("youngs_modulus = 210e9", 'length = "mm"\nforce = "N"', "which is 2.1e+17 Pa, expected"),
+        (
+            "youngs_modulus = 210",
+            'length = "um"\nforce = "N"\npressure = "GPa"',
+            "found N, expected mN, as GPa and um make",
+        ),
+        (STEEL, 'length = "MM"\nforce = "N"', 'expected a unit of length; did you mean "mm"?'),
+        (STEEL, 'length = "N"', "length: found N, a unit of force, expected a unit of length"),
+        (STEEL, 'length = "m"\nconvert = true\nforce = "furlong"', "force: found 'furlong'"),
+        ("E = 210e9", METRES, 'E: unknown key, did you mean "youngs_modulus"?'),
+    ],
+)
+def test_units_of_scenes(
+    tmp_path: Path, command: Any, case: Case, modulus: str, units: str, said: str
+) -> None:
+    write_scene(tmp_path, modulus, units)
+    outcome = command("run", "scene.toml", "--no-figures")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert said in outcome.err
+
+
+def test_the_modulus_is_said(tmp_path: Path, command: Any, case: Case) -> None:
+    units = 'length = "um"\npressure = "GPa"'
+    write_scene(tmp_path, "youngs_modulus = 210", units)
+    outcome = command("run", "scene.toml", "--no-figures")
+    assert "contact modulus   115.3846154 mN/um²  (1.154e+11 Pa)" in outcome.out
+    assert "load" in outcome.out
+    assert " mN\n" in outcome.out
+
+
+def test_a_map_without_a_unit(tmp_path: Path, command: Any, case: Case) -> None:
+    heights = cr.surface.self_affine(0.8, 1e-7, 2e-5, seed=1, pixels=64).heights
+    np.save(tmp_path / "map.npy", heights)
+    asked = ("summits", "map.npy", "--pixel", "1e-6", "--scene", "scene.toml", "--no-figures")
+    outcome = command(*asked, "--out", "new.csv")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "map.npy: unit: found none, expected --unit, as the scene is in m" in outcome.err
+    assert command(*asked, "--out", "new.csv", "--unit", "m").status in (0, 3)
+
+
+# What else is read, and said
+
+
+def test_explain_reads_and_judges_nothing(tmp_path: Path, command: Any, case: Case) -> None:
+    name = text("a.csv", **GERMAN)(tmp_path, case.table("x\xa0[m] y\xa0[m] P", gap=case.loads))
+    outcome = command("verify", "scene.toml", name, "--explain", "--column", "load=P")
+    assert (outcome.status, outcome.err) == (0, "")
+    for said in (
+        "separated by semicolons, decimal comma",
+        "x [m]",
+        "load: column P",
+        "matched by position",
+        "not looked at: gap",
+        "closest",
+        "1.154e+11 Pa",
+    ):
+        assert said in outcome.out  # fmt: skip
+    assert "certificate" not in outcome.out
+    told = command("verify", "scene.toml", name, "--explain", "--column", "load=P", "--json")
+    assert json.loads(told.out)["read"] == outcome.out.removesuffix("\n").split("\n")
+
+
+def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
+    from xml.etree import ElementTree
+
+    wrong = case.loads.copy()
+    wrong[np.argmax(wrong)] = 0.0
+    name = text()(tmp_path, {"load": wrong})
+    outcome = command("verify", "scene.toml", name, "--junit", "found.xml")
+    assert outcome.status == 3
+    (suite,) = ElementTree.parse(tmp_path / "found.xml").getroot().iter("testsuite")
+    cases = {each.get("name"): each for each in suite}
+    assert list(cases) == ["loads: contact set", "loads: undecided", "loads: off", "loads: total"]
+    assert suite.get("failures") == str(sum(len(each) for each in cases.values()))
+    assert f"{np.argmax(case.loads)} at (" in str(cases["loads: contact set"][0].text)
+    again = command("verify", "scene.toml", name, "--junit", "found.xml")
+    assert again.status == 2
+    assert "found.xml: is there already" in again.err
+
+
+def test_what_is_proved_is_said(tmp_path: Path, command: Any, case: Case) -> None:
+    name = text()(tmp_path, {"load": case.loads * (1 + 1e-3)})
+    outcome = command("verify", "scene.toml", name)
+    assert outcome.status == 0
+    (line,) = (line for line in outcome.out.splitlines() if line.startswith("result  "))
+    assert re.fullmatch(
+        r"result {12}contact set proved; loads known to 0\.\d+ % of the largest "
+        r"\(no tolerance given\)",
+        line,
+    )
+    assert "geometry          closest" in outcome.out
+
+
+def test_bytes_of_every_kind_end_in_a_reason(tmp_path: Path, command: Any, case: Case) -> None:
+    held = io.BytesIO()
+    savemat(held, {"load": case.loads})
+    for name in ("a.mat", "a.xlsx", "a.csv.gz"):
+        for content in (b"", b"\x00" * 200, held.getvalue()[:150], b"PK\x03\x04" + b"x" * 99):
+            outcome = command("verify", "scene.toml", raw(tmp_path, content, name))
+            assert (outcome.status, outcome.out) == (2, "")
+            assert f"{name}: " in outcome.err

@@ -1,0 +1,382 @@
+"""Tables as people have them: read where the meaning is certain, else every mistake is shown."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scene_files import scene_text, write_loads
+
+import convexrough as cr
+from convexrough.run.scene_file import read_scene
+from convexrough.run.tables import read_summits
+from convexrough.tabular.table import read_table
+from convexrough.verdict.claims import Claimed, Manner, read_shear_forces
+from convexrough.verdict.claims import read_loads as read_with
+
+PLACES = [[0.0, 0.0], [1.0, 0.0], [0.5, 2.5]]
+LOADS = [1.5, 0.0, 2.5e-5]
+
+
+def small() -> cr.Scene:
+    return cr.Scene(1.0, cr.Asperities(PLACES, 0.1), cr.Material(1.0, 0.3), geometry="summit")
+
+
+def read_loads(path: Path, scene: cr.Scene, **how: Any) -> Claimed:
+    return read_with(path, scene, Manner(**how))
+
+
+@pytest.fixture(scope="module")
+def contact() -> cr.Contact:
+    asperities = cr.Asperities.hexagonal(
+        spacing=0.0025, tip_radius=0.02, within=0.006, height_std=1e-6, tip_radius_cv=0.1, seed=2
+    )
+    return cr.press(
+        cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit"), approach=2e-5
+    )
+
+
+def written(folder: Path, content: str | bytes, name: str = "loads.csv") -> Path:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def refused(
+    folder: Path, content: str | bytes, name: str = "loads.csv", **options: Any
+) -> list[str]:
+    """The lines of the message, without the path."""
+    path = written(folder, content)
+    with pytest.raises(cr.ConvexroughError) as caught:
+        read_loads(path, small(), **options)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith(f"{path}: ") for line in lines)
+    return [line.removeprefix(f"{path}: ") for line in lines]
+
+
+# As people have them
+
+ROWS = "0,0,1.5\n1,0,0\n0.5,2.5,2.5e-5\n"
+GERMAN = "x;y;load [N]\n0;0;1,5\n1;0;0\n0,5;2,5;2,5E-05\n"
+FILES = {
+    "plain": "x,y,load\n" + ROWS,
+    "spaces after commas": "x, y, load\n0, 0, 1.5\n1, 0, 0\n0.5, 2.5, 2.5e-5\n",
+    "shuffled": "load,x,y\n2.5e-5,0.5,2.5\n1.5,0,0\n0,1,0\n",
+    "decimal comma": GERMAN,
+    "decimal comma, tabs": GERMAN.replace(";", "\t"),
+    "spaces": "  x    y   load\n  0    0   1.5\n  1.0  0   0\n  0.5  2.5 2.5e-5\n",
+    "spaces and a unit": "x [m] y [m] load [N]\n" + ROWS.replace(",", " "),
+    "comments": "# made by hand\nx,y,load\n"
+    + ROWS.replace("1.5\n", "1.5 # the first\n")
+    + "# end\n",
+    "header in a comment": "# x y load\n" + ROWS.replace(",", " "),
+    "percent comments": "% from MATLAB\nx,y,load\n" + ROWS,
+    "more columns": "id,x,status,y,load,gap\n7,0,ok,0,1.5,\n8,1,ok,0,0,1\n9,0.5,no,2.5,2.5e-5,\n",
+    "pandas": ",x,y,load\n0,0,0,1.5\n1,1,0,0\n2,0.5,2.5,2.5e-5\n",
+    "R": '"x" "y" "load"\n"1" 0 0 1.5\n"2" 1 0 0\n"3" 0.5 2.5 2.5e-5\n',
+    "separators at the ends": "x,y,load,\n" + ROWS.replace("\n", ",\n"),
+    "separators at the ends of rows": "x,y,load\n" + ROWS.replace("\n", ",,\n"),
+    "quoted": '"x","y","load"\n' + ROWS.replace("1.5", '"1.5"'),
+    "Fortran": "x,y,load\n0.0D+00,0,0.15D+01\n1,0,0.D0\n0.5,2.5,2.5d-5\n",
+    "Fortran, three digits": "x,y,load\n0,0,1.5\n1,0,0\n5.0-001,2.5,2.5-005\n",
+    "blank lines": "\n\nx,y,load\n\n" + ROWS.replace("\n", "\n\n"),
+    "Windows": ("x,y,load\n" + ROWS).replace("\n", "\r\n"),
+    "old Macintosh": ("x,y,load\n" + ROWS).replace("\n", "\r"),
+    "Excel": "sep=;\n" + GERMAN,
+    "byte-order mark": "\ufeffx,y,load\n" + ROWS,
+    "UTF-16": ("x,y,load\n" + ROWS).encode("utf-16"),
+    "UTF-16 without a mark": ("x,y,load\n" + ROWS).encode("utf-16-le"),
+    "Latin-1": ("H\xf6he [\xb5m],x,y,load\n1," + ROWS[:-1].replace("\n", "\n1,")).encode("latin-1"),
+    "writematrix": ROWS,
+    "typographic minus": "x,y,load\n0,0,1.5\n1,\N{MINUS SIGN}0,0\n0.5,2.5,2.5e\N{MINUS SIGN}5\n",
+    "one column": "load\n1.5\n0\n2.5e-5\n",
+    "one column, decimal comma": "load\n1,5\n0\n2,5e-5\n",
+    "numbers alone": "1.5\n0\n2.5e-5\n",
+}
+
+
+@pytest.mark.parametrize("content", FILES.values(), ids=FILES)
+def test_as_people_have_them(tmp_path: Path, content: str | bytes) -> None:
+    assert read_loads(written(tmp_path, content), small()).values.tolist() == LOADS
+
+
+def test_a_line_of_numbers(tmp_path: Path) -> None:
+    """As MATLAB writes a row vector."""
+    scene = cr.Scene(
+        1.0,
+        cr.Asperities([[i, 0] for i in range(5)], 0.1),
+        cr.Material(1.0, 0.3),
+        geometry="summit",
+    )
+    path = written(tmp_path, "1,2,3,4,5.5\n")
+    assert read_loads(path, scene).values.tolist() == [1, 2, 3, 4, 5.5]
+    np.save(tmp_path / "a.npy", [[1, 2, 3, 4, 5.5]])
+    assert read_loads(tmp_path / "a.npy", scene).values.tolist() == [1, 2, 3, 4, 5.5]
+
+
+def test_units_are_kept_and_shown(tmp_path: Path) -> None:
+    found = read_loads(written(tmp_path, GERMAN), small())
+    said = "separated by semicolons, decimal comma, load [N], matched by position, to 0"
+    assert found.note.endswith(said)
+    assert "load [kN]" in read_loads(written(tmp_path, "load / kN\n1\n0\n0\n"), small()).note
+
+
+@pytest.mark.parametrize(
+    ("content", "columns"),
+    [
+        ("P,y pos,xs\n1.5,0,0\n0,0,1\n2.5e-5,2.5,.5\n", {"load": "P", "x": "xs", "y": "y pos"}),
+        ("F [N];load\n1.5;9\n0;9\n2.5e-5;9\n", {"load": "F"}),
+        ("9,1.5\n9,0\n9,2.5e-5\n", {"load": "2"}),
+        ("2.5e-5 0.5 2.5\n1.5 0 0\n0 1 0\n", {"load": "1", "x": "2", "y": "3"}),
+    ],
+)
+def test_columns_by_other_names(tmp_path: Path, content: str, columns: dict[str, str]) -> None:
+    found = read_loads(written(tmp_path, content), small(), columns=columns)
+    assert found.values.tolist() == LOADS
+
+
+def test_arrays(tmp_path: Path) -> None:
+    table = np.column_stack((PLACES, LOADS))
+    records = np.rec.fromarrays(table.T, names="x,y,load")
+    for name, saved in (("a", LOADS), ("b", table), ("c", records)):
+        np.save(tmp_path / f"{name}.npy", saved)
+        assert read_loads(tmp_path / f"{name}.npy", small()).values.tolist() == LOADS, name
+    np.savez(tmp_path / "e.npz", load=LOADS)
+    np.savez(tmp_path / "f.npz", np.array(LOADS))
+    np.savez(tmp_path / "g.npz", x=table[:, 0], y=table[:, 1], load=LOADS, more=["a", "b", "c"])
+    np.savez(tmp_path / "h.npz", force=3.0, grid=np.eye(4), load=LOADS, other=np.ones(9))
+    for name in "efgh":
+        assert read_loads(tmp_path / f"{name}.npz", small()).values.tolist() == LOADS, name
+
+
+def test_parquet(tmp_path: Path) -> None:
+    import pyarrow
+    from pyarrow import parquet
+
+    x, y = np.transpose(PLACES)
+    columns = {"x": x[::-1], "y": y[::-1], "status": ["a", "b", "c"], "load": LOADS[::-1]}
+    parquet.write_table(pyarrow.table(columns), tmp_path / "a.parquet")
+    assert read_loads(tmp_path / "a.parquet", small()).values.tolist() == LOADS
+    parquet.write_table(pyarrow.table({"load": [1.0, None, 2.0]}), tmp_path / "gap.parquet")
+    with pytest.raises(cr.InputError, match="entry 1, column load: found None, expected a finite"):
+        read_loads(tmp_path / "gap.parquet", small())
+    (tmp_path / "b.parquet").write_bytes(b"PAR1 and then nothing")
+    with pytest.raises(cr.FileError, match=r"not an \.parquet file"):
+        read_loads(tmp_path / "b.parquet", small())
+
+
+def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    with pytest.raises(cr.FileError, match="needs pyarrow: pip install pyarrow"):
+        read_loads(written(tmp_path, b"PAR1", "a.parquet"), small())
+
+
+def test_shear_forces_with_words(tmp_path: Path) -> None:
+    content = "status,force [N],x,y\nopen,0,1,0\nsliding,-2,0,0\npartial,1,0.5,2.5\n"
+    found = read_shear_forces(written(tmp_path, content), small(), Manner())
+    assert found.values.tolist() == [-2, 0, 1]
+    assert found.status is not None
+    assert found.status.tolist() == ["sliding", "open", "partial"]
+    assert (
+        read_shear_forces(written(tmp_path, "force\n1\n2\n3\n"), small(), Manner()).status is None
+    )
+
+
+# Positions
+
+
+def test_loads_are_matched_by_position(tmp_path: Path, contact: cr.Contact) -> None:
+    order = np.random.default_rng(3).permutation(len(contact.loads))
+    path = write_loads(tmp_path / "loads.csv", contact.scene, contact.loads, order)
+    assert np.array_equal(read_loads(path, contact.scene).values, contact.loads)
+
+
+@pytest.mark.parametrize(("offset", "fine"), [(0.009, True), (0.011, False)])
+def test_loads_at_a_slightly_different_place(
+    tmp_path: Path, contact: cr.Contact, offset: float, fine: bool
+) -> None:
+    path, scene = tmp_path / "loads.csv", contact.scene
+    moved = cr.Asperities(scene.asperities.positions + np.array([offset * 0.0025, 0]), 0.02)
+    write_loads(
+        path,
+        cr.Scene(1.0, moved, scene.material, geometry="summit"),
+        contact.loads,
+        range(len(moved)),
+    )
+    if fine:
+        assert np.array_equal(read_loads(path, scene).values, contact.loads)
+        with pytest.raises(cr.InputError, match="to 1e-05"):
+            read_loads(path, scene, tolerance=1e-5)
+    else:
+        with pytest.raises(cr.InputError, match=r"row \d+: found position .* 2.75e-05 from"):
+            read_loads(path, scene)
+        assert np.array_equal(read_loads(path, scene, tolerance=1e-4).values, contact.loads)
+
+
+# Mistakes
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ("load\n1\n", "rows: found 1, expected 3, one per asperity of the scene"),
+        (
+            "load\n1\n-2\n3\n",
+            "row 3, column load: found -2.0, expected a number that is not negative: ",
+        ),
+        ("load\n1\n-2e-20\n3\n", "not negative; --floor 2e-20 counts noise as 0: -2e-20"),
+        (
+            "loads\n1\n2\n3\n",
+            "found 'loads', expected a known column; did you mean \"load\"?",
+        ),
+        ("x,y\n0,0\n1,0\n", "columns: found x, y, expected a column 'load'"),
+        ("x,load\n0,1\n1,1\n2,1\n", "columns: found only x, expected x and y"),
+        ("x,y,load\n0,0,1\n0,0,1\n1,0,1\n", "row 3: found the same position as in row 2"),
+        ("x,y,load\n0,0,1\n1,0,1\n0,2,1\n", "row 4: found position [0.0, 2.0], 0.707107 from"),
+        ("1,2\n1,2\n1,2\n", "columns: found no header and 2 columns, expected a column 'load'"),
+        ("1,2,3\n4,5,6\n7,8,9\n", "row 1: found position [1.0, 2.0], "),
+        ("x,y,load\n0,0,1\n1000,0,1\n500,2500,1\n", "found them 10^3 times as far out"),
+        (b"PK\x03\x04...", "not text: an archive or an Excel workbook; name it .xlsx"),
+        (b"MATLAB 5.0 MAT-file", "not text: a MAT-file; name it .mat"),
+        (b"load\n1\x00\n", "row 2: not text"),
+    ],
+)
+def test_wrong_loads(tmp_path: Path, content: str | bytes, expected: str) -> None:
+    assert any(expected in line for line in refused(tmp_path, content))
+
+
+def test_all_mistakes_at_once_with_their_lines(tmp_path: Path) -> None:
+    content = "x,y,load\n0,0,one\n1,0\n0.5,?,2\n7,7,nan\n"
+    assert refused(tmp_path, content) == [
+        "row 2, column load: found 'one', expected a finite number: 0,0,one",
+        "row 5, column load: found nan, expected a finite number: 7,7,nan",
+        "row 4, column y: found '?', expected a finite number: 0.5,?,2",
+        "row 3: found 2 cells, expected 3, as in the header: 1,0",
+    ]
+    many = refused(tmp_path, "load\n" + "x\n" * 1000)
+    assert len(many) == 11
+    assert many[-1] == "and 990 more mistakes"
+
+
+# Never a traceback, and nothing takes long
+
+CELLS = st.one_of(
+    st.text(max_size=8),
+    st.floats().map(repr),
+    st.sampled_from(["1,5", "1.5D-3", "", '"', "x", "load", "#", "1e999", "9" * 400, "\x00", "-0"]),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(st.lists(CELLS, max_size=5), max_size=6),
+    st.sampled_from([",", ";", "\t", " ", "  ", ", ", "|"]),
+    st.sampled_from(["utf-8", "utf-16", "latin-1", "utf-8-sig"]),
+)
+def test_any_text(tmp_path_factory: Any, rows: list[list[str]], separator: str, code: str) -> None:
+    text = "\n".join(separator.join(row) for row in rows)
+    read_or_refused(tmp_path_factory, text.encode(code, "replace"), "a.csv")
+
+
+def read_or_refused(folders: Any, content: bytes, name: str) -> None:
+    path = written(folders.mktemp("any"), content, name)
+    message = f"{path}: read"
+    try:
+        found = read_loads(path, small())
+        assert np.isfinite(found.values).all()
+        assert (found.values >= 0).all()
+    except cr.ConvexroughError as error:
+        message = str(error)
+    assert all(line.startswith(f"{path}: ") for line in message.split("\n"))
+    assert max(map(len, message.split("\n"))) < 400 + len(str(path))
+
+
+@pytest.mark.parametrize("unit", [b"1", b"1,", b"1 ", b'"', b"x,", b"\xff", b"#"])
+@pytest.mark.sample(2)
+def test_an_endless_line_is_refused(tmp_path: Path, unit: bytes) -> None:
+    path = written(tmp_path, b"load\n" + unit * (100_000_000 // len(unit)))
+    with pytest.raises(cr.FileError, match="row 2: longer than 16,777,216 characters"):
+        read_loads(path, small())
+    path.unlink()
+
+
+# Files of asperities
+
+
+def test_summits(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    lines = "y, x ,tip_radius,height\r\n0.5,0.25,0.1,1e-3\r\n-1,2,0.2,-1e-3\r\n\r\n"
+    (folder / "summits.csv").write_bytes(b"\xef\xbb\xbf" + lines.encode())
+    # The path is relative to the scene file, wherever the command runs.
+    (tmp_path / "scene.toml").write_text(scene_text('pattern = "file"\npath = "data/summits.csv"'))
+    asperities = read_scene(tmp_path / "scene.toml").scene.asperities
+    assert asperities.positions.tolist() == [[0.25, 0.5], [2.0, -1.0]]
+    assert asperities.tip_radii.tolist() == [0.1, 0.2]
+    assert asperities.heights.tolist() == [1e-3, -1e-3]
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ("", "empty"),
+        ("x,y\n", "rows: found none below the header"),
+        ("x,y,heigth\n0,0,0\n", "found 'heigth', expected a known column; did you mean \"height\""),
+        ("x,height\n0,0\n", "columns: found x, height, expected a column 'y'"),
+        ("x,y,x\n0,0,0\n", "columns: found 'x' twice, expected once"),
+        ("x,y\n0,0\n1,abc\n", "row 3, column y: found 'abc', expected a finite number: 1,abc"),
+        ("x,y\n0,0\n1,\n", "row 3, column y: found '', expected a finite number: 1,"),
+        ("x,y\n0,nan\n", "row 2, column y: found nan, expected a finite number: 0,nan"),
+        ("x,y\n-inf,0\n", "row 2, column x: found -inf, expected a finite number"),
+        ("x,y\n0,0\n1,2,3\n", "row 3: found 3 cells, expected 2, as in the header: 1,2,3"),
+        ("x,y\n0,0,1\n1,2,3\n", "row 2: found 3 cells, expected 2"),
+        ("x,y\n0,0\n1", "row 3: found 1 cells, expected 2"),
+        ('x,y\n0,"1\n', 'row 2: unexpected end of data: 0,"1'),
+        ("x,y\n0,1_000\n", "row 2, column y: found '1_000', expected a finite number"),
+        ("x,y,tip_radius\n0,0,1\n", "tip radii: found both"),
+        ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
+        ("0,0\n1,1\n", "found no header and 2 columns, expected a column 'x'"),
+    ],
+)
+def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
+    path = tmp_path / "summits.csv"
+    path.write_text(content)
+    with pytest.raises(cr.ConvexroughError) as caught:
+        read_summits(path, tip_radius=1.0)
+    assert str(caught.value).startswith(str(path))
+    assert expected in str(caught.value)
+
+
+def test_summits_need_a_tip_radius(tmp_path: Path) -> None:
+    path = tmp_path / "summits.csv"
+    path.write_text("x,y\n0,0\n")
+    with pytest.raises(cr.InputError, match="tip radii: found neither"):
+        read_summits(path, tip_radius=None)
+
+
+NUMBERS = st.one_of(
+    st.floats(-1e60, 1e60).map(lambda each: each if abs(each) > 1e-60 else 0.0),
+    st.integers(-9, 9).map(float),
+    st.floats(0, 1).map(lambda each: round(each, 2)),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS.map(abs)), min_size=1, max_size=8),
+    st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("  ", ".")]),
+    st.sampled_from(["x{0}y{0}load", "x [m]{0}y [m]{0}load [N]", '"x"{0}"y"{0}"load"']),
+    st.sampled_from(["{}", "{:.17e}", "{:.17g}"]),
+)
+def test_what_is_written_is_read(
+    tmp_path_factory: Any, rows: Any, style: tuple[str, str], header: str, form: str
+) -> None:
+    separator, mark = style
+    lines = [separator.join(form.format(x).replace(".", mark) for x in row) for row in rows]
+    path = tmp_path_factory.mktemp("any") / "a.csv"
+    path.write_text("\n".join([header.format(separator), *lines]))
+    read = read_table(path, required=("x", "y", "load")).columns
+    expected = np.array([[float(form.format(x)) for x in row] for row in rows])
+    assert np.array_equal(np.column_stack([read[name] for name in ("x", "y", "load")]), expected)

@@ -1,0 +1,240 @@
+"""`verify` on the command line: what it says, in which order, and its exit status."""
+
+import csv
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from drawn import fits, words
+from scene_files import HEXAGONAL, scene_text, write_loads
+
+import convexrough as cr
+from convexrough.friction.verdict import verify_shear
+from convexrough.plots.verdict import verdict_figures
+from convexrough.run.scene_file import read_scene
+
+MORE = '[units]\nlength = "mm"\nforce = "N"\n[friction]\ncoefficient = 0.5\n'
+
+
+@pytest.fixture
+def contact(tmp_path: Path) -> cr.Contact:
+    """The paper's, whose scene is a.toml by its approach, and b.toml by its load."""
+    within = HEXAGONAL + "within = 0.0102"
+    (tmp_path / "a.toml").write_text(scene_text(within, more=MORE))
+    contact = cr.press(read_scene(tmp_path / "a.toml").scene, approach=5e-5)
+    (tmp_path / "b.toml").write_text(scene_text(within, f"load = {contact.load!r}", MORE))
+    return contact
+
+
+def claim(contact: cr.Contact, changes: dict[int, float] | None = None, factor: float = 1.0) -> str:
+    """The loads, written in a shuffled order, with some changed."""
+    loads = factor * contact.loads
+    for i, load in (changes or {}).items():
+        loads[i] = load
+    order = np.random.default_rng(1).permutation(len(loads))
+    return str(write_loads(Path("loads.csv"), contact.scene, loads, order))
+
+
+def test_what_is_right(command: Any, contact: cr.Contact) -> None:
+    for scene in ("a.toml", "b.toml"):
+        outcome = command("verify", scene, claim(contact), "--within", "1e-10")
+        assert (outcome.status, outcome.err) == (0, "")
+        lines = [line for line in outcome.out.splitlines() if line]
+        assert [line[:18].strip() for line in lines[1:8]] == [
+            *(
+                "geometry",
+                "contact modulus",
+                "result",
+                "wrong statuses",
+                "undecided",
+                "load error",
+                "total load",
+            )
+        ]
+        assert re.search(r" contact set proved; loads known to \S+e-1\d of the largest$", lines[3])
+        assert [line[18:] for line in lines[4:6]] == ["none"] * 2
+        assert re.match(r"at most \S+e-1\d of the largest load \(1e-10 allowed\)", lines[6][18:])
+        assert lines[7].endswith("(as prescribed)" if scene == "b.toml" else "(none prescribed)")
+
+
+def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
+    loads = claim(contact, {36: 0.0, 50: 1e-9})
+    outcome = command("verify", "a.toml", loads)
+    assert outcome.status == 3
+    assert "warning: not certified: 2 wrongly claimed" in outcome.err
+    lines = [line.split() for line in outcome.out.splitlines()]
+    heads = [" ".join(line) for line in lines]
+    places = [
+        next(i for i, line in enumerate(heads) if line.startswith(each))
+        for each in ("result contact set wrong", "wrong statuses 2",
+                     "claimed open, proved to touch: 1",
+                     "claimed to touch, proved open: 1", "undecided none", "load error",
+                     "total load", "suspects", "certificate of the given loads")
+    ]  # fmt: skip
+    assert places == sorted(places)
+    x, y = contact.scene.asperities.positions[36]
+    row = lines[places[2] + 2]
+    assert row[:5] == ["36", f"{x:.6g}", f"{y:.6g}", "0", f"{contact.loads[36]:.6g}"]
+    assert float(row[5]) >= contact.loads[36]
+    assert row[6] == "contact"
+    assert lines[places[3] + 2][0] == "50"
+    assert lines[places[3] + 2][-1] == "open"
+    assert [line[0] for line in lines[places[7] + 2 :][:2]] == ["36", "50"]
+
+
+def test_json(command: Any, contact: cr.Contact) -> None:
+    outcome = command("verify", "b.toml", claim(contact, {36: 0.0}), "--json", "--within", "1e-6")
+    found = json.loads(outcome.out)
+    verdict = found["verdict"]
+    assert outcome.status == 3
+    assert verdict["holds"] is False
+    assert verdict["wrongly_open"] == [36]
+    assert verdict["wrongly_loaded"] == verdict["undecided"] == []
+    assert verdict["suspects"][0] == 36
+    assert verdict["total_prescribed"] == contact.load
+    assert verdict["total_given"] == pytest.approx(contact.load - contact.loads[36], rel=1e-12)
+    assert verdict["within"] == 1e-6
+    assert {"scope", "load_error"} < set(found["normal"]["certificate"])
+    rows = found["asperities"]
+    assert [row["index"] for row in rows] == list(range(61))
+    assert rows[36]["claimed"] == "open"
+    assert rows[36]["status"] == "contact"
+    assert rows[36]["suspect"] == 1
+    assert rows[36]["load_error"] >= rows[36]["solution"] > 0
+
+
+@pytest.mark.parametrize("scene", ["a.toml", "b.toml"])
+def test_loads_in_another_unit(command: Any, contact: cr.Contact, scene: str) -> None:
+    outcome = command("verify", scene, claim(contact, factor=1e3))
+    assert outcome.status == 3
+    assert "hint: the loads are 10^3 times what they should be: another unit, as mN for N?" in (
+        outcome.err
+    )
+    if scene == "b.toml":
+        assert ": ratio 1000\n" in outcome.out
+        assert "total of the loads off" in outcome.err
+
+
+def test_noise(command: Any, contact: cr.Contact) -> None:
+    noisy = {int(i): 1.5e-20 for i in np.flatnonzero(contact.loads == 0)}
+    outcome = command("verify", "a.toml", claim(contact, noisy))
+    assert outcome.status == 3
+    assert "hint: 24 of the loads, on asperities proved open, are at most 1.5e-20" in outcome.err
+    assert "--floor 2e-20 counts them as open" in outcome.err
+    assert "and 14 more: --json and --out have all" in outcome.out
+    assert command("verify", "a.toml", claim(contact, noisy), "--floor", "2e-20").status == 0
+    below = claim(contact, {40: -1e-20})
+    refused = command("verify", "a.toml", below)
+    assert refused.status == 2
+    assert "not negative; --floor 1e-20 counts noise as 0: " in refused.err
+    assert command("verify", "a.toml", below, "--floor", "1e-20").status == 0
+
+
+def test_units_in_the_header(command: Any, contact: cr.Contact) -> None:
+    path = Path(claim(contact))
+    text = path.read_text()
+    path.write_text(text.replace("x,load,y", "x [mm],load [N],y [mm]"))
+    outcome = command("verify", "a.toml", str(path))
+    assert "load [N], x [mm], y [mm], matched by position" in outcome.out
+
+
+def test_columns_and_tolerance(command: Any, contact: cr.Contact) -> None:
+    path = Path(claim(contact))
+    path.write_text(path.read_text().replace("x,load,y", "X pos;P;b").replace(",", ";"))
+    named = ("--column", "load=P", "--column", "x=X pos", "--column", "y=b")
+    assert command("verify", "a.toml", str(path), *named).status == 0
+    assert command("verify", "a.toml", str(path), *named, "--tolerance", "1e-9").status == 0
+    outcome = command("verify", "a.toml", str(path), "--column", "q=P")
+    assert outcome.status == 2
+    assert "--column: found q=P, expected NAME=COLUMN" in outcome.err
+
+
+def shear_file(contact: cr.Contact, forces: Any, words: Any = None) -> str:
+    rows = [repr(force) for force in np.asarray(forces).tolist()]
+    if words is not None:
+        rows = [f"{row},{word}" for row, word in zip(rows, words, strict=True)]
+    head = "force" if words is None else "force,status"
+    Path("forces.csv").write_text("\n".join([head, *rows]))
+    return "forces.csv"
+
+
+def test_shear_forces(command: Any, contact: cr.Contact) -> None:
+    force = 0.25 * contact.load
+    state = cr.shear(contact, force=force)
+    asked = ("verify", "a.toml", claim(contact), "--shear-force", repr(force), "--shear")
+    outcome = command(*asked, shear_file(contact, state.forces))
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "shear forces      statuses proved; shear forces known to " in outcome.out
+    spoiled = state.forces.copy()
+    spoiled[4] = 0.5 * contact.loads[4]
+    outcome = command(*asked, shear_file(contact, spoiled), "--json")
+    assert outcome.status == 3
+    found = json.loads(outcome.out)
+    assert found["verdict"]["holds"]
+    assert found["shear_verdict"]["wrongly_sliding"] == [4]
+    assert found["shear_verdict"]["suspects"] == [4]
+    row = found["asperities"][4]
+    assert (row["shear_claimed"], row["shear_status"]) == ("sliding", "partial")
+    assert row["force_error"] >= spoiled[4] - state.forces[4]
+    assert "total of the forces off" in outcome.err
+
+
+def test_wrong_use(command: Any, contact: cr.Contact) -> None:
+    loads = claim(contact)
+    for wrong, expected in (
+        (("--shear", loads), "--shear and --shear-force go together"),
+        (("--shear-force", "1"), "--shear and --shear-force go together"),
+        (("--within", "0"), "--within: found 0.0, expected a positive number"),
+        (("--tolerance", "-1"), "--tolerance: found -1.0"),
+        (("--floor", "-1"), "--floor: found -1.0"),
+        (("--floor", "nan"), "--floor: found nan"),
+        (("--shear", loads, "--shear-force", "1", "--column", "force=load"), "gross sliding"),
+    ):
+        outcome = command("verify", "a.toml", loads, *wrong)
+        assert (outcome.status, outcome.out) == (2, ""), wrong
+        assert expected in outcome.err
+
+
+def test_files(command: Any, contact: cr.Contact, tmp_path: Path) -> None:
+    loads = claim(contact, {36: 0.0})
+    outcome = command("verify", "a.toml", loads, "--out", "found", "--json")
+    folder = tmp_path / "found"
+    assert {path.name for path in folder.iterdir()} == {
+        "files.json", "verdict.csv", "verdict.json", "verdict.png", "verdict.svg",
+    }  # fmt: skip
+    assert json.loads(outcome.out) == json.loads((folder / "verdict.json").read_text())
+    with (folder / "verdict.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert rows[36]["claimed"] == "open"
+    assert rows[36]["suspect"] == "1"
+    again = command("verify", "a.toml", loads, "--out", "found")
+    assert again.status == 2
+    assert "found: not empty; --force replaces its results, --out takes another" in again.err
+
+
+def test_the_figure(contact: cr.Contact) -> None:
+    loads = contact.loads.copy()
+    loads[36], loads[50] = 0.0, loads.max()
+    verdict = cr.verify(contact.scene, loads, approach=5e-5)
+    force = 0.25 * contact.load
+    forces = cr.shear(contact, force=force).forces.copy()
+    forces[4] = 0.5 * contact.loads[4]
+    sheared = verify_shear(contact, forces, force=force)
+    for figures in (verdict_figures(verdict), verdict_figures(verdict, sheared, length_unit="m")):
+        said = {text.get_text() for text in words(figures["verdict"])}
+        assert {"36", "50", "claimed open, proved to touch (1)"} < said
+        fits(figures["verdict"])
+    assert {"4", "claimed to slide, proved not to (1)", "sliding", "partial slip"} < said
+
+
+def test_the_page_has_every_option_and_exit_status(command: Any) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "verify.md").read_text()
+    told = command("verify", "--help").out
+    for option in re.findall(r"^ +(--\w+)", told, re.M):
+        assert f"`{option}" in page or f" {option} " in page, option
+    for status in ("0 only if", "2 wrong", "3 otherwise", "4 no"):
+        assert status in " ".join(told.split())
+        assert f"| {status[0]} |" in page
