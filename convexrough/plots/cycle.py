@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
 
 from convexrough.arrays import Array
 from convexrough.friction.cycle import Cycle, Loop
@@ -123,15 +124,15 @@ def loops_figure(
                 moved = smooth_loop(scale.sphere, forces)
                 draw_loop(axes, scale, moved, forces, slope, smooth=True)
         end = loop.displacements[0] - slope * loop.forces[0]
-        upright.annotate(_range(cycle, scale), (x.of(end), q.of(loop.forces[0])), xytext=(0, 2),
-                         textcoords="offset points", fontsize=7, ha="center",
-                         va="bottom")  # fmt: skip
+        upright.annotate(_range(cycle, scale), (x.of(end), q.of(loop.forces[0])), xytext=(4, 2),
+                         textcoords="offset points", fontsize=7, va="center",
+                         path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
     label(whole, x.short("X"), q.short("Q"))
     label(upright, x.short("X - Q/k") if x.said and not x.symbol
           else f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$", "")  # fmt: skip
     upright.sharey(whole)
     upright.tick_params(labelleft=False)
-    upright.margins(y=0.1)
+    upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
     which = f": {len(cycles)} of {count} cycles" if count > len(cycles) else ""
     title(whole, f"whole contact{which}")
     title(upright, "less an elastic part")

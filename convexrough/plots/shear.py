@@ -76,7 +76,7 @@ def shear_figures(
     for axes in panels[len(shown) - columns : len(shown)]:
         axes.tick_params(labelbottom=True)
     limit = f"$fP$ = {quantity(scale.limit, force_unit)}"
-    figure.supxlabel(f"{scale.length.label('x')},   {limit}", fontsize=LABEL)
+    figure.supxlabel(f"{scale.length.label('x')}    ({limit})", fontsize=LABEL)
     figure.supylabel(scale.length.short("y"), fontsize=LABEL)
     legend_outside(figure, legend_handles(shown, scale), "upper center", 2 if columns == 1 else 4)
     return Figures({"stick_slip": figure})
