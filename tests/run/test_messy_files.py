@@ -267,7 +267,7 @@ REFUSED: dict[str, tuple[Callable[[Path, Case], str], str]] = {
     "x alone": (lambda to, case: text()(to, {"x": PLACES[:, 0], "load": case.loads}),
                 "found only x, expected x and y"),
     "another name, not said": (lambda to, case: text()(to, case.table("x y Fz")),
-                               "expected a column 'load'; --column load=NAME names another"),
+                               "expected a column 'load'; --column load=Fz names another"),
     "a row of totals": (lambda to, case: raw(
         to, lines(case.table()) + f"Sum,,{case.loads.sum()}\n"), "column x: found 'Sum'"),
 }  # fmt: skip
