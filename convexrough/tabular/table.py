@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -155,7 +156,10 @@ def read_table(
         else:
             places = {each: place for each, place in places.items() if each not in others}
     missing = [name for name in required if name not in places]
-    advice = "; --column {0}=NAME names another" if how.scalable else ""
+    left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
+    others = [quote(name) for name in left if name.lower() not in INDEX]
+    other = others[0] if len(others) == 1 == len(missing) else "NAME"
+    advice = f"; --column {{}}={other} names another" if how.scalable else ""
     mistakes += [
         f"columns: found {_named(source)}, expected a column {each!r}{advice.format(each)}"
         for each in missing

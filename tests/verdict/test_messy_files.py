@@ -251,7 +251,7 @@ REFUSED: dict[str, tuple[Callable[[Path, Case], str], str]] = {
     "pressures without areas": (lambda to, case: text()(
         to, case.table("x y pressure")), "expected a column 'area', or x and y on a regular grid"),
     "another name, not said": (lambda to, case: text()(to, case.table("x y Fz")),
-                               "expected a column 'load'; --column load=NAME names another"),
+                               "expected a column 'load'; --column load=Fz names another"),
     "a row of totals": (lambda to, case: raw(
         to, lines(case.table()) + f"Sum,,{case.loads.sum()}\n"), "column x: found 'Sum'"),
 }  # fmt: skip
