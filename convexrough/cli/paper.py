@@ -17,9 +17,9 @@ def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool, html: 
     """Reproduce the source paper's example (Dini and Hills 2009)."""
     from convexrough.paper import example
     from convexrough.paper.figure_data import figure_data
-    from convexrough.run.page import slider_page
     from convexrough.run.results import (
         results_folder,
+        slider_page,
         write_figures,
         write_results,
         write_tables,
@@ -30,6 +30,8 @@ def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool, html: 
     folder = out or Path("paper-results")
     with results_folder(folder, force=force) as new, progress("reproducing the paper"):
         found = example.results()
+        for result in found:
+            result.prepare(figures=False)
         contact = found[0].contact
         comparison = example.compare(found)
         files = write_tables(new, figure_data(contact))
@@ -38,7 +40,7 @@ def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool, html: 
 
             files += write_figures(new, paper_figures(contact))
         if html:
-            page = slider_page(contact, found[0].lines(UnitNames()), UnitNames())
+            page = slider_page(found[0], UnitNames())
             files.append(write_text(new / "slider.html", page))
         more = {"paper": comparison}
         files += write_results(new, found, figures=False, more=more)

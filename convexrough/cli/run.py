@@ -17,7 +17,6 @@ from convexrough.whole import replacing, write_text
 if TYPE_CHECKING:
     from convexrough.proof import Proof
     from convexrough.run.stage import Result
-    from convexrough.tabular.units import UnitNames
 
 
 @click.command()
@@ -40,7 +39,7 @@ def run(
     is computed as by `convexrough sweep`.
     """
     from convexrough import checks
-    from convexrough.run.results import origin, results_folder, write_results
+    from convexrough.run.results import origin, results_folder, slider_page, write_results
     from convexrough.run.scene_file import has_sweep, read_scene
 
     if has_sweep(scene):
@@ -60,8 +59,8 @@ def run(
         with blamed_on(scene), progress("computing"):
             results = file.compute(contact)
             for result in results:
-                result.prepare()
-            page = _page(results[0], file.units) if html else ""
+                result.prepare(figures=not no_figures)
+            page = slider_page(results[0], file.units) if html else ""
         evidence = _proved(results) if proof else None
         with progress("writing results"):
             files = write_results(new, results, figures=not no_figures, units=file.units)
@@ -87,12 +86,6 @@ def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: 
         options["force"] = force
     status: int = click.get_current_context().invoke(command, **options)
     return status
-
-
-def _page(pressed: Result, units: UnitNames) -> str:
-    from convexrough.run.page import slider_page
-
-    return slider_page(pressed.contact, pressed.lines(units), units)
 
 
 def _proved(results: list[Result]) -> Proof | None:

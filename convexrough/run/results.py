@@ -13,7 +13,7 @@ import platform
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib import metadata
+from importlib import metadata, resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -131,6 +131,19 @@ def write_results(
     path = folder / "summary.json"
     write_json(path, summarise(results) | dict(more or {}))
     return [path, *written]
+
+
+def slider_page(pressed: Result, units: UnitNames) -> str:
+    """A page to move the shear force, as HTML: states are found and judged here.
+
+    Raises InputError if the scene has no friction, or another base than a sphere.
+    """
+    from convexrough.plots.slider import slider_data  # matplotlib: only when it draws
+
+    data = slider_data(pressed.contact, pressed.lines(units), units)
+    found = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    template = resources.files("convexrough.plots").joinpath("slider.html")
+    return template.read_text(encoding="utf-8").replace("{{data}}", found)
 
 
 def write_json(path: Path, summary: Summary) -> Path:

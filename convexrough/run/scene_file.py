@@ -20,7 +20,6 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.progress import tell
 from convexrough.record import Record
 from convexrough.run.tables import read_summits, read_text
-from convexrough.run.toml_slips import explained
 from convexrough.scene.asperities import Asperities, largest_tip_radius
 from convexrough.scene.base import checked
 from convexrough.scene.material import Material
@@ -28,6 +27,7 @@ from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import Scene, reach
 from convexrough.solvers import Solver, named
 from convexrough.tabular.table import Reading, few, named_columns
+from convexrough.tabular.toml_slips import explained
 from convexrough.tabular.units import UnitNames
 
 if TYPE_CHECKING:

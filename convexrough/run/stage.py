@@ -107,6 +107,7 @@ class Result(Tabular, Drawn):
     printed: ClassVar[Mapping[str, str]] = {}  # keys of rows, and their headings
     title: ClassVar[str] = ""
     digits: ClassVar[int] = 7
+    steps: ClassVar[bool] = False  # rows follow each other: the last ones are printed
 
     stage: Stage
     contact: Contact
@@ -149,8 +150,8 @@ class Result(Tabular, Drawn):
         """Figures by the stems of their files; units are only said."""
         return {}
 
-    def prepare(self) -> None:
-        """Compute what only tables and figures need."""
+    def prepare(self, *, figures: bool) -> None:
+        """Compute what only tables need, and figures, so that nothing is solved in writing them."""
 
     def lines(self, units: UnitNames) -> list[str]:
         """A table for people."""
@@ -165,11 +166,6 @@ class Result(Tabular, Drawn):
     def headings(self) -> Mapping[str, str]:
         """Of the printed columns, by their keys in the rows."""
         return self.printed
-
-    @property
-    def steps(self) -> bool:
-        """Rows are steps that follow each other."""
-        return False
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
         """The main picture of the last of `found`: axes in, axes out."""
@@ -187,6 +183,8 @@ class Result(Tabular, Drawn):
 class Steps(Result):
     """Steps that follow each other: one result with arrays along them."""
 
+    steps = True
+
     def rows(self) -> list[Summary]:
         columns = self.columns_of_steps()
         return [dict(zip(columns, row, strict=True)) for row in _rows(columns)]
@@ -202,11 +200,7 @@ class Steps(Result):
 
     def summary(self) -> Summary:
         """A list for each number."""
-        return {key: [row[key] for row in self.known] for key in self.columns_of_steps()}
-
-    @property
-    def steps(self) -> bool:
-        return True
+        return {key: [row[key] for row in self.known] for key in self.known[0]}
 
 
 class Single(Result):

@@ -293,21 +293,6 @@ def test_many_asperities_go_to_npz(
     assert np.array_equal(read_loads(path, contact.scene, Manner()).values, contact.loads)
 
 
-@pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x03\x04 and then nothing"])
-def test_a_broken_npz(tmp_path: Path, contact: cr.Contact, content: bytes) -> None:
-    path = tmp_path / "loads.npz"
-    path.write_bytes(content)
-    with pytest.raises(cr.FileError, match=str(path)):
-        read_loads(path, contact.scene, Manner())
-
-
-def test_figures_are_written_twice_each(tmp_path: Path, contact: cr.Contact) -> None:
-    names = written(tmp_path, contact, figures=True)
-    assert {"pressure.png", "pressure.svg"} < set(names)
-    assert (tmp_path / "pressure.png").read_bytes().startswith(b"\x89PNG")
-    assert b"<svg" in (tmp_path / "pressure.svg").read_bytes()
-
-
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     path = tmp_path / "result.csv"
     path.write_text("old")

@@ -9,7 +9,7 @@ from scene_files import scene_text
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
-from convexrough.run.toml_slips import explained
+from convexrough.tabular.toml_slips import explained
 
 
 def refused(folder: Path, text: str) -> list[str]:

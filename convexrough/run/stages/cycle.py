@@ -126,7 +126,7 @@ class Cycled(Result):
             chosen = stage.loop_asperities
         return loops(self.found, stage.loop_points or affordable, None, chosen)
 
-    def prepare(self) -> None:
+    def prepare(self, *, figures: bool) -> None:
         _ = self.loops
 
     def tables(self) -> dict[str, Columns]:

@@ -64,10 +64,8 @@ FILES = {
     "plain": "x,y,load\n" + ROWS,
     "spaces after commas": "x, y, load\n0, 0, 1.5\n1, 0, 0\n0.5, 2.5, 2.5e-5\n",
     "shuffled": "load,x,y\n2.5e-5,0.5,2.5\n1.5,0,0\n0,1,0\n",
-    "semicolons": "x;y;load\n" + ROWS.replace(",", ";"),
     "decimal comma": GERMAN,
     "decimal comma, tabs": GERMAN.replace(";", "\t"),
-    "tabs": "x\ty\tload\n" + ROWS.replace(",", "\t"),
     "spaces": "  x    y   load\n  0    0   1.5\n  1.0  0   0\n  0.5  2.5 2.5e-5\n",
     "spaces and a unit": "x [m] y [m] load [N]\n" + ROWS.replace(",", " "),
     "comments": "# made by hand\nx,y,load\n"
@@ -75,7 +73,6 @@ FILES = {
     + "# end\n",
     "header in a comment": "# x y load\n" + ROWS.replace(",", " "),
     "percent comments": "% from MATLAB\nx,y,load\n" + ROWS,
-    "units": "x [m],y [m],load (mN)\n" + ROWS,
     "more columns": "id,x,status,y,load,gap\n7,0,ok,0,1.5,\n8,1,ok,0,0,1\n9,0.5,no,2.5,2.5e-5,\n",
     "pandas": ",x,y,load\n0,0,0,1.5\n1,1,0,0\n2,0.5,2.5,2.5e-5\n",
     "R": '"x" "y" "load"\n"1" 0 0 1.5\n"2" 1 0 0\n"3" 0.5 2.5 2.5e-5\n',
@@ -87,22 +84,16 @@ FILES = {
     "blank lines": "\n\nx,y,load\n\n" + ROWS.replace("\n", "\n\n"),
     "Windows": ("x,y,load\n" + ROWS).replace("\n", "\r\n"),
     "old Macintosh": ("x,y,load\n" + ROWS).replace("\n", "\r"),
-    "capitals": "X,Y,Load\n" + ROWS,
     "Excel": "sep=;\n" + GERMAN,
-    "Excel, decimal points": "sep=;\nx;y;load\n" + ROWS.replace(",", ";"),
     "byte-order mark": "\ufeffx,y,load\n" + ROWS,
     "UTF-16": ("x,y,load\n" + ROWS).encode("utf-16"),
-    "UTF-16, big end first": "\ufeffx,y,load\n".encode("utf-16-be") + ROWS.encode("utf-16-be"),
     "UTF-16 without a mark": ("x,y,load\n" + ROWS).encode("utf-16-le"),
     "Latin-1": ("H\xf6he [\xb5m],x,y,load\n1," + ROWS[:-1].replace("\n", "\n1,")).encode("latin-1"),
     "writematrix": ROWS,
-    "dlmwrite": ROWS.replace(",", "\t"),
     "typographic minus": "x,y,load\n0,0,1.5\n1,\N{MINUS SIGN}0,0\n0.5,2.5,2.5e\N{MINUS SIGN}5\n",
     "one column": "load\n1.5\n0\n2.5e-5\n",
-    "one column with a unit": "load [N]\n1.5\n0\n2.5e-5\n",
     "one column, decimal comma": "load\n1,5\n0\n2,5e-5\n",
     "numbers alone": "1.5\n0\n2.5e-5\n",
-    "numbers alone with a comment": "# loads in N\n1.5\n0\n2.5e-5\n",
 }
 
 
@@ -231,7 +222,6 @@ def test_loads_at_a_slightly_different_place(
     ("content", "expected"),
     [
         ("load\n1\n", "rows: found 1, expected 3, one per asperity of the scene"),
-        ("load\n1\n2\n3\n4\n", "rows: found 4, expected 3, one per asperity of the scene"),
         (
             "load\n1\n-2\n3\n",
             "row 3, column load: found -2.0, expected a number that is not negative: ",

@@ -14,9 +14,9 @@ from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
 from convexrough.paper import example
-from convexrough.run import page as slider
-from convexrough.run.page import page_data, slider_page
-from convexrough.run.stages import Normal
+from convexrough.plots import slider
+from convexrough.run.results import slider_page
+from convexrough.run.stages.normal import Normal, Pressed
 from convexrough.tabular.units import UnitNames
 
 UNITS = UnitNames("m", "N")
@@ -32,12 +32,16 @@ def pressed(scene: cr.Scene, approach: float = example.APPROACH) -> cr.Contact:
 
 
 def page_of(contact: cr.Contact, units: UnitNames = UNITS) -> str:
-    return slider_page(contact, said(contact, units), units)
+    return slider_page(pressed_result(contact), units)
+
+
+def pressed_result(contact: cr.Contact) -> Pressed:
+    return Normal(approach=contact.approach).compute(contact)
 
 
 def said(contact: cr.Contact, units: UnitNames = UNITS) -> list[str]:
     """What a run says of the contact."""
-    return Normal(approach=contact.approach).compute(contact).lines(units)
+    return pressed_result(contact).lines(units)
 
 
 def inside(text: str) -> Any:
@@ -47,7 +51,7 @@ def inside(text: str) -> Any:
 
 
 def data_of(contact: cr.Contact) -> Any:
-    return page_data(contact, said(contact), UNITS)
+    return slider.slider_data(contact, said(contact), UNITS)
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,6 @@ Masing's rule (docs/theory/paths.md); nothing else is computed there.
 
 from __future__ import annotations
 
-import json
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -34,18 +32,10 @@ FEWEST_FORCES = 21
 MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 
 
-def slider_page(contact: Contact, said: list[str], units: UnitNames) -> str:
-    """The page as HTML, with what is said of the contact.
-
-    Raises InputError if the scene has no friction, or another base.
-    """
-    found = json.dumps(page_data(contact, said, units), separators=(",", ":"))
-    template = files("convexrough.run").joinpath("page.html").read_text(encoding="utf-8")
-    return template.replace("{{data}}", found.replace("<", "\\u003c"))
-
-
-def page_data(contact: Contact, said: list[str], units: UnitNames) -> dict[str, Any]:
+def slider_data(contact: Contact, said: list[str], units: UnitNames) -> dict[str, Any]:
     """What the page shows: lengths of the map in a_H, forces in f P, displacements in X0.
+
+    said : lines on the contact
 
     Numbers have the five digits that are shown. `stick` has a row per force and a column per disc:
     the stick radius in thousandths of the contact radius, 0 where sliding, -1 where undecided.
