@@ -110,7 +110,7 @@ def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
             times = abs(worst) / limit
             found += f" ({times:.4g} f P" if times > 1.001 else f" ((1 + {times - 1:.1g}) f P"
             found += ": gross sliding)"
-        raise InputError(name, found=found, expected=f"at most f P = {limit!r} in size")
+        raise InputError(name, found=found, expected=f"at most f P = {float(limit)!r} in size")
     return given
 
 
