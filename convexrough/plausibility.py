@@ -64,8 +64,8 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
         )
     if normal["extent"] > STEEP:
         yield (
-            f"contact reaches to {normal['extent']:.3g} of the base's radius: it is taken for a "
-            f"paraboloid, which is off by 1 % at {STEEP:g}"
+            f"contact reaches to {normal['extent']:.3g} of the base's radius: its paraboloid "
+            f"differs from a sphere by 1 % at {STEEP:g}"
         )
     if normal["steepness"] > STEEP:
         yield (

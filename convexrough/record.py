@@ -141,9 +141,9 @@ def singular(name: str) -> str:
 
 
 def in_words(value: Any) -> str:
-    """A value in one line: of an array its size and range, or how many there are of each word.
+    """A value in one line: an array as its size and range, statuses as their counts.
 
-    Of a mapping its keys, of a tuple of records how many.
+    A mapping is shown as its keys, a tuple of records as their number.
     """
     if isinstance(value, Record):
         return value._headline()

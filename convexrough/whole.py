@@ -48,7 +48,7 @@ def write_text(path: Path, text: str | bytes) -> Path:
 
 
 def to_json(contents: Any) -> str:
-    """Valid JSON: infinities, and what is no number, are null."""
+    """Valid JSON, in which infinities and nan are null."""
     return json.dumps(_finite(contents), indent=2, allow_nan=False)
 
 

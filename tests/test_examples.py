@@ -7,6 +7,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import pytest
+from matplotlib.text import Text
 
 FOLDER = Path(__file__).parent.parent / "examples"
 #: Relative tolerances: of the paper's rounded numbers, of quadrature, extrapolation and minima.
@@ -23,8 +24,11 @@ TOLERANCES = {
 }
 
 
-#: All `compare()` at their end; the scripts of the course also assert what they say on the way.
-SCRIPTS = [*sorted(FOLDER.glob("*.py")), *sorted(FOLDER.glob("course/*.py"))]
+#: All `compare()` at their end.
+SCRIPTS = sorted(FOLDER.glob("*.py"))
+
+#: These assert what they say on the way.
+LESSONS = sorted(FOLDER.glob("course/[01]*.py"))
 
 
 @pytest.fixture(autouse=True)
@@ -34,7 +38,8 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     plt.switch_backend("agg")
     monkeypatch.setattr(plt, "show", lambda: figures.extend(plt.get_fignums()))
     monkeypatch.syspath_prepend(FOLDER)  # as for a script: one example may begin with another
-    yield figures
+    with plt.rc_context():
+        yield figures
     plt.close("all")
 
 
@@ -52,15 +57,23 @@ def load(path: Path) -> Any:
     [path for path in SCRIPTS if path.stem not in ("boundary_elements", "measured_surface")],
     ids=lambda path: path.stem,
 )
-def test_example(path: Path, shown: list[int]) -> None:
+def test_example(path: Path) -> None:
     pairs = load(path).compare()
     assert pairs
-    if path.parent.name == "course":
-        assert shown, "a class that runs the script sees no picture"
-        assert shown == plt.get_fignums()
     for name, computed, reference in pairs:
         tolerance = TOLERANCES.get(path.stem, 1e-9)
         assert computed == pytest.approx(reference, rel=tolerance, abs=1e-12), name
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_lesson(path: Path, shown: list[int]) -> None:
+    """Every claim holds, and a class that runs the script sees its picture in large letters."""
+    lesson = load(path)
+    assert path.read_text("utf-8").count("\nassert ") > 5
+    assert shown == plt.get_fignums() == [1]
+    assert plt.rcParams["font.size"] >= 14
+    assert min(text.get_fontsize() for text in plt.figure(1).findobj(Text) if text.get_text()) > 10
+    assert not hasattr(lesson, "compare")
 
 
 def test_boundary_elements() -> None:

@@ -109,23 +109,25 @@ def measure_attempt(
     row = Row("solve", family, len(scene), solver=attempt.solver, setting=attempt.setting)
     memory = MemoryRise()
 
-    def solved(_: object = None) -> Solution:
+    def solved(_: object = None) -> tuple[NormalProblem, Solution]:
         """Of a problem of its own each time: an operator keeps what it has computed once."""
         problem = NormalProblem.assemble(scene, approach=APPROACH, influence=attempt.influence)
-        return attempt.settings.solve(problem)
+        return problem, attempt.settings.solve(problem)
 
     try:
-        solution, risen = solved(), memory.risen()
+        (problem, solution), risen = solved(), memory.risen()
         seconds, runs = least(lambda: None, solved, patience)
     except (InputError, SolverError) as error:
         return replace(row, outcome=_outcome(error), message=str(error))
+    loads = np.zeros(len(scene))
+    loads[problem.candidates] = solution.loads * problem.units.force  # a power of two
     return replace(
         row,
-        touching=int(np.count_nonzero(solution.loads)),
+        touching=int(np.count_nonzero(loads)),
         seconds=seconds,
         runs=runs,
         iterations=solution.iterations,
-        error=math.nan if reference is None else reference.error(solution.loads),
+        error=math.nan if reference is None else reference.error(loads),
         memory=risen,
     )
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from convexrough.bench.machine import describe_machine
 from convexrough.bench.measure import Attempt, measure_attempt, measure_sweep, measure_task
-from convexrough.bench.reference import refine
+from convexrough.bench.reference import reference
 from convexrough.bench.rows import Bench, Row, better_than_default
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import press
@@ -116,9 +116,9 @@ def _panel(family: Family, size: int, quick: bool, patience: float, say: Announc
     say(f"{family}, about {size:,}: reference")
     each = scene(family, REFINEMENTS[size])
     problem = NormalProblem.assemble(each, approach=APPROACH)
-    reference = None
-    with suppress(InputError, SolverError):
-        reference = refine(problem, Newton().solve(problem).loads)
+    right = None
+    with suppress(SolverError):
+        right = reference(each, APPROACH)
     tried = [
         attempt
         for attempt in attempts(quick)
@@ -127,7 +127,7 @@ def _panel(family: Family, size: int, quick: bool, patience: float, say: Announc
     rows = []
     for attempt in tried:
         say(f"{family}, about {size:,}: {attempt.solver}, {attempt.setting}")
-        rows.append(measure_attempt(family, each, attempt, reference, patience))
+        rows.append(measure_attempt(family, each, attempt, right, patience))
     for _ in range(ROUNDS):
         rivals = better_than_default(rows)
         for i, row in enumerate(rows):

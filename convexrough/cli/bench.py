@@ -12,15 +12,15 @@ from convexrough.cli.speech import DONE, echo, progress, written
 
 @click.command()
 @output_options
-@click.option("--quick", is_flag=True, help="Fewer and smaller sizes: less than a minute.")
-@click.option("--page", metavar="FILE", type=PATH, help="A Markdown page to renew, too.")
+@click.option("--quick", is_flag=True, help="Fewer and smaller sizes.")
+@click.option("--page", metavar="FILE", type=PATH, help="Also update this Markdown page.")
 def bench(
     out: Path | None, no_figures: bool, force: bool, as_json: bool, quick: bool, page: Path | None
 ) -> int:
-    """Speed against error: every solver, many sizes, the true error of each answer.
+    """Measure time and error of every solver at many sizes.
 
-    Results go to the folder bench-results unless --out names another. With --page, what was found
-    also goes between the markers of that page, and the figures into the folder figures beside it.
+    Results go to the folder bench-results unless --out names another. With --page, the results also
+    replace the text between the markers of that page, and the figures beside it.
     """
     from convexrough.bench import page as pages
     from convexrough.bench import suite

@@ -23,13 +23,13 @@ from convexrough.cli.speech import (
 @solver_option
 @json_option
 def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
-    """Run every formulation and solver on one scene: agreement, certificate, time.
+    """Compare all solvers on one scene: agreement, certificate, time.
 
-    The cone program also goes through SCS and QOCO, where they are installed. With --solver, those
-    named run beside Newton's method.
+    SCS and QOCO also solve the cone program, where they are installed. With --solver, only the
+    named solvers are compared with Newton's method.
 
-    Exit status 3 also where a solver refuses the scene, or where two certified answers exclude each
-    other: that would be a mistake in the mathematics.
+    Exit status 3 also where a solver refuses the scene, or where two certified results contradict
+    each other: that would be a mistake in the mathematics.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named

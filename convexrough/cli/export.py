@@ -14,21 +14,22 @@ from convexrough.cli.speech import DONE, blamed_on, echo, progress, say_aside, w
 @click.command()
 @click.argument("scene", type=PATH)
 @click.option("--format", "formats", type=click.Choice(["cbf", "json", "mps", "npz"]),
-              multiple=True, help="Only this; may be repeated.")  # fmt: skip
+              multiple=True, help="Only this format; may be repeated.")  # fmt: skip
 @click.option("--bristles", metavar="M", type=click.IntRange(1), default=64, show_default=True,
-              help="Of each asperity, in the quadratic program.")  # fmt: skip
-@click.option("--out", metavar="DIR", type=PATH, help="Folder for programs.")
-@click.option("--force", is_flag=True, help="Replace results in a folder in use.")
+              help="Bristles per asperity in the quadratic program.")  # fmt: skip
+@click.option("--out", metavar="DIR", type=PATH, help="Folder for the programs.")
+@click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
 @json_option
 def export(
     scene: Path, formats: tuple[str, ...], bristles: int, out: Path | None, force: bool,
     as_json: bool,
 ) -> int:  # fmt: skip
-    """Write a scene as programs for other solvers: cones, their dual, and rows of bristles.
+    """Write a scene as cone and quadratic programs for other solvers.
 
-    cbf, json (of Clarabel) and npz have the cone program, which is the contact law itself, and its
-    dual, which bounds the energy; mps and npz (of qpsolvers) the quadratic program of bristles.
-    index.json says what leads back from a solution, and what the least objective is.
+    The formats cbf, json (Clarabel) and npz contain the cone program, which is equivalent to the
+    contact law, and its dual, which bounds the energy; mps and npz (qpsolvers) contain the
+    quadratic program of bristles. index.json states how to convert a solution to loads, and the
+    minimum.
 
     Programs go to the folder SCENE-programs unless --out names another.
     """

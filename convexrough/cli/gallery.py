@@ -11,9 +11,7 @@ from convexrough.cli.speech import DONE, echo, progress
 
 
 @click.command()
-@click.option(
-    "--list", "listed", is_flag=True, help="List the cases: what is done without options."
-)
+@click.option("--list", "listed", is_flag=True, help="List the cases (default).")
 @click.option("--export", metavar="DIR", type=PATH, help="Folder for programs and answers.")
 @click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
 @click.option("--profile", is_flag=True, help="Time every solver and check its solutions.")
@@ -29,11 +27,11 @@ def gallery(
     names: tuple[str, ...],
     as_json: bool,
 ) -> int:
-    """Hard scenes with answers to 50 digits, for the developers of solvers.
+    """List or export hard scenes with answers to 50 digits.
 
-    NAMES are of cases or of families; all, if none is given. --export writes each as a quadratic
-    program (.npz of qpsolvers) and as a cone program (JSON of Clarabel, and CBF), with an index.
-    --profile is a performance profile, of all our solvers or of those that --solver names.
+    NAMES are names of cases or of families; default: all. --export writes each case as a quadratic
+    program (.npz for qpsolvers) and as a cone program (JSON for Clarabel, and CBF), with an index.
+    --profile computes a performance profile of all solvers, or of those given by --solver.
     """
     from convexrough import gallery as wing
     from convexrough.compare import solver_named

@@ -1,6 +1,6 @@
-"""The program: its commands, how it ends, and what becomes of errors.
+"""The program: its commands, exit statuses and error messages.
 
-What is slow to import is imported by the command that needs it, when it runs.
+Each command imports slow modules when it runs.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ COMPLETE = "_CONVEXROUGH_COMPLETE"
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="convexrough")
 def program() -> None:
-    """Rough frictional contact, with a proof of which asperities touch.
+    """Compute rough frictional contact, with a proof of which asperities touch.
 
     Exit status: 0 done and certified; 1 standard output closed or full; 2 wrong input; 3 done, not
     certified; 4 a solver failed; 130 interrupted.
@@ -116,7 +116,7 @@ def _interrupts() -> Iterator[list[int]]:
 
 
 def _unheard(error: OSError) -> int:
-    """Nobody reads standard output any more, or it is full; results are written all the same."""
+    """The exit status where standard output is closed or full; result files are complete."""
     if error.errno != errno.EPIPE:
         say_aside("error", f"standard output: {error.strerror or error}")
     nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("proof", type=PATH)
 def check(proof: Path) -> int:
-    """Check a proof in exact arithmetic, believing nothing in the file.
+    """Check a proof file in exact arithmetic.
 
-    Exit status: 0 all that it claims is proved; 1 refused, with the reason; 2 unreadable. The
-    checker is one file that needs Python only: python checker.py PROOF does the same.
+    Exit status: 0 all claims are proved; 1 refused, with the reason; 2 unreadable. The checker is
+    one file that needs only Python: python checker.py PROOF does the same.
     """
     from convexrough import checker
 
@@ -30,7 +30,7 @@ def check(proof: Path) -> int:
 
 
 def proved(work: Callable[[], Proof]) -> Proof | None:
-    """A proof, or why there is none."""
+    """The proof, or None after a warning with the reason."""
     try:
         with progress("proving"):
             return work()

@@ -33,10 +33,10 @@ def run(
     html: bool,
     proof: bool,
 ) -> int:
-    """Press and shear the scene of a TOML file; write tables, certificate and figures.
+    """Compute a scene file; write tables, certificate and figures.
 
-    Results go to the folder SCENE-results unless --out names another. A file with [sweep] is
-    computed as `convexrough sweep` does.
+    Results go to the folder SCENE-results unless --out names another. A file with a table [sweep]
+    is computed as by `convexrough sweep`.
     """
     from convexrough import checks
     from convexrough.run.results import origin, results_folder, slider_page, write_results
@@ -76,7 +76,7 @@ def run(
 
 
 def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: bool) -> int:
-    """What `convexrough sweep` does with this file."""
+    """Compute the file as `convexrough sweep` does."""
     from convexrough.cli.sweep import sweep as command
 
     if given:

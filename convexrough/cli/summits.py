@@ -1,4 +1,4 @@
-"""`summits`: from a measured surface to asperities, and how strongly to prune them."""
+"""`summits`: find the summits of a measured surface, and choose the pruning."""
 
 from __future__ import annotations
 
@@ -30,27 +30,29 @@ if TYPE_CHECKING:
 
 
 def map_options(command: Command) -> Command:
-    """How the file of a map is to be read."""
+    """Options for reading the file of a map."""
     for option in (
-        click.option("--fill", is_flag=True, help="Fill holes in the map, and say how many."),
+        click.option("--fill", is_flag=True, help="Fill holes in the map and report them."),
         click.option("--detrend", type=click.Choice(["plane", "sphere", "none"]), default="plane",
-                     show_default=True, help="What is no roughness."),
-        click.option("--height-unit", metavar="UNIT", help="Of the heights, if not that."),
-        click.option("--unit", metavar="UNIT", help="Of the pixel and the heights: µm, mm, ..."),
-        click.option("--pixel", metavar="X[,Y]", help="Size of a pixel, where the file has none."),
+                     show_default=True, help="Form to remove before finding summits."),
+        click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if different."),
+        click.option("--unit", metavar="UNIT", help="Unit of pixels and heights: µm, mm, ..."),
+        click.option("--pixel", metavar="X[,Y]", help="Size of a pixel, if the file has none."),
     ):  # fmt: skip
         command = option(command)
     return command
 
 
 def press_options(command: Command) -> Command:
-    """How the summits are pressed."""
+    """Options for pressing the summits."""
     for option in (
         click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, with --load."),
-        click.option("--load", metavar="P", type=float, help="Press with this load."),
-        click.option("--approach", metavar="D", type=float, help="Or press by this approach."),
-        click.option("--radius", metavar="R", type=float, help="Press a sphere on the summits."),
-        click.option("--scene", metavar="SCENE", type=PATH, help="Press as this scene file says."),
+        click.option("--load", metavar="P", type=float, help="Prescribed load."),
+        click.option("--approach", metavar="D", type=float, help="Prescribed approach."),
+        click.option(
+            "--radius", metavar="R", type=float, help="Radius of the sphere, without --scene."
+        ),
+        click.option("--scene", metavar="SCENE", type=PATH, help="Press as in this scene file."),
     ):
         command = option(command)
     return command
@@ -61,13 +63,13 @@ def press_options(command: Command) -> Command:
 @press_options
 @map_options
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
-              help="Pixels across a paraboloid.")  # fmt: skip
+              help="Width in pixels of the fit of a paraboloid.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Least prominence of a hill, in parts of Sz.")  # fmt: skip
+              help="Smallest prominence of a hill, as a fraction of Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
-              help="Press the map itself, too, by boundary elements.")  # fmt: skip
+              help="Also press the whole map by boundary elements.")  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,
-              help="Table for a scene file; figures go beside it.")  # fmt: skip
+              help="Table for a scene file; figures go to its folder.")  # fmt: skip
 @click.option("--no-figures", is_flag=True, help="Do not write figures.")
 @click.option("--force", is_flag=True, help="Overwrite a table of an earlier run.")
 @json_option
@@ -82,12 +84,12 @@ def summits(
     as_json: bool,
     **options: Any,
 ) -> int:
-    """Find the summits of a measured surface, and how far they can be trusted.
+    """Find the summits of a measured surface, and choose the pruning.
 
-    SURFACE is .npy, .npz, .mat, a matrix or x, y, height in text, or an instrument's file. Pressed
-    by a sphere about the middle of the map (--scene, or --radius with --approach or --load),
-    contacts, proof, crowding and model error are held against the pruning. With --whole every pixel
-    is pressed, at the same approach, and the asperities are held against that.
+    SURFACE is .npy, .npz, .mat, a text file with a matrix or columns x, y, height, or an
+    instrument's file. With --scene, or --radius and --approach or --load, the command presses a
+    sphere on the middle of the map and reports contacts, certificate, crowding and model error for
+    several prunings. With --whole it also presses every pixel at the same approach, for comparison.
 
     Exit status: 3 where the contact at the chosen pruning is not certified.
     """
@@ -159,7 +161,7 @@ def _check_pressing(
 ) -> None:
     others = (radius, approach, load, modulus)
     if scene is not None and any(each is not None for each in others):
-        raise click.UsageError("--scene says how to press; --radius and the like are not needed.")
+        raise click.UsageError("--scene says how to press: omit --radius and similar options.")
     if scene is None and any(each is not None for each in others):
         if radius is None or (approach is None) == (load is None):
             raise click.UsageError("--radius needs exactly one of --approach and --load.")

@@ -34,16 +34,16 @@ if TYPE_CHECKING:
 
 
 def claim_options(command: Command) -> Command:
-    """What `verify` is asked, and how it reads files."""
-    called = "The column of load, x, y, ...: its header, or its number from 1."
+    """Options for the questions of `verify` and for reading files."""
+    called = "Header or number (from 1) of the column of load, x, y, ..."
     for option in (
-        click.option("--junit", metavar="FILE", type=PATH, help="Write the findings for CI."),
+        click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML."),
         click.option("--force", is_flag=True, help="Overwrite the results of an earlier run."),
-        click.option("--out", metavar="DIR", type=PATH, help="Folder for table, JSON, figure."),
+        click.option("--out", metavar="DIR", type=PATH, help="Folder for the results."),
         click.option("--explain", is_flag=True, help="Report how the files are read, and stop."),
         click.option("--shear-force", metavar="Q", type=float, help="Total shear force of FORCES."),
-        click.option("--shear", metavar="FORCES", type=PATH, help="A file of shear forces, too."),
-        click.option("--nodes", is_flag=True, help="Rows are nodes: sum them at asperities."),
+        click.option("--shear", metavar="FORCES", type=PATH, help="Also check these shear forces."),
+        click.option("--nodes", is_flag=True, help="Rows are nodes; sum their forces."),
         click.option("--missing-open", is_flag=True, help="Asperities without a row are open."),
         click.option("--sign", type=click.Choice(["1", "-1"]), default="1",
                      help="-1 where compression is negative."),
@@ -54,7 +54,7 @@ def claim_options(command: Command) -> Command:
                      help="Largest distance of a position from its asperity; "
                           "default 1 % of the smallest spacing."),
         click.option("--floor", metavar="X", type=float, default=0.0,
-                     help="A load up to X claims that its asperity is open."),
+                     help="Treat loads up to X as zero (open asperity)."),
         click.option("--within", metavar="PART", type=float,
                      help="Largest error allowed, as a fraction of the largest load."),
     ):  # fmt: skip
@@ -110,12 +110,13 @@ def verify(
 ) -> int:
     """Check contact loads from another code.
 
-    LOADS is a file of numbers with a column load, and x and y or an index unless in the scene's
-    order: CSV and its kin, .xlsx, .mat, .npy, .npz or Parquet. It claims that asperities with a
-    load touch, and no others. A column pressure, of nodes or pixels, is summed at asperities.
+    LOADS is a table with a column load, and columns x and y or an index unless its rows are in the
+    order of the scene: text (CSV, TSV, ...), .xlsx, .mat, .npy, .npz or Parquet. It claims that
+    exactly the asperities with a load touch. A column pressure of nodes or pixels is summed at
+    asperities.
 
-    Exit status: 0 only if the claimed set is proved right, every load is near enough and a
-    prescribed total agrees, and the like of shear forces; 2 wrong input; 3 otherwise; 4 no shear
+    Exit status: 0 only if the claimed set is proved right, every load is close enough and a
+    prescribed total agrees, and the same for shear forces; 2 wrong input; 3 otherwise; 4 no shear
     state was found to compare with.
     """
     from convexrough.run.results import results_folder
@@ -187,7 +188,7 @@ def _written(
 
 
 def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
-    """Of the loads that are claimed to touch."""
+    """The proof of the claimed loads."""
     from convexrough.progress import tell
     from convexrough.proof import prove
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -41,6 +42,7 @@ from convexrough.friction.path import (
 from convexrough.friction.shear import level_at
 from convexrough.friction.state import displacements_of, states_of, stick_radii, worded
 from convexrough.influence import Kind
+from convexrough.numbers.balls import Ball
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
@@ -306,14 +308,20 @@ def cycles(
     ['0.00021', '0.0028', '0.048']
     """
     checks.instance("contact", contact, Contact)
-    limit = checks.friction(contact.scene.friction) * contact.load
+    f = checks.friction(contact.scene.friction)
+    limit = f * contact.load
     checks.exactly_one("maximum", maximum, "displacement", displacement)
     if displacement is not None:
         if minimum is not None:
             expected = "none beside a displacement, whose cycles are symmetric"
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
-        return [_moved(contact, float(each), announce) for each in amplitudes]
+        if contact.load > 0.0:
+            levels = contact.keep(FrictionLevels)
+            heights = [levels.load - level_at("displacement", levels, x) for x in amplitudes]
+            ends = [(height, -height) for height in heights]
+            return _at_the_load(contact, ends, [(float(f * h), -float(f * h)) for h in heights])
+        maximum = 0.0 * amplitudes
     assert maximum is not None  # exactly_one
     upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
     lower = -upper
@@ -324,10 +332,27 @@ def cycles(
         i = int(np.argmax(upper < lower))
         expected = f"at least the minimum, {lower[i]:g}; by default that is its negative"
         raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
-    return [
-        _between(contact, high, low, announce)
-        for high, low in zip(upper.tolist(), lower.tolist(), strict=True)
-    ]
+    forces = list(zip(upper.tolist(), lower.tolist(), strict=True))
+    if contact.load == 0.0:
+        return [_still(contact, np.zeros(2), np.array(each)) for each in forces]
+    if announce is not None:
+        announce("pressing at the level of a cycle")
+    load = contact.keep(FrictionLevels).load
+    points = [[point_at(load, Q, contact.scene)[1] for Q in each] for each in forces]
+    return _at_the_load(contact, points, forces)
+
+
+def _at_the_load(
+    contact: Contact,
+    heights: Sequence[Sequence[Fraction]],
+    forces: Sequence[tuple[float, float]],
+) -> list[Cycle]:
+    """Cycles between two T each, at the load of the contact."""
+    load = contact.keep(FrictionLevels).load
+    paths = [[(load, T) for T in each] for each in heights]
+    held = np.full(2, float(load))
+    asked = [(path, held.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
+    return _cycles(contact, MemoryCurve.pressed(load), asked)
 
 
 def steady(
@@ -355,7 +380,7 @@ def steady(
     P, Q = (np.array(each, dtype=np.float64) for each in (loads, forces))
     if contact.load == 0.0:
         return _still(contact, P, Q)
-    return _cycle(contact, MemoryCurve(), points, P, Q)
+    return _cycles(contact, MemoryCurve(), [(points, P, Q)])[0]
 
 
 class _Closed:
@@ -371,39 +396,41 @@ class _Closed:
         self.least = min(load for load, _ in points)
 
 
-def _between(contact: Contact, maximum: float, minimum: float, announce: Announce | None) -> Cycle:
-    forces = np.array([maximum, minimum])
-    if contact.load == 0.0:
-        return _still(contact, np.zeros(2), forces)
-    levels = contact.keep(FrictionLevels)
-    if announce is not None:
-        announce("pressing at the level of a cycle")
-    points = [point_at(levels.load, force, contact.scene) for force in (maximum, minimum)]
-    loads = np.full(2, float(levels.load))
-    return _cycle(contact, MemoryCurve.pressed(levels.load), points, loads, forces)
-
-
-def _moved(contact: Contact, displacement: float, announce: Announce | None) -> Cycle:
-    if contact.load == 0.0:
-        return _still(contact, np.zeros(2), np.zeros(2))
-    levels = contact.keep(FrictionLevels)
-    height = levels.load - level_at("displacement", levels, displacement)
-    Q = float(height * Fraction(checks.friction(contact.scene.friction)))
-    points = [(levels.load, height), (levels.load, -height)]
-    start, loads = MemoryCurve.pressed(levels.load), np.full(2, float(levels.load))
-    return _cycle(contact, start, points, loads, np.array([Q, -Q]))
+def _cycles(
+    contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
+) -> list[Cycle]:
+    """Of closed paths with these points, P and Q each, from one state on."""
+    levels, closed = contact.keep(FrictionLevels), [_Closed(start, path) for path, _, _ in asked]
+    needed = [
+        levels_needed(each.curves, [*each.first, *each.later]) | {each.still, each.least}
+        for each in closed
+    ]
+    levels.prepare(load for each in needed for load in each)
+    widest_first = sorted(range(len(needed)), key=lambda k: min(needed[k]))
+    orders = {k: levels.order(needed[k]) for k in widest_first}
+    spent = losses(levels, [pieces for each in closed for pieces in (each.first, each.later)])
+    moved = displacements_of(levels, [curve for each in closed for curve in each.curves])
+    ends = np.cumsum([0, *(len(each.curves) for each in closed)]).tolist()
+    return [
+        _cycle(contact, start, path, each, orders[k], spent[2 * k : 2 * k + 2], moved[slice(*far)])
+        for k, (path, each, far) in enumerate(zip(asked, closed, pairwise(ends), strict=True))
+    ]
 
 
 def _cycle(
-    contact: Contact, start: MemoryCurve, points: list[Point], loads: Array, forces: Array
+    contact: Contact,
+    start: MemoryCurve,
+    path: tuple[list[Point], Array, Array],
+    closed: _Closed,
+    order: Order,
+    spent: Ball,
+    moved: Ball,
 ) -> Cycle:
-    levels, closed = contact.keep(FrictionLevels), _Closed(start, points)
-    pieces = [*closed.first, *closed.later]
-    needed = levels_needed(closed.curves, pieces) | {closed.still, closed.least}
-    order = levels.order(needed)
-    spent = losses(levels, [closed.first, closed.later]) * levels.loss_unit
-    (first, loss), (first_error, error) = rounded(spent)
-    moved, moved_error = _amplitude(levels, closed.curves)
+    """One of them. spent : the first time, and later;  moved : X of its curves."""
+    levels, (points, loads, forces) = contact.keep(FrictionLevels), path
+    (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
+    half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
+    amplitude, amplitude_error = (float(part) for part in rounded(half))
     rest, top, bottom = (levels.at(each) for each in (closed.still, levels.load, closed.least))
     sliding = bottom.touching & rest.open
     intermittent = top.touching & bottom.open
@@ -415,6 +442,7 @@ def _cycle(
     slips, slip_errors = rounded(
         (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
     )
+    radii, radius_errors = stick_radii(levels, rest)
     constant = all(load == levels.load for load, _ in points)
     height = (max(t for _, t in points) - min(t for _, t in points)) / 2
     defect = np.nan
@@ -423,11 +451,11 @@ def _cycle(
         defect = abs(other - loss) / (loss or 1.0)
     if order != "proved":
         error = first_error = np.inf
-    if order == "fails" and levels.proved:
-        first, loss, moved = _stepped(levels, start, points)
     if order == "fails":
-        moved_error, words, slip_errors = np.inf, {}, slip_errors + np.inf
-    radii, radius_errors = stick_radii(levels, rest)
+        if levels.proved:
+            first, loss, amplitude = _stepped(levels, start, points)
+        amplitude_error, words = np.inf, {}
+        slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
     everywhere = {name: levels.to_scene(which) for name, which in words.items()}
     slides = everywhere.get("sliding", np.zeros(len(levels.scene), dtype=bool))
     lost, kept = levels.to_scene(intermittent), levels.to_scene(bottom.touching)
@@ -447,7 +475,7 @@ def _cycle(
         slips=frozen(np.where(lost, np.nan, np.where(kept, slips, 0.0))),
         slip_errors=frozen(slip_errors),
         stick_radii=radii,
-        stick_radius_errors=frozen(radius_errors + (np.inf if order == "fails" else 0.0)),
+        stick_radius_errors=frozen(radius_errors),
         level=float(closed.still),
         force_level=float(levels.coefficient.value) * float(closed.force_level),
         balance_defect=defect,
@@ -455,21 +483,13 @@ def _cycle(
         smooth_normalised=float(mindlin.loss(float(height / levels.load)))
         if constant and reference
         else np.nan,
-        displacement_amplitude=moved,
-        displacement_error=moved_error,
+        displacement_amplitude=amplitude,
+        displacement_error=amplitude_error,
         order=order,
         presses=levels.presses,
     )
     found.__dict__["_later"] = closed.later
     return found
-
-
-def _amplitude(levels: FrictionLevels, curves: Sequence[MemoryCurve]) -> tuple[float, float]:
-    """Half the range of X of these curves, and a bound on its error."""
-    found = displacements_of(levels, curves)
-    high, low = int(np.argmax(found.value)), int(np.argmin(found.value))
-    value, error = rounded((found[high] - found[low]) * 0.5)
-    return float(value), float(error)
 
 
 def _stepped(

@@ -96,9 +96,9 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
 
         I = (P0 - L0) D - (P0 - P1) m + run (2 m - M).
 
-    D0 is concave, so m lies in [D/2, D], M between its trapezoid and D0(P0), and D in
-    [0, run / (2 E* a(L1))]: of each the smaller enclosure counts, so that fronts that hardly run
-    keep their digits.
+    D0 rises and is concave, so m lies in [D/2, D], M between its trapezoid and the larger of its
+    ends, and D in [0, run / (2 E* a(L1))]: of each the smaller enclosure counts, so that fronts
+    that hardly run keep their digits.
     """
     if not pieces:
         return Ball.exact(np.zeros(0))
@@ -119,7 +119,8 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     D = _sharper(D0 - D1, Ball.between(np.zeros(len(run)), _over(run.upper, softest)))
     m = _sharper((V0 - V1) / run - D1, _hull(D * 0.5, D))
     first, last = D2 - D1, D3 - D1
-    M = _sharper((V2 - V3) / fall - D3 + last, _hull((first + last) * 0.5, first))
+    larger = where(fall.value >= 0.0, first, last)
+    M = _sharper((V2 - V3) / fall - D3 + last, _hull((first + last) * 0.5, larger))
     found = over * D - fall * m + run * (m * 2.0 - M)
     if not levels.proved:
         return found
@@ -157,7 +158,8 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
 
     and neither falls with P where order holds. So a piece on which the load varies is cut into
     cells, by its part of what all fronts run through, and of each the losses at the load of either
-    end enclose that between: the middle is off by about cells^-2, and the bound is some 1 / cells.
+    end enclose that between: the middle has an error of about cells^-2, and the bound is about
+    1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Pair, Pair]]()  # weight, loads and fronts at both ends

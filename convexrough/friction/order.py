@@ -65,7 +65,7 @@ Order = Literal["proved", "proved for one step", "fails"]
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
 #: Up to so many that touch the inverse costs no more than the levels themselves.
-MOST = 300
+MOST = 800
 
 #: Levels between that are tried: where an inverse is made, and where none is.
 BETWEEN, FEW_BETWEEN = 7, 1
@@ -127,10 +127,12 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
         return True
     if len(span.support) > most or not span.mu > 0:
         return False
-    inverse = _Inverse.of(span)
-    below, m = inverse.bounds(span)
+    inverse = span.inverse()
+    (below,), (upper_ends,) = inverse.bounds(lambda m: span.delta(m[0])[None])
     if not (below > 0).all():
         return False
+    m = np.ones(len(span.c))
+    m[span.support] = upper_ends
     rates = span.rates(m)
     rates[span.support] = below
     left = span.unsettled(rates, rising)
@@ -146,64 +148,39 @@ def proved_in_rows(rows: Stack, boxes: Boxes, high: Rows, low: Rows) -> NDArray[
 
     False, too, where more has to be known of open asperities than row sums say.
     """
-    n, k = high.loads.shape[1], rows.coefficients
-    support = ~high.open
+    k, support = rows.coefficients, ~high.open
     c = np.where(support, 1.5 * np.cbrt(high.loads.upper) / k.lower * (1 + SAFETY), 0.0)
     least = np.minimum(LEAST * c.max(axis=1, keepdims=True), 1.0 / boxes.stiffness)
     c = np.where(support, np.maximum(c, least) * (1 + SAFETY), 0.0)
-    stiffest = np.where(support, c * boxes.stiffness, 0.0).max(axis=1, keepdims=True)
-    beyond = np.maximum(stiffest - 1.0, 0.0)
-    mu = 1.0 - boxes.number - beyond * (1 + SAFETY) - SAFETY
+    beyond = np.where(support, c * boxes.stiffness, 0.0).max(axis=1, keepdims=True) - 1.0
+    mu = 1.0 - boxes.number - np.maximum(beyond, 0.0) * (1 + SAFETY) - SAFETY
     drop = (high.approach - low.approach).upper[:, None]
     count = max(1, int(support.sum(axis=1).max()))
-    order = np.argsort(~support, axis=1, kind="stable")[:, :count]
-    inside, c_in, depth = (
-        np.take_along_axis(values, order, axis=1) for values in (support, c, high.indentation.lower)
-    )
-    steep = np.broadcast_to(k.upper, c.shape)
-    steep = np.take_along_axis(steep, order, axis=1) ** 1.5
-    w, entry_error, matrix = np.sqrt(c_in), np.zeros((len(c), 1)), np.empty((len(c), count, count))
+    order = np.argsort(~support, axis=1, kind="stable")[:, :count]  # others have c = 0
+    entries, entry_error = np.empty((len(c), count, count)), np.zeros((len(c), 1))
     for some, problem in rows.coupled:
-        entry_error[some] = problem.influence.entry_error
         which = order[some]
-        matrix[some] = problem.influence.matrix[which[:, :, None], which[:, None, :]]
-    matrix *= w[:, :, None] * w[:, None, :]
-    diagonal = np.arange(count)
-    matrix[:, diagonal, diagonal] = 1.0
-    X = np.linalg.inv(matrix)
-    v = (X @ w[:, :, None])[:, :, 0]
-    lost = 1.01 * (entry_error + (count + 8) * ROUNDOFF)
-    lost = lost * np.abs(matrix).sum(axis=2).max(axis=1)[:, None]
-    left, rest = np.eye(count) - matrix @ X, w - (matrix @ v[:, :, None])[:, :, 0]
-    errors = (_norms(left) + lost * _norms(X)) / mu * (1 + SAFETY)
-    error = (_norms(rest[:, :, None]) + lost * _norms(v[:, :, None])) / mu * (1 + SAFETY)
-    up, down = np.maximum(X + errors[:, None, :], 0.0), np.maximum(errors[:, None, :] - X, 0.0)
-    up[:, diagonal, diagonal] = down[:, diagonal, diagonal] = 0.0
-    root = np.where(w > 0, w, 1.0)
-
-    def change(m: Array) -> Array:
-        low_end = np.maximum(depth - m * drop * (1 + SAFETY), 0.0)
-        slopes = 1.5 * np.sqrt(low_end) / steep * (1 - SAFETY)
-        delta = np.clip(c_in - slopes + SAFETY * c_in, 0.0, c_in)
-        return np.asarray(delta * m / root)
-
-    m = np.ones(w.shape)
-    for _ in range(IMPROVEMENTS):
-        above = (v + error + (down @ change(m)[:, :, None])[:, :, 0]) / root * (1 + SAFETY)
-        m = np.minimum(m, np.maximum(above, 0.0))
-    falls = (error + (up @ change(m)[:, :, None])[:, :, 0]) * (1 + SAFETY)
-    below = (v - falls) / root - SAFETY * np.abs(v / root)
-    most, felt = np.ones(c.shape), np.zeros(c.shape)
-    np.put_along_axis(most, order, np.where(inside, m, 1.0), axis=1)
-    felt = rows.apply(c * most) * (1.0 + 1.01 * (entry_error + (n + 2) * ROUNDOFF))
+        entries[some] = problem.influence.matrix[which[:, :, None], which[:, None, :]]
+        entry_error[some] = problem.influence.entry_error
+    inside, c_in, depth, steep = (
+        np.take_along_axis(np.broadcast_to(values, c.shape), order, axis=1)
+        for values in (support, c, high.indentation.lower, k.upper**1.5)
+    )
+    inverse = _Inverse.of(entries, c_in, mu, entry_error)
+    below, m = inverse.bounds(lambda m: _delta(c_in, depth, steep, m * drop))
+    most = np.zeros(c.shape)
+    np.put_along_axis(most, order, c_in * m, axis=1)
+    felt = rows.apply(most) * (1.0 + 1.01 * (entry_error + (c.shape[1] + 2) * ROUNDOFF))
     rates = 1.0 - felt * (1 + SAFETY) - SAFETY
     stays = (rates > 0) | (-high.indentation.upper > drop * -rates * (1 + SAFETY))
-    rising = np.where(inside, below > 0, True).all(axis=1) & (support | stays).all(axis=1)
+    rising = (~inside | (below > 0)).all(axis=1) & (support | stays).all(axis=1)
     return np.asarray(rising & (mu[:, 0] > 0))
 
 
-def _norms(columns: NDArray[Any]) -> Array:
-    return np.asarray(np.sqrt((columns * columns).sum(axis=1)))
+def _delta(c: Array, depth: Array, steep: Array, fallen: Array) -> Array:
+    """At least C~ - c(n) of indentations that have fallen by so much, from `depth` at least."""
+    slopes = 1.5 * np.sqrt(np.maximum(depth - fallen * (1 + SAFETY), 0.0)) / steep
+    return np.asarray(np.clip(c - slopes * (1 - SAFETY) + SAFETY * c, 0.0, c))
 
 
 class _Span(NamedTuple):
@@ -243,12 +220,17 @@ class _Span(NamedTuple):
 
     def delta(self, m: Array) -> Array:
         """Of the support."""
-        k = self.upper.problem.exact.coefficients.upper
-        least = self.upper.indentation.lower[self.support] - m * self.drop * (1 + SAFETY)
-        steep = (k if len(k) == 1 else k[self.support]) ** 1.5
-        slopes = 1.5 * np.sqrt(np.maximum(least, 0.0)) / steep * (1 - SAFETY)
-        c = self.c[self.support]
-        return np.asarray(np.clip(c - slopes + SAFETY * c, 0.0, c))
+        k = np.broadcast_to(self.upper.problem.exact.coefficients.upper, self.c.shape)
+        depth, c = self.upper.indentation.lower[self.support], self.c[self.support]
+        return _delta(c, depth, k[self.support] ** 1.5, m * self.drop)
+
+    def inverse(self) -> _Inverse:
+        """Of the support: one row."""
+        influence = self.upper.problem.influence
+        entries, c = influence.submatrix(self.support)[None], self.c[self.support][None]
+        return _Inverse.of(
+            entries, c, np.full((1, 1), self.mu), np.full((1, 1), influence.entry_error)
+        )
 
     def unsettled(self, rates: Array, rising: NDArray[np.bool_]) -> Indices:
         """Those with a rate that may be negative, and that must rise or might not stay open."""
@@ -259,70 +241,70 @@ class _Span(NamedTuple):
 
 
 class _Inverse(NamedTuple):
-    """B^-1 of the support, and v = B^-1 w, as computed, with bounds on their errors.
+    """B^-1 and v = B^-1 w of supports in rows, as computed, with bounds on their errors.
 
-    errors : (m,) of the columns, in the 2-norm;  error : of v, in the 2-norm
-    lost   : what a product with A loses, relative to the sizes of its rows
+    errors : (m, s) of the columns, in the 2-norm;  error : (m, 1) of v, in the 2-norm
+    lost   : (m, 1) what a product with A loses, relative to the sizes of its rows
     """
 
     w: Array
     matrix: Array
     errors: Array
     v: Array
-    error: float
-    lost: float
+    error: Array
+    lost: Array
 
     @classmethod
-    def of(cls, span: _Span) -> _Inverse:
-        influence = span.upper.problem.influence
-        w = np.sqrt(span.c[span.support])
-        B = influence.submatrix(span.support) * w * w[:, None]
-        np.fill_diagonal(B, 1.0)
+    def of(cls, entries: Array, c: Array, mu: Array, entry_error: Array) -> _Inverse:
+        """entries : (m, s, s) of A, written into;  c : (m, s) C~;  mu, entry_error : (m, 1)."""
+        w, diagonal = np.sqrt(c), np.arange(c.shape[1])
+        B = entries
+        B *= w[:, :, None] * w[:, None, :]
+        B[:, diagonal, diagonal] = 1.0
         X = np.asarray(np.linalg.inv(B), dtype=np.float64)
-        lost = 1.01 * (influence.entry_error + (len(w) + 8) * ROUNDOFF)
-        largest = float(np.abs(B).sum(axis=1).max())  # at least the 2-norm of |B|
-        v = X @ w
+        lost = 1.01 * (entry_error + (c.shape[1] + 8) * ROUNDOFF)
+        largest = np.abs(B).sum(axis=2).max(axis=1)[:, None]  # at least the 2-norm of |B|
+        v = X @ w[:, :, None]
 
-        def error(left: Array, of: Array) -> Array:
-            rounding = lost * largest * np.linalg.norm(of, axis=0)
-            sizes = np.asarray(np.linalg.norm(left, axis=0) + rounding, dtype=np.float64)
-            return np.asarray(sizes / span.mu * (1 + SAFETY))
+        def error(left: NDArray[Any], of: NDArray[Any]) -> Array:
+            rounding = lost * largest * np.linalg.norm(of, axis=1)
+            return np.asarray((np.linalg.norm(left, axis=1) + rounding) / mu * (1 + SAFETY))
 
-        errors = error(np.eye(len(w)) - B @ X, X)
-        return cls(w, X, errors, v, float(error(w - B @ v, v)), lost)
+        errors = error(np.eye(c.shape[1]) - B @ X, X)
+        return cls(w, X, errors, v[:, :, 0], error(w[:, :, None] - B @ v, v), lost)
 
-    def bounds(self, span: _Span) -> tuple[Array, Array]:
-        """(m,) lower bounds on the rates of the support, and (n,) m, upper ones; by (1)."""
-        high = np.maximum(self.matrix + self.errors, 0.0)
-        low = np.maximum(self.errors - self.matrix, 0.0)
-        np.fill_diagonal(high, 0.0)
-        np.fill_diagonal(low, 0.0)
-        m = np.ones(len(self.w))
+    def bounds(self, delta: Callable[[Array], Array]) -> tuple[Array, Array]:
+        """(m, s) lower bounds on the rates of the supports, and m, upper ones; by (1).
+
+        delta : of m
+        """
+        high = np.maximum(self.matrix + self.errors[:, None, :], 0.0)
+        low = np.maximum(self.errors[:, None, :] - self.matrix, 0.0)
+        diagonal, w = np.arange(self.w.shape[1]), np.where(self.w > 0, self.w, 1.0)
+        high[:, diagonal, diagonal] = low[:, diagonal, diagonal] = 0.0
+        m = np.ones(w.shape)
         for _ in range(IMPROVEMENTS):
-            change = span.delta(m) * m / self.w
-            above = (self.v + self.error + low @ change) / self.w * (1 + SAFETY)
+            change = delta(m) * m / w
+            above = (self.v + self.error + (low @ change[:, :, None])[:, :, 0]) / w * (1 + SAFETY)
             m = np.minimum(m, np.maximum(above, 0.0))
-        change = span.delta(m) * m / self.w
-        falls = (self.error + high @ change) * (1 + SAFETY)
-        below = (self.v - falls) / self.w
-        every = np.ones(len(span.c))
-        every[span.support] = m
-        return below - SAFETY * np.abs(self.v / self.w), every
+        change = delta(m) * m / w
+        falls = (self.error + (high @ change[:, :, None])[:, :, 0]) * (1 + SAFETY)
+        return (self.v - falls) / w - SAFETY * np.abs(self.v / w), m
 
     def elsewhere(self, span: _Span, which: Indices, m: Array) -> Array:
-        """Lower bounds on the rates of others, that are open; by (1)."""
+        """Lower bounds on the rates of others, that are open; by (1), of the one row."""
         if len(which) == 0:
             return np.zeros(0)
         both = np.concatenate((span.support, which))
         rows = span.upper.problem.influence.submatrix(both)[len(span.support) :]
-        weighted = rows[:, : len(span.support)] * self.w
+        weighted = rows[:, : len(span.support)] * self.w[0]
         sizes = np.linalg.norm(weighted, axis=1)
-        lost = self.errors + self.lost * np.linalg.norm(self.matrix, axis=0)
-        falls = np.maximum(np.outer(sizes, lost) - weighted @ self.matrix, 0.0)
+        lost = self.errors[0] + self.lost[0] * np.linalg.norm(self.matrix[0], axis=0)
+        falls = np.maximum(np.outer(sizes, lost) - weighted @ self.matrix[0], 0.0)
         m = m[span.support]
-        by_change = falls @ (span.delta(m) * m / self.w)
-        off = sizes * (self.error + self.lost * float(np.linalg.norm(self.v)))
-        felt = weighted @ self.v
+        by_change = falls @ (span.delta(m) * m / self.w[0])
+        off = sizes * (self.error[0] + self.lost[0] * float(np.linalg.norm(self.v[0])))
+        felt = weighted @ self.v[0]
         return np.asarray(1.0 - felt - (by_change + off) * (1 + SAFETY) - SAFETY * (1 + felt))
 
 

@@ -82,9 +82,9 @@ def phase_losses(
     influence: Kind | None = None,
     announce: Announce | None = None,
 ) -> PhaseLosses:
-    """The loss of an elliptic path at several phases and sizes; `elliptic_path` has the letters.
+    """The loss of an elliptic path at several phases and sizes; symbols as in `elliptic_path`.
 
-    chords : of each ellipse; the loss is off by about chords^-2
+    chords : number per ellipse; the relative error of the loss is about chords^-2
     influence, announce : as in `load_path`
 
     Raises what `elliptic_path` and `steady` raise.

@@ -27,8 +27,8 @@ def elliptic_path(
 
     phase : [rad] 0 for a full ellipse, pi/2 for loads in phase on a straight line
     friction : f of the scene, which says where P + Q/f and P - Q/f are extreme
-    chords : about as many; those extremes and the extremes of P are always corners, so that the
-        loss is off by about chords^-2, and the permanently stuck level is exact
+    chords : approximate number; those extremes and the extremes of P are always corners, so the
+        relative error of the loss is about chords^-2, and the permanently stuck level is exact
 
     >>> loads, forces = cr.elliptic_path(
     ...     load=1.0, load_amplitude=0.5, force_amplitude=0.1, friction=0.5, chords=8

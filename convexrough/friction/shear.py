@@ -343,15 +343,15 @@ def _nothing_loaded(contact: Contact, displacement: float) -> ShearState:
 
 
 def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> ShearCertificate:
-    """Judge shear forces of first loading that came from anywhere.
+    """The certificate of shear forces of first loading from any source.
 
     forces : (n,) [force] along the shear force, in the order of the scene's asperities
-    force  : [force] the shear force Q that they carry
+    force  : [force] their prescribed sum Q
 
-    Forces are held against the solution: `force_errors` are bounds on their distance to it. A word
-    is that of the solution where the force is near enough to imply it: nearer to f P, or to what
-    the solution leaves of it, than a hundredth of f P, or than all that is left. All else in the
-    certificate is of the solution.
+    `force_errors` are bounds on the distance to the solution. An asperity has the status of the
+    solution where its force is close enough to imply it: nearer to f P, or to what the solution
+    leaves of it, than a hundredth of f P, or than all that is left. The rest of the certificate is
+    that of the solution.
 
     Raises InputError if the scene has no friction, |Q| exceeds f P, or forces are not numbers.
 

@@ -1,8 +1,9 @@
-"""A load path found in three ways: do they agree, and what does it cost?
+"""Comparison of three methods for a load path: agreement and time.
 
-The memory curve is plane geometry. The general step knows no order and solves equations by Newton's
-method; the conic step minimises the same energy as a cone program. Both take one step for each
-segment, which is exact where indentations are ordered: docs/theory/without-order.md.
+The memory curve is plane geometry. The general step does not assume monotonic indentations and
+solves equations by Newton's method; the conic step minimises the same energy as a cone program.
+Both take one step for each segment, which is exact where indentations are monotonic:
+docs/theory/without-order.md.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ class States(NamedTuple):
 
 
 def used_by(curves: Sequence[MemoryCurve]) -> set[Fraction]:
-    """The loads of the levels that states and their words need."""
+    """The loads of the levels that states and their statuses need."""
     bent = {load for curve in curves for load, bend in curve.bends if bend}
     return bent | {curve.front for curve in curves if curve.front is not None}
 
@@ -129,7 +129,7 @@ def words(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[n
 
 
 def worded(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
-    """(N,) "open" where open here, and each word where that is proved; else "undecided"."""
+    """(N,) "open" where open here, each of the given statuses where proved; else "undecided"."""
     found = np.full(len(levels.scene), "open", dtype="<U12")
     some = np.full(len(levels.candidates), "undecided", dtype="<U12")
     some[here.open] = "open"

@@ -1,4 +1,4 @@
-"""`verify` for shear forces: what somebody claims of sliding, held against what is proved."""
+"""`verify` for shear forces: compare claims about sliding with the proof."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ CLAIMS_SLIDING = 1e-4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearVerdict(Claim, Record):
-    """What is proved of shear forces of first loading. Arrays are those of the scene's asperities.
+    """Comparison of claimed shear forces of first loading with the proof. Arrays are (n,).
 
     contact : pressed;  forces : (n,) [force] as given
-    total_prescribed : [force] the shear force Q that they carry
-    claimed : (n,) who is claimed to slide
-    within  : forces must be proved this near, in parts of the largest; None: near enough for every
-        word to follow from the forces alone
+    total_prescribed : [force] their prescribed sum Q
+    claimed : (n,) true where the asperity is claimed to slide
+    within  : largest error allowed, as a fraction of the largest force; None: as accurate as needed
+        to prove every status from the forces alone
     certificate : of the forces as given
     solution : the friction state, with its own certificate
     """
@@ -81,13 +81,12 @@ def verify_shear(
     within: float | None = None,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
-    """Hold shear forces of first loading that came from anywhere against the friction law.
+    """Compare shear forces of first loading from any source with the solution.
 
     forces  : (n,) [force] along the shear force, in the order of the scene's asperities
-    force   : [force] the shear force Q that they carry
-    within  : forces must be proved this near, in parts of the largest force
-    sliding : (n,) who is claimed to slide; default: those whose force is f P, or short of it by no
-        more than 1e-4 of that
+    force   : [force] their prescribed sum Q
+    within  : largest error allowed, as a fraction of the largest force
+    sliding : (n,) bool, the claim; default: asperities whose force is at least (1 - 1e-4) f P
 
     Raises InputError as `certify_shear`.
     """

@@ -18,11 +18,11 @@ from convexrough.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Manufactured(Record):
-    """A contact made from its answer. The heights that make it exact are rounded to float64, so
+    """A contact made from its answer. The heights that make it exact are rounded to float64, and
 
         cr.certify(made.scene, made.loads, approach=made.approach)
 
-    proves by how much, and every word.
+    bounds the effect and proves the statuses.
 
     approach : [length] to press by
     loads    : (n,) [force] with zeros where open;  gaps : (n,) [length]

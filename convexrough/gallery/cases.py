@@ -25,7 +25,7 @@ from convexrough.scene.scene import Scene
 #: Scenes and answers, a line for each case; `tests/gallery_answers.py` writes it.
 DATA = "cases.json"
 
-#: That of every case but those in other units: the words of friction do not depend on it.
+#: Of every case except those in other units; statuses under shear do not depend on it.
 FRICTION = 0.5
 MATERIAL = Material(contact_modulus=1.0, poisson_ratio=0.3)
 

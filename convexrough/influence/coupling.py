@@ -33,13 +33,12 @@ class Rounding(NamedTuple):
     """How far a computed product A P can be from the true one, for loads of either sign.
 
     The error of component i is at most  relative * (A |P|)_i + r_i  with |r_i| <= each  and
-    ||r||_2 <= norm: eta, rho_inf and rho_2 of docs/theory/operators.md. And (A |P|)_i <= most.
+    ||r||_2 <= norm: eta, rho_inf and rho_2 of docs/theory/operators.md.
     """
 
     relative: float
     norm: float
     each: float
-    most: float = np.inf
 
     def of(self, displacement: Array) -> Array:
         """A bound for each component; `displacement` is A |P| as computed."""

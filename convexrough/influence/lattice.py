@@ -83,8 +83,7 @@ class LatticeCoupling:
         norm = self.box.bound(kernel, ROUNDOFF) * size + off * size
         each = self.box.bound_each(kernel, ROUNDOFF) * size + off * largest
         relative = 1.01 * ENTRY_ROUNDOFFS * ROUNDOFF
-        most = 1.01 * kernel.norm / self._least * size  # by Cauchy's inequality
-        return Rounding(relative, self._unit * norm, self._unit * each, self._unit * most)
+        return Rounding(relative, self._unit * norm, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
         """In single precision, with a bound on its rounding added."""

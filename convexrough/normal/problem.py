@@ -168,10 +168,7 @@ class NormalProblem:
         if self.influence.at_hand and float(np.abs(change.high).max()) > small:
             return self.product(others)
         moved, off = self.influence.apply(change.high), self.influence.rounding(change.high)
-        most = off.most  # of A |change|
-        if not np.isfinite(most):
-            felt = self.influence.apply(np.abs(change.high))
-            most = float((felt + off.of(felt)).max(initial=0.0))
+        most = self.row_norm * float(np.linalg.norm(change.high))  # of A |change|, by Cauchy
         error = (off.relative + 2 * ROUNDOFF) * most + off.each
         return product + Ball.around(moved, error * (1 + SAFETY))
 

@@ -177,11 +177,12 @@ def completed(problem: NormalProblem, loads: Pair) -> tuple[Pair, Ball]:
         loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
         loads = loads * (total / loads.total())
     j = int(np.argmax(loads.high))
-    missing = problem.total - Ball.exact(loads).sum()
+    with_total = Pair(*(np.append(-x, y) for x, y in zip(loads, total, strict=True)))
+    missing = with_total.total()
     high, low = loads.high.copy(), loads.low.copy()
-    high[j], low[j] = largest = loads.at(j) + missing.mid
-    rounding = PAIR_ROUNDOFF * abs(float(largest.high)) + TINY
-    return Pair(high, low), Ball.around(0.0, missing.radius + rounding)
+    high[j], low[j] = loads.at(j) + missing
+    rounding = 8 * PAIR_ROUNDOFF * problem.load + (len(high) + 2) * TINY
+    return Pair(high, low), Ball.around(0.0, problem.total.radius + rounding)
 
 
 def _size(state: Trial) -> float:

@@ -207,7 +207,7 @@ class Solved:
 
     @cached_property
     def rows(self) -> Rows:
-        """With the words that are proved."""
+        """With the proved statuses."""
         touching = self.indentation.positive | self.loads.positive
         known = self.approach[:, 0], self.loads, self.indentation
         return Rows(self.total, *known, touching, self.indentation.negative)

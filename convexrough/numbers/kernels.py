@@ -29,7 +29,9 @@ def _residual(
     total, second = two_sum(total, -D.high)
     mid = Pair(*two_sum(total, (first + second) + ((rest + v.low) - D.low)))
     sizes = np.abs(local) + (np.abs(v.high) + np.abs(D.high))
-    off = rise(P, dP, dP * slope, lambda x: np.cbrt(x) ** 2)
-    radius = (np.abs(k.high) + dk) * off + dk * power.high
+    radius = dk * power.high
+    if dP.any():
+        off = rise(P, dP, dP * slope, lambda x: np.cbrt(x) ** 2)
+        radius = radius + (np.abs(k.high) + dk) * off
     lost = PAIR_ROUNDOFF * sizes + TINY * (1.0 + np.abs(k.high) * slope)
     return mid, (radius * UP + (dv + dD) + lost) * UP

@@ -54,10 +54,11 @@ class Pair(NamedTuple):
 
     def __add__(self, other: object) -> Pair:
         assert isinstance(other, Pair)
-        high, high_rest = two_sum(self.high, other.high)
+        first, high_rest = two_sum(self.high, other.high)
         low, low_rest = two_sum(self.low, other.low)
-        high, rest = _settled(high, high_rest + low)
-        return Pair(*_settled(high, rest + low_rest))
+        low = high_rest + low
+        high = first + low
+        return Pair(*_settled(high, (low - (high - first)) + low_rest))
 
     def __neg__(self) -> Pair:
         return Pair(-self.high, -self.low)

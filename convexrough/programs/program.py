@@ -204,10 +204,10 @@ def _objective(program: ConeProgram, boxes: Boxes, own: Array) -> float:
 
 
 def _bristle_error(rows: BristleProgram, own: Array) -> float:
-    """About how far an exact solution is from the contact's, over the largest load.
+    """Estimated error of the exact solution of the program, over the largest load.
 
-    A row of m bristles is off by 0.375 B / m^2 at worst, B the load of its box; the others answer
-    to that, by no more than one over the least eigenvalue of the scaled Hessian.
+    A row of m bristles has an error of at most 0.375 B / m^2, with B the load of its box; the
+    response of the others is at most one over the smallest eigenvalue of the scaled Hessian.
     """
     row = 0.375 * float(rows.box.max() / own.max()) / rows.m**2
     return row / float(scaled_eigenvalues(rows.problem, own)[0])

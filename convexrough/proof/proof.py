@@ -99,7 +99,7 @@ def prove(
     checking does: a minute for 3,000 asperities.
 
     Raises InputError for bad values and for scenes too large for the checker; ProofError where no
-    solution is proved near these loads: they are too far off, or too crowded.
+    solution is proved near these loads: they are too inaccurate, or too crowded.
     """
     checks.exactly_one("approach", approach, "load", load)
     refuse_many(scene)

@@ -1,4 +1,4 @@
-"""summary.json: what `--json` prints, and the words and exit status that go with it."""
+"""summary.json, which `--json` prints, with the printed report and the exit status."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
         )
     if solver in conic or solver in defines.SOLVER_MAP_QP:
         return f"{solver} has no second-order cones", f"{choice}, or solvers.BristleQP()"
-    return f"CVXPY knows no solver {solver}", checks.nearest(solver, installed)
+    return f"CVXPY has no solver {solver}", checks.nearest(solver, installed)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -100,14 +100,14 @@ def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float =
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Whole(Table):
-    """A map pressed whole, beside the asperities that stand for it, at the same approach.
+    """A map pressed by boundary elements, and its asperities at the same approach.
 
     contact   : of the asperities
     pressures : (ny, nx) [force/length^2] of the pixels
     loads     : (n,) [force] of the pixels that are nearest to each asperity
-    load [force], area [length^2] : of all;  pieces : of pixels in contact that touch each other
-    resolution : how much the load changes where pixels are twice as wide, over the load: about
-        four times what the pixels of the map are off by, where these resolve the tips
+    load [force], area [length^2] : totals;  pieces : number of connected sets of loaded pixels
+    resolution : relative change of the load for pixels of twice the width: about four times the
+        error due to the pixels of the map, where these resolve the tips
     """
 
     _along: ClassVar[Along] = {("asperity",): ("loads",), ("row", "column"): ("pressures",)}

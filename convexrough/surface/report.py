@@ -28,16 +28,16 @@ MOST_LISTED = 10
 #: Part of a map's half width from which on contact is too near to its edge.
 NEAR_EDGE = 0.9
 
-#: Part by which a statistic may differ from that of the moments without a word.
+#: Relative difference of a statistic from that of the moments up to which there is no warning.
 UNLIKE = 0.2
 
 
 @dataclass(frozen=True)
 class Scanned:
-    """A surface, all its summits, those that pruning leaves, and what comes of pressing on them.
+    """A surface, all its summits, those left by pruning, and the result of pressing them.
 
-    curve, contact : None where nobody said how they are pressed; contact also where none was found
-    whole : the map by boundary elements, where asked
+    curve, contact : None if not pressed; contact also if no solution was found
+    whole : the map pressed by boundary elements, or None
     """
 
     surface: Surface

@@ -7,7 +7,7 @@ many, so that whoever computes a part, and when, writes the same file.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -72,28 +72,38 @@ class Folder:
             for name, values in arrays.items()
         }
 
-    def missing(self, wanted: Iterable[range]) -> tuple[list[range], str]:
-        """Which parts are to be computed, and what was found; what is damaged is removed."""
-        known, todo = {part.start for part in self.parts()}, []
-        scenes = damaged = unfinished = 0
-        for part in wanted:
-            if part.start in known:
-                try:
-                    self.read(part)
-                    scenes += len(part)
-                    continue
-                except FileError:
-                    self.file(part).unlink()
-                    damaged += 1
-            todo.append(part)
+    def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
+        """Which parts are to be computed, and what was found; what is damaged is removed.
+
+        Raises FileError where something is there that is not to be gone on with.
+        """
+        known, damaged = {part.start for part in self.parts()}, 0
+        there = [part for part in wanted if part.start in known]
+        if there and not resume:
+            raise FileError(
+                f"{self.path}: holds {sum(map(len, there)):,} of these {sum(map(len, wanted)):,} "
+                "scenes already; --resume computes the rest, --force overwrites them, --out takes "
+                "another folder"
+            )
+        for part in there:
+            try:
+                self.read(part)
+            except FileError:
+                self.file(part).unlink()
+                known.remove(part.start)
+                damaged += 1
+        todo = [part for part in wanted if part.start not in known]
         mine = {self.file(part).name for part in todo}
-        for left in (self.path / PARTS).glob(".*.unfinished"):
-            if left.name[1:].rsplit(".", 2)[0] in mine:
-                left.unlink(missing_ok=True)
-                unfinished += 1
-        said = f"found {scenes:,} scenes"
+        left = [
+            path
+            for path in (self.path / PARTS).glob(".*.unfinished")
+            if path.name[1:].rsplit(".", 2)[0] in mine
+        ]
+        for path in left:
+            path.unlink(missing_ok=True)
+        said = f"found {sum(map(len, wanted)) - sum(map(len, todo)):,} scenes"
         said += f", {damaged:,} damaged parts removed" if damaged else ""
-        return todo, said + (f", {unfinished:,} unfinished files removed" if unfinished else "")
+        return todo, said + (f", {len(left):,} unfinished files removed" if left else "")
 
 
 def open_folder(path: Path) -> Folder:

@@ -32,8 +32,6 @@ AT_ONCE, EACH = 1000, 2
 #: Batches whose worker died after which no worker lives.
 MOST_LOST = 64
 
-Lost = list[tuple[Batch, BaseException]]
-
 
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     """The rows of batches, as they come.
@@ -42,19 +40,21 @@ def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     its worker dies again, or where nobody is left to compute.
     """
     lost = yield from _together(iter(batches), executor)
-    dead: Lost = []
-    for batch, _ in lost:
+    dead = []
+    for batch in lost:
         dead += yield from _together(iter((batch,)), executor)
     if dead:
-        which = ", ".join(str(batch) for batch, _ in dead)
-        raise WorkerError(f"the process that computed scenes {which} died, twice") from dead[0][1]
+        which = ", ".join(map(str, dead))
+        raise WorkerError(f"the process that computed scenes {which} died, twice")
 
 
-def _together(batches: Iterator[Batch], executor: Executor) -> Generator[Columns, None, Lost]:
+def _together(
+    batches: Iterator[Batch], executor: Executor
+) -> Generator[Columns, None, list[Batch]]:
     """The rows of batches, in any order; and those whose workers died."""
     most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
     pending: dict[Future[Rows], Batch] = {}
-    lost: Lost = []
+    lost: list[Batch] = []
     try:
         while True:
             for batch in islice(batches, most - len(pending)):
@@ -66,7 +66,7 @@ def _together(batches: Iterator[Batch], executor: Executor) -> Generator[Columns
                 try:
                     rows = future.result()
                 except _lost() as error:
-                    lost.append((batch, error))
+                    lost.append(batch)
                     if len(lost) > MOST_LOST:
                         raise WorkerError(f"workers die as soon as they live: {error}") from error
                     continue

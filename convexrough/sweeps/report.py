@@ -13,7 +13,7 @@ from convexrough.run.summary import headed
 from convexrough.sweeps.batch import Columns
 from convexrough.sweeps.folder import MANIFEST
 from convexrough.sweeps.plan import Plan
-from convexrough.sweeps.sweep import Done, duration
+from convexrough.sweeps.sweep import Done
 from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned
 
@@ -43,7 +43,7 @@ def describe(summary: Summary) -> list[str]:
     lines += [(f"  {word}", f"{it[word]:,}") for word in ("certified", "undecided", "failed")]
     if "computed" in it:
         rate = it["computed"] / it["seconds"]
-        said = f"{it['computed']:,} in {duration(it['seconds'])}, {rate:,.3g} a second"
+        said = f"{it['computed']:,} in {it['seconds']:,.0f} s, {rate:,.3g} a second"
         lines.append(("computed", f"{said}; {it['found']}"))
     if left_out := it["not_measured"]:
         lines.append(("left out", f"{', '.join(map('[{}]'.format, left_out))}: nothing measured"))

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.errors import FileError, InputError, MistakesError
+from convexrough.errors import InputError, MistakesError
 from convexrough.progress import tell
 from convexrough.run.stage import Stage
 from convexrough.scene.scene import Scene
 from convexrough.sweeps.batch import Columns, table
-from convexrough.sweeps.folder import Folder, make_folder
+from convexrough.sweeps.folder import make_folder
 from convexrough.sweeps.measures import Stages
 from convexrough.sweeps.plan import Plan, planned
 from convexrough.sweeps.pool import Processes, computed
@@ -120,7 +121,7 @@ def run(
     todo = _share(plan, part)
     if out is not None:
         folder = make_folder(Path(out), plan.manifest(), overwrite=overwrite)
-        todo, found = _missing(folder, todo, resume)
+        todo, found = folder.missing(todo, resume)
         tell(found)
     count = sum(map(len, todo))
     held = [table(plan.batch(range(0)), [])]  # no rows, all columns
@@ -151,18 +152,6 @@ def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
     return [plan.part(number) for number in range(first, stop)]
 
 
-def _missing(folder: Folder, wanted: list[range], resume: bool) -> tuple[list[range], str]:
-    """The parts to compute, and what was found; FileError where that is not to be gone on with."""
-    known = {part.start for part in folder.parts()}
-    there = sum(len(part) for part in wanted if part.start in known)
-    if there and not resume:
-        raise FileError(
-            f"{folder.path}: holds {there:,} of these {sum(map(len, wanted)):,} scenes already; "
-            f"--resume computes the rest, --force overwrites them, --out takes another folder"
-        )
-    return folder.missing(wanted)
-
-
 def _told(found: Iterator[Columns], count: int) -> Iterator[Columns]:
     """The rows themselves; how far they have come is told on the way."""
     began, done, failed = time.monotonic(), 0, 0
@@ -171,17 +160,9 @@ def _told(found: Iterator[Columns], count: int) -> Iterator[Columns]:
         done += len(columns["status"])
         failed += int(np.count_nonzero(columns["status"] == "failed"))
         rate = done / max(time.monotonic() - began, 1e-9)
-        said = f"{done:,} of {count:,} scenes, {rate:,.3g} a second, "
-        said += f"{duration((count - done) / rate)} left"
+        left = timedelta(seconds=round((count - done) / rate))
+        said = f"{done:,} of {count:,} scenes, {rate:,.3g} a second, {left} left"
         tell(said + (f", {failed:,} failed" if failed else ""))
-
-
-def duration(seconds: float) -> str:
-    """In the unit that suits."""
-    for size, unit in ((365.25 * 86400, "years"), (86400, "days"), (3600, "h"), (60, "min")):
-        if seconds >= 2 * size:
-            return f"{seconds / size:,.0f} {unit}"
-    return f"{seconds:.0f} s"
 
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:

@@ -55,8 +55,8 @@ class SweepTable(Record):
     failed.
 
     >>> loads = [1e-7, 2e-7, 3e-7]
-    >>> table = cr.sweep([scene] * 3, load=loads, measure=["contacts"], workers=1)
-    >>> print(table.read(["normal.load", "contacts"])["contacts"], table.complete)
+    >>> table = cr.sweep([scene] * 3, load=loads, measure=["contact"], workers=1)
+    >>> print(table.read(["normal.load", "contact"])["contact"], table.complete)
     [19. 31. 37.] True
     """
 

@@ -86,7 +86,8 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
 
     known : names that may be wanted, in lower case; of others only those as long as these are kept
 
-    Raises FileError where what reads such files is not installed, OSError, and SPOILED.
+    Raises FileError where the package for such files is missing, OSError, and errors of corrupted
+    files.
     """
     named = named_arrays(path)
     (first, values), *others = named.items() or [("", np.zeros(0))]

@@ -77,9 +77,9 @@ _SLIPS = [
 
 
 def explained(path: object, text: str, error: Exception) -> str:
-    """A line for each slip: where, the line, and what is meant; at the end what is not understood.
+    """A sentence for each slip: place, line and correction; the last one may be without correction.
 
-    Each slip is mended to find the next.
+    Each slip is corrected to find the next.
     """
     lines = text.split("\n")
     found: list[str] = []
@@ -88,14 +88,14 @@ def explained(path: object, text: str, error: Exception) -> str:
         number = int(place[1]) if place else 0
         line = lines[number - 1].strip("\r") if 0 < number <= len(lines) else ""
         shown = line.strip() if len(line) <= MOST_SHOWN else f"{line[:MOST_SHOWN].strip()}..."
-        meant = _mended(line) if len(line) < 200 else None
+        meant = _corrected(line) if len(line) < 200 else None
         if meant is None:
             what = f"{path}: not a TOML file: {error}"
             found.append(f"{what}: {shown}" if shown else what)
             break
-        mended, why = meant
-        found.append(f"{path}: line {number}: found {shown}, expected {mended}: {why}")
-        lines[number - 1] = mended
+        fixed, why = meant
+        found.append(f"{path}: line {number}: found {shown}, expected {fixed}: {why}")
+        lines[number - 1] = fixed
         try:
             tomllib.loads("\n".join(lines))
         except (ValueError, RecursionError) as following:
@@ -105,7 +105,7 @@ def explained(path: object, text: str, error: Exception) -> str:
     return "\n".join(found)
 
 
-def _mended(line: str) -> tuple[str, str] | None:
+def _corrected(line: str) -> tuple[str, str] | None:
     """What is meant by a line, and why; None where that is not known."""
     for pattern, meant, why in _SLIPS:
         if found := pattern.fullmatch(line):

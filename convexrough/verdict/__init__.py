@@ -1,4 +1,4 @@
-"""Claims of loads and shear forces from anywhere, held against what is proved."""
+"""Comparison of claimed loads and shear forces with the proof."""
 
 from convexrough.verdict.verdict import Verdict as Verdict
 from convexrough.verdict.verdict import verify as verify

@@ -1,4 +1,4 @@
-"""Forces that somebody claims, from a file: one per asperity of a scene, in its order."""
+"""Claimed forces from a file: one per asperity of a scene, in its order."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from convexrough.tabular.table import Reading, Table, few, read_table
 from convexrough.tabular.text import bare
 from convexrough.verdict.verdict import NOISE, rounded_up
 
-#: Positions in a file may be off by this part of the least spacing, unless a tolerance is given:
+#: Largest error of positions in a file, over the smallest spacing, unless a tolerance is given:
 #: five digits are enough, and every asperity still has one nearest row.
 POSITION_TOLERANCE = 1e-2
 
@@ -35,7 +35,7 @@ class Manner(Reading):
     """How a file of forces is read.
 
     sign      : -1 where compression is negative
-    tolerance : [length] by which positions may be off; default: 1 % of the least spacing
+    tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
     missing_open : asperities without a row are open
     nodes     : rows are nodes or pixels, which add up at their nearest asperity
     """

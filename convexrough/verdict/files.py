@@ -1,4 +1,4 @@
-"""`verify` on files: read what is claimed, and hold it against what is proved."""
+"""`verify` on files: read the claims, and compare them with the proof."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _sheared(
 
 
 def _claims(path: Path | None, forces: Claimed, contact: Contact) -> NDArray[np.bool_] | None:
-    """(n,) who is said to slide; None where the file has no words."""
+    """(n,) true where the file says sliding; None where it has no statuses."""
     if forces.status is None:
         return None
     said = np.char.lower(np.char.strip(forces.status))

@@ -85,7 +85,7 @@ def describe_verdict(found: Verified, units: UnitNames) -> list[str]:
 
 
 def describe_scene(scene: Scene, units: UnitNames) -> list[str]:
-    """What loads are held against."""
+    """Lines about the scene: geometry and contact modulus."""
     modulus = described_modulus(scene.material.contact_modulus, units)
     return [_line("geometry", scene.geometry), _line("contact modulus", modulus)]
 
@@ -118,9 +118,9 @@ def _describe(claim: Claim, scene: Scene, name: str, units: UnitNames) -> list[s
     what = "result" if name == "load" else _kind(claim)
     lines = [_line(what, _proved(claim))]
     lines.append(_line("wrong statuses", str(len(claim.wrongly_claimed) or "none")))
-    for what, who in claim.wrong.items():
-        if len(who):
-            lines += [f"  {what}: {len(who):,}", *table.of(_worst_first(claim, who))]
+    for what, which in claim.wrong.items():
+        if len(which):
+            lines += [f"  {what}: {len(which):,}", *table.of(_worst_first(claim, which))]
     lines.append(_line("undecided", str(len(claim.undecided) or "none")))
     lines += table.of(claim.undecided)
     lines += [_line(f"{name} error", _off(claim, name)), *table.of(claim.off)]
@@ -140,7 +140,7 @@ def reason(found: Verified) -> str:
         counts[f"{kind}s off"] = len(claim.off)
         parts += [f"{count:,} {what}" for what, count in counts.items() if count]
         if not claim.near_enough and claim.within is None:
-            parts.append(f"{kind}s too far off to prove every word")
+            parts.append(f"{kind}s too inaccurate to prove all statuses")
         if not claim.total_holds:
             parts.append(f"total of the {kind}s off")
     return ", ".join(parts)
@@ -151,11 +151,11 @@ def junit(found: Verified) -> bytes:
     suite = ElementTree.Element("testsuite", name="convexrough verify")
     failures = 0
     for kind, claim in found.claims:
-        set_wrong = {what: who for what, who in claim.wrong.items() if len(who)}
+        set_wrong = {what: which for what, which in claim.wrong.items() if len(which)}
         asked: dict[str, str] = {
             "contact set" if claim is found.verdict else "statuses": "; ".join(
-                f"{what}: {_named(claim, found.verdict.scene, who)}"
-                for what, who in set_wrong.items()
+                f"{what}: {_named(claim, found.verdict.scene, which)}"
+                for what, which in set_wrong.items()
             ),
             "undecided": _named(claim, found.verdict.scene, claim.undecided),
             "off": "" if claim.near_enough else _off(claim, kind),

@@ -172,14 +172,14 @@ def verify(
     floor: float = 0.0,
     influence: Kind | None = None,
 ) -> Verdict:
-    """Hold loads that came from anywhere against the contact law.
+    """Compare loads from any source with the solution: which touch, and how accurate they are.
 
     loads : (n,) [force] in the order of the scene's asperities
-    approach [length] or load [force] : what is prescribed, exactly one
-    within : loads must be proved this near, in parts of the largest load
-    floor  : [force] a load up to this counts as 0, and claims that its asperity is open; so does
-        noise below 0 that is no larger
-    influence : how to couple the asperities; None for the cheapest exact way
+    approach [length] or load [force] : the prescribed quantity, exactly one
+    within : largest error allowed, as a fraction of the largest load
+    floor  : [force] a load up to this size, also a negative one, counts as 0 and claims that its
+        asperity is open
+    influence : compliance operator; None for the cheapest that is exact
 
     Raises InputError for loads of the wrong length, not finite, or negative beyond the floor.
 

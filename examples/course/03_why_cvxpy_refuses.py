@@ -27,6 +27,8 @@ from numpy.typing import NDArray
 
 import convexrough as cr
 
+plt.rcParams["font.size"] = 14  # to be read from the last row
+
 Array = NDArray[np.float64]
 
 asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0051)
@@ -108,7 +110,7 @@ assert np.linalg.eigvalsh(M)[0] > 0
 # which one takes load from the other: a valley while contacts are small, and a ridge when they are
 # too large.
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
 shift = np.linspace(-1, 1, 201)
 for radius, style in [(0.5, "-"), (1.2, "--"), (1.7, ":")]:
     # r = 1; loads P (1 +- shift) with 1/(2 a) = (2/3) k P^(-1/3), in units of k P^(5/3)
@@ -116,7 +118,7 @@ for radius, style in [(0.5, "-"), (1.2, "--"), (1.7, ":")]:
     energy = 0.6 * ((1 + shift) ** (5 / 3) + (1 - shift) ** (5 / 3) - 2) - coupling * shift**2
     left.plot(shift, energy, "k", ls=style, label=f"contact radius {radius:g} r")
 left.set(xlabel="share of load moved from one to the other [1]", ylabel="energy / $k P^{5/3}$ [1]")
-left.legend(fontsize=8)
+left.legend()
 
 rng = np.random.default_rng(3)
 bare_least, shell_least = [], []
@@ -200,13 +202,3 @@ for _ in range(60):
     low, high = (middle, high) if definite(middle) else (low, middle)
 print("convex up to a / r =", low)
 assert abs(low - np.pi / 2) < 1e-9
-
-
-def compare() -> list[tuple[str, float, float]]:
-    """(quantity, computed, reference): what the page says."""
-    certificate = cr.press(scene, approach=1.5e-5).certificate
-    largest_radius = np.sqrt(scene.relative_radii[0] * 1.5e-5)  # alone, under the axis
-    return [
-        ("radius up to which two are convex, over r", low, np.pi / 2),
-        ("convexity number", certificate.convexity_number, largest_radius / (np.pi / 2 * s)),
-    ]

@@ -25,6 +25,8 @@ import numpy as np
 
 import convexrough as cr
 
+plt.rcParams["font.size"] = 14  # to be read from the last row
+
 Pair = tuple[Fraction, Fraction]
 A = Fraction(1, 4)
 D: Pair = (Fraction(1), Fraction(3, 5))
@@ -102,7 +104,7 @@ print("h =", *h)
 
 theta = max(A / h[0], A / h[1])
 print("theta =", theta)
-assert theta < 1
+assert theta == Fraction(3, 8)
 
 # %%
 # **6. Complementarity.** The true gaps :math:`g^*` are not negative, and 0 where :math:`P^*` is
@@ -135,15 +137,15 @@ h1, h2 = float(h[0]), float(h[1])
 allowance = np.sqrt(
     ((x**2 + y**3 / 4 - 1) ** 2 / h1 + (y**2 + x**3 / 4 - 0.6) ** 2 / h2) / (1 - float(theta)) ** 2
 )
-figure, axes = plt.subplots(figsize=(5.2, 4.2), layout="constrained")
+figure, axes = plt.subplots(figsize=(7.5, 6), layout="constrained")
 lines = axes.contour(x, y, allowance, [0.05, 0.1, 0.2, 0.4, 0.8], colors="0.3", linewidths=0.9)
-axes.clabel(lines, fontsize=8)
+axes.clabel(lines)
 said = (x**3 > allowance / np.sqrt(h1)) & (y**3 > allowance / np.sqrt(h2))
 said &= (x <= float(b[0])) & (y <= float(b[1]))
 axes.contourf(x, y, said, [0.5, 1.5], colors="0.85")
 axes.plot(a1, a2, "ko", ms=6)
 axes.set(xlabel="trial $a_1$ [length]", ylabel="trial $a_2$ [length]")
-axes.set_title("proved distance to the solution; grey: both proved to touch", fontsize=9)
+axes.set_title("proved distance; grey: both proved to touch")
 plt.show()
 
 # %%
@@ -202,13 +204,3 @@ print(f"theta {theta_3}, gap {float(gap):.4f}, its error at most {float(doubt) *
 assert theta_3 < 1
 assert gap > 0
 assert gap**2 > doubt
-
-
-def compare() -> list[tuple[str, float, float]]:
-    """(quantity, computed, reference): what the page says."""
-    load = cr.press(scene, approach=1.0).loads[0]
-    return [
-        ("theta", float(theta), 0.375),
-        ("theta of three", float(theta_3), 0.75),
-        ("package's load over that of 50 digits", load / float(true[0]), 1.0),
-    ]

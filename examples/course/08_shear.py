@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 import convexrough as cr
 
+plt.rcParams["font.size"] = 14  # to be read from the last row
+
 Array = NDArray[np.float64]
 NU, FRICTION = 0.3, 0.5
 
@@ -92,6 +94,7 @@ gaps = np.where(second.loads > 0, 0.0, second.gaps)
 slips = ratio * FRICTION * gaps[touching]
 print("sliding:", int((slips > 0).sum()), "of", len(touching))
 assert (slips > 0).sum() == 6
+assert abs(displacement / cr.shear(pressed, force=Q).displacement - 1) < 1e-9
 assert abs(forces.sum() / Q - 1) < 1e-12
 
 # %%
@@ -102,7 +105,7 @@ assert abs(forces.sum() / Q - 1) < 1e-12
 # P_i))^{1/3}`: the contact disc of the second pressing. Dark discs stick; the ring around them, and
 # the hatched discs, have slipped.
 
-figure, panels = plt.subplots(1, 3, figsize=(9, 3.4), layout="constrained", sharey=True)
+figure, panels = plt.subplots(1, 3, figsize=(11, 4.4), layout="constrained", sharey=True)
 smooth_radius = cr.smooth(scene, load=pressed.load).contact_radius
 for axes, part in zip(panels, (0.25, 0.5, 0.8), strict=True):
     less = cr.press(scene, load=(1 - part) * pressed.load)
@@ -120,9 +123,7 @@ for axes, part in zip(panels, (0.25, 0.5, 0.8), strict=True):
             )
         )
     axes.set(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25), aspect="equal", xlabel="$x / a_H$ [1]")
-    axes.set_title(
-        f"$Q / (f P)$ = {part}: {int((less.loads[touching] == 0).sum())} slide", fontsize=10
-    )
+    axes.set_title(f"$Q / (f P)$ = {part}: {int((less.loads[touching] == 0).sum())} slide")
 panels[0].set_ylabel("$y / a_H$ [1]")
 plt.show()
 
@@ -165,11 +166,3 @@ for _ in range(60):
 onset = 1 - cr.press(scene, approach=high).load / pressed.load
 print(f"the outermost ring slides from Q / (f P) = {onset:.6f}")
 assert abs(onset - 0.3517) < 5e-5
-
-
-def compare() -> list[tuple[str, float, float]]:
-    """(quantity, computed, reference): what the page says."""
-    return [
-        ("displacement by two pressings over shear's", displacement / state.displacement, 1.0),
-        ("onset of sliding", onset, float(np.nanmin(cr.onset_of_sliding(pressed)) / limit)),
-    ]

@@ -27,6 +27,8 @@ from numpy.typing import NDArray
 
 import convexrough as cr
 
+plt.rcParams["font.size"] = 14  # to be read from the last row
+
 Array = NDArray[np.float64]
 NU, FRICTION = 0.3, 0.5
 ratio = (2 - NU) / (2 * (1 - NU))  # c_t
@@ -119,8 +121,10 @@ for p, t in corners:
 # front :math:`L`, down to which the contact slipped. Unloading at constant shear, the last step,
 # slips though :math:`Q` rests: friction gives way under it.
 
-figure, places = plt.subplots(1, 4, figsize=(11, 3.2), sharey=True, layout="constrained")
-for k, axes in enumerate(places):
+figure, places = plt.subplots(
+    2, 2, figsize=(11, 8.5), sharex=True, sharey=True, layout="constrained"
+)
+for k, axes in enumerate(places.flat):
     s, h = np.array([[float(x) for x in point] for point in drawn[k]]).T
     way = np.array([(0, 0), *corners[: k + 1]])
     axes.plot([0, 1], [0, 1], "k:", lw=0.7)
@@ -132,10 +136,11 @@ for k, axes in enumerate(places):
         reach = np.array([0.0, s[-1]])
         axes.plot(reach, h[-1] - (s[-1] - reach), "k--", lw=0.7, label="ruler")
         axes.plot([L], [h[-1] - (s[-1] - L)], "o", mfc="white", mec="k", label="front")
-    axes.set(xlabel="load $P$ or level $s$ / $P^*$ [1]", title=f"point {k + 1}", aspect="equal")
+    axes.set(title=f"point {k + 1}", aspect="equal")
     axes.set(xlim=(0, 1.05), ylim=(-0.5, 0.8))
-places[0].set(ylabel="$T = Q / f$ / $P^*$ [1]")
-places[1].legend(fontsize=7, loc="lower left")
+figure.supxlabel("load $P$ or level $s$ / $P^*$ [1]")
+figure.supylabel("$T = Q / f$ / $P^*$ [1]")
+places[0, 1].legend(loc="lower left")
 plt.show()
 
 # %%
@@ -269,12 +274,3 @@ again = cr.load_path(scene, loads=np.tile(P, 3), forces=FRICTION * np.tile(T, 3)
 for state in again.curves[4:]:
     levels, heights = ([float(x) for x in each] for each in (state.levels, state.heights))
     assert abs(np.interp(settled.level, levels, heights) - settled.force_level / FRICTION) < 1e-19
-
-
-def compare() -> list[tuple[str, float, float]]:
-    """(quantity, computed, reference): what the page says."""
-    return [
-        ("X by ruler and presses over that of load_path", X / float(path.displacements[-1]), 1.0),
-        ("front of the last step, over P*", float(drawn[-1][-2][0]), 0.2),
-        ("level that sticks for ever, over P*", settled.level / whole, 0.4),
-    ]

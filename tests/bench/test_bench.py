@@ -11,22 +11,19 @@ import multiprecision
 import numpy as np
 import pytest
 from drawn import words
-from flint import arb, ctx
 from matplotlib.text import Text
 
 import convexrough as cr
-from convexrough.bench import measure, page, reference, suite
+from convexrough.bench import measure, page, suite
 from convexrough.bench.figures import bench_figures
 from convexrough.bench.measure import Attempt
 from convexrough.bench.profile import Profile, profile_of
+from convexrough.bench.reference import reference
 from convexrough.bench.rows import Bench, Row, better_than_default, exponent, frontier
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, scene
-from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, Conic, Newton
 
 ROOT = Path(__file__).parent.parent.parent
-LONG = np.finfo(np.longdouble).eps < 1e-18
-extended = pytest.mark.skipif(not LONG, reason="no extended precision on this platform")
 SMALL = (("lattice", 61),)
 
 
@@ -45,23 +42,11 @@ def tiny() -> Bench:
 # The reference.
 
 
-def solved(family: Any, refinement: float) -> tuple[NormalProblem, reference.Reference]:
-    problem = NormalProblem.assemble(scene(family, refinement), approach=APPROACH)
-    return problem, reference.refine(problem, Newton().solve(problem).loads)
-
-
-def test_no_reference_where_long_double_is_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("convexrough.bench.reference.Long", np.float64)
-    problem = NormalProblem.assemble(scene("lattice", 1.0), approach=APPROACH)
-    with pytest.raises(cr.InputError, match="numbers longer than float64"):
-        reference.refine(problem, Newton().solve(problem).loads)
-
-
-@extended
 @pytest.mark.parametrize("family", ["lattice", "rough"])
 def test_reference_against_50_digits(family: Any) -> None:
-    problem, found = solved(family, 1.0)
-    asperities = problem.scene.asperities
+    each = scene(family, 1.0)
+    found = reference(each, APPROACH)
+    asperities = each.asperities
     exact = multiprecision.solve(
         asperities.positions,
         asperities.tip_radii,
@@ -70,37 +55,15 @@ def test_reference_against_50_digits(family: Any) -> None:
         contact_modulus=1.0,
         approach=APPROACH,
     )
-    loads = found.loads * problem.units.force  # a power of two
-    high = loads.astype(np.float64)
-    low = (loads - high).astype(np.float64)
-    with ctx.workdps(60):
-        off = [
-            abs(float(arb(float(h)) + arb(float(e)) - exact.loads[i]))
-            for i, h, e in zip(problem.candidates, high, low, strict=True)
-        ]
-    assert 0 < max(off) < 2e-18 * float(loads.max())
-    assert found.correction < 1e-17
-    assert found.residual < 1e-18
+    off = np.abs(multiprecision.errors(found.loads, exact.loads)).max() / found.loads.max()
+    assert 0 < off <= found.bound < 2e-16
+    assert found.error(found.loads * 1.001) == pytest.approx(1e-3, rel=1e-6)
 
 
-@extended
-def test_reference_improves_on_sloppy_loads() -> None:
-    problem, good = solved("lattice", 1.0)
-    loads = Newton().solve(problem).loads
-    again = reference.refine(problem, loads * 1.001)
-    assert good.error(again.loads.astype(np.float64)) < 1e-15
-    assert good.error(loads) < 1e-14
-    assert good.error(loads * 1.001) == pytest.approx(1e-3, rel=1e-6)
-
-
-@extended
-def test_reference_refuses_what_it_cannot_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = NormalProblem.assemble(scene("lattice", 1.0), load=1e-7)
-    with pytest.raises(cr.InputError, match="approach control"):
-        reference.refine(problem, np.zeros(len(problem)))
-    monkeypatch.setattr(reference, "MOST", 60)
-    with pytest.raises(cr.InputError, match="found 61 asperities, expected at most 60"):
-        solved("lattice", 1.0)
+def test_loads_that_are_not_proved_are_no_reference(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("convexrough.bench.reference.ACCURATE", 1e-20)
+    with pytest.raises(cr.SolverError, match=r"reference: loads proved to .* only"):
+        reference(scene("lattice", 1.0), APPROACH)
 
 
 # What is measured, and what is said of it.

@@ -1,12 +1,14 @@
 """Levels found together, in rows, against the same ones found one by one."""
 
 import pickle
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from levels_reference import SCENES
 from numpy.testing import assert_array_equal
 from path_scenes import shaded
 from scenes import NAMED, random_scenes
@@ -90,6 +92,35 @@ def test_what_is_better_alone_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> 
         if level is not None:
             apart = (alone.loads - level.loads).value
             assert (np.abs(apart) <= alone.loads.radius + level.loads.radius).all()
+
+
+def test_cycles_together_are_those_alone() -> None:
+    scene, approach = NAMED["rough"]
+    contact, alone = (cr.press(replace(scene, friction=0.5), approach=approach) for _ in range(2))
+    maxima = 0.5 * contact.load * np.array([1e-3, 0.2, 0.0, 0.9, 1.0])
+    for found, maximum in zip(cr.cycles(contact, maxima), maxima, strict=True):
+        one = cr.cycle(alone, maximum=maximum)
+        assert found.order == one.order == "proved"
+        assert (found.status == one.status).all()
+        assert (found.loss, found.loss_first) == (one.loss, one.loss_first)
+        assert found.displacement_amplitude == one.displacement_amplitude
+        assert found.loss_error <= 2 * one.loss_error
+        assert_array_equal(found.asperity_losses, one.asperity_losses)
+
+
+def test_order_is_proved_when_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Row sums do not prove it here, and without an inverse no loss is proved; asked once, all."""
+    scene, approach = SCENES["dense"]
+
+    def loss_error(contact: cr.Contact) -> float:
+        return cr.cycle(contact, maximum=0.1 * contact.load).loss_error
+
+    asked, unasked = (cr.press(scene, approach=approach) for _ in range(2))
+    monkeypatch.setattr(FrictionLevels.order, "__defaults__", (5,))
+    assert np.isinf(loss_error(unasked))
+    assert cr.prove_order(asked, most=5) == "proved for one step"
+    assert cr.prove_order(asked) == "proved"
+    assert loss_error(asked) < 1e-12 * cr.cycle(asked, maximum=0.1 * asked.load).loss
 
 
 def test_shares_of_a_loss_where_the_load_varies() -> None:

@@ -22,25 +22,26 @@ from convexrough.gallery import any_size, cases
 
 NAMES = gallery.names()
 
-#: Where float64 cannot tell, or nothing is proved; one asperity of the first, all of the others.
-UNDECIDED: dict[str, int] = {}
-
 #: Of the last of 50 digits.
 UNIT = Fraction(1, 10**49)
 
 #: 64 bristles are off by about 1 / 64^2, which a Newton step squares; the others are nearer.
 SQUARED = 64.0**-4
 
+#: Newton's method is in every other test, and CVXPY sends Clarabel what Conic does.
 SOLVERS = [
-    solvers.Newton(),
     solvers.Conic(),
-    solvers.ConicCVXPY(),
     solvers.ConicCVXPY(solver="QOCO"),
     solvers.ConicCVXPY(solver="SCS"),
     solvers.BristleQP(),
 ]
 
 each_case = pytest.mark.parametrize("name", NAMES)
+
+#: Scales, vectors and proofs are asked of the first case of each family: what differs inside a
+#: family is how near a thing is to happening.
+FIRST = [*{gallery.case(name).family: name for name in reversed(NAMES)}.values()]
+each_family = pytest.mark.parametrize("name", FIRST)
 
 #: A case and an operator that it allows.
 each_operator = pytest.mark.parametrize(
@@ -133,7 +134,7 @@ def test_words_and_bounds_when_pressed(name: str, operator: Any) -> None:
     assert within(proof.gaps, case.gaps, proof.gap_errors)
     assert within(proof.approach, [case.exact_approach], proof.approach_error)
     if operator == "dense":
-        assert (contact.status == "undecided").sum() == UNDECIDED.get(name, 0)
+        assert (contact.status != "undecided").all()
 
 
 @pytest.mark.parametrize(
@@ -153,7 +154,7 @@ def test_proofs_end_where_the_cases_say(threshold: str, below: str, above: str) 
     assert scopes == [below, above]
 
 
-@pytest.mark.sample(60)
+@pytest.mark.sample(40)
 @each_case
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: solver.name)
 def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
@@ -191,8 +192,8 @@ def test_sheared_and_cycled(name: str) -> None:
     assert within(state.displacement, [case.displacement], proof.displacement_error)
 
 
-@pytest.mark.sample(15)
-@each_case
+@pytest.mark.sample(6)
+@each_family
 def test_sheared_with_vectors(name: str) -> None:
     """At nu = 0 the tensor is the scalar kernel, and the answer is that of Ciavarella and Jaeger.
 
@@ -205,27 +206,6 @@ def test_sheared_with_vectors(name: str) -> None:
     if case.forces:
         assert true_shear_words(case, state.status)
         assert within(state.forces[:, 0], case.forces, state.certificate.force_errors)
-
-
-@pytest.mark.sample(15)
-@each_case
-@pytest.mark.parametrize(
-    "solver", [cr.FrictionNewton(), cr.FrictionConic()], ids=["newton", "conic"]
-)
-def test_vector_friction_by_both_solvers(name: str, solver: Any) -> None:
-    """With the full kernel no exact answer is known: each must not exclude the default's."""
-    contact, force = pressed(name), gallery.case(name).shear_force
-    first = cr.shear_vector(contact, force=force)
-    try:
-        second = cr.shear_vector(contact, force=force, solver=solver)
-    except (cr.SolverError, cr.InputError):
-        assert isinstance(solver, cr.FrictionConic)
-        return
-    apart = np.hypot(*(first.forces - second.forces).T)
-    bounds = first.certificate.force_errors + second.certificate.force_errors
-    assert (apart <= bounds * (1 + 1e-12)).all()
-    both = (first.status != "undecided") & (second.status != "undecided")
-    assert np.array_equal(first.status[both], second.status[both])
 
 
 @pytest.mark.parametrize("name", ["reversals-random", "reversals-nested"])
@@ -270,14 +250,13 @@ def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
     return cr.Scene(radius, asperities, material, scene.friction, scene.geometry)
 
 
-@pytest.mark.sample(15)
-@each_operator
+@pytest.mark.sample(8)
+@each_family
 @pytest.mark.parametrize(("length", "modulus"), [(2.0**5, 2.0**-4), (2.0**-11, 2.0**10)])
-def test_powers_of_two_scale_every_bit(
-    name: str, operator: Any, length: float, modulus: float
-) -> None:
+def test_powers_of_two_scale_every_bit(name: str, length: float, modulus: float) -> None:
     """Where the exponents differ by a multiple of 3: k is a cube root, which must scale, too."""
     case = gallery.case(name)
+    operator = operators(case.scene)[-1]  # the least like a matrix
     one, force = pressed(name, operator), modulus * length**2
     factor = length if case.load is None else force
     control = {key: value * factor for key, value in case.control.items()}
@@ -295,20 +274,6 @@ def test_powers_of_two_scale_every_bit(
     assert loss == cr.cycle(one, maximum=case.shear_force).loss * force * length
 
 
-@pytest.mark.sample(15)
-@each_case
-def test_other_powers_of_two_agree_within_the_bounds(name: str) -> None:
-    """Their cube roots are rounded anew."""
-    case, one = gallery.case(name), pressed(name)
-    control = {key: 2 * value if key == "approach" else 4 * value for key, value in
-               case.control.items()}  # fmt: skip
-    other = cr.press(scaled(case.scene, 2.0, 1.0), **control)
-    assert true_words(case, other.status)
-    bounds = other.certificate.load_errors / 4
-    assert within(other.loads / 4, case.loads, bounds)
-    assert case.judge(other.loads / 4).error < 1e-13 or one.certificate.scope == "none"
-
-
 @pytest.mark.sample(20)
 @each_case
 def test_verify_is_not_fooled(name: str) -> None:
@@ -316,7 +281,7 @@ def test_verify_is_not_fooled(name: str) -> None:
     case, contact = gallery.case(name), pressed(name)
     loads = np.array([float(each) for each in case.loads])
     right = cr.verify(case.scene, loads, **case.control)
-    assert right.holds == (name not in UNDECIDED)
+    assert right.holds
     assert true_words(case, right.status)
     least = int(np.argmin(np.where(case.touching, loads, np.inf)))
     forgotten = loads.copy()
@@ -336,8 +301,8 @@ def test_verify_is_not_fooled(name: str) -> None:
         assert true_words(case, verdict.status)
 
 
-@pytest.mark.sample(20)
-@each_case
+@pytest.mark.sample(10)
+@each_family
 def test_proofs_are_accepted_or_refused(name: str) -> None:
     """By exact arithmetic that shares no code with anything else here."""
     case, contact = gallery.case(name), pressed(name)

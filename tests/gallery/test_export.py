@@ -72,27 +72,20 @@ def test_bristle_programs(name: str, pack: Path, index: Any) -> None:
         judged(name, about, qpsolvers.solve_problem(problem, solver, **given).x, about["off"])
 
 
-@pytest.mark.sample(20)
-@each_case
-def test_cone_programs_by_clarabel(name: str, pack: Path, index: Any) -> None:
-    about = program(index, name, "cones.json")
-    if about is None:
-        return
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    found = clarabel.load_from_file(str(pack / f"{name}.cones.json"), settings).solve()
-    judged(name, about, found.x, NEAR)
-    assert abs(found.obj_val - about["objective"]) < 1e-7 * max(abs(about["objective"]), 1e-3)
-
-
 @pytest.mark.sample(12)
 @each_case
 def test_cone_programs_by_another_solver(name: str, pack: Path, index: Any) -> None:
+    """By Clarabel's own reader, and by SCS, which takes the numbers of the same file."""
     about = program(index, name, "cones.json")
     if about is None:
         return
-    data = json.loads((pack / f"{name}.cones.json").read_text())
+    path = pack / f"{name}.cones.json"
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+    first = clarabel.load_from_file(str(path), settings).solve()
+    assert abs(first.obj_val - about["objective"]) < 1e-7 * max(abs(about["objective"]), 1e-3)
+    data = json.loads(path.read_text())
 
     def matrix(part: Any) -> Any:
         columns = part["nzval"], part["rowval"], part["colptr"]
@@ -102,9 +95,9 @@ def test_cone_programs_by_another_solver(name: str, pack: Path, index: Any) -> N
     given |= {"b": np.array(data["b"]), "c": np.array(data["q"])}
     zero, *orders = data["cones"]
     cones = {"z": zero["ZeroConeT"], "q": [cone["SecondOrderConeT"] for cone in orders]}
-    settings = {"eps_abs": TOLERANCE, "eps_rel": TOLERANCE, "max_iters": 50_000}
-    found = scs.SCS(given, cones, verbose=False, **settings).solve()
-    judged(name, about, found["x"], NEAR)
+    limits = {"eps_abs": TOLERANCE, "eps_rel": TOLERANCE, "max_iters": 50_000}
+    for x in (first.x, scs.SCS(given, cones, verbose=False, **limits).solve()["x"]):
+        judged(name, about, x, NEAR)
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning:picos")  # of PICOS' reader, by itself
@@ -126,20 +119,6 @@ def test_cbf(name: str, pack: Path, index: Any) -> None:
     assert isinstance(problem, picos.Problem)
 
 
-def test_a_file_with_one_number_changed_is_found_out(pack: Path, index: Any) -> None:
-    """The tests above can fail: here they do."""
-    about = program(index, "two-equal", "cones.json")
-    data = json.loads((pack / "two-equal.cones.json").read_text())
-    data["q"][0] *= 1.01
-    changed = pack / "changed.json"
-    changed.write_text(json.dumps(data))
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    found = clarabel.load_from_file(str(changed), settings).solve()
-    with pytest.raises(AssertionError):
-        judged("two-equal", about, found.x, NEAR)
-
-
 def test_the_index(pack: Path, index: Any) -> None:
     assert list(index) == list(gallery.names())
     page = (pack / "index.md").read_text()
@@ -157,7 +136,7 @@ def test_the_index(pack: Path, index: Any) -> None:
     assert left_out == {"convexity-end-above"}
     written = {path.name for path in pack.iterdir()}
     listed = set(json.loads((pack / "files.json").read_text())["files"])
-    assert written - listed <= {"files.json", "changed.json"}
+    assert written - listed <= {"files.json"}
 
 
 def test_the_command(command: Any, tmp_path: Path) -> None:

@@ -251,7 +251,7 @@ def test_crowding() -> None:
     assert operator.smoother(radii) is None
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.floats(0.3, 4))
 def test_shell_lemma(seed: int, count: int, shape: float) -> None:
     """A + diag(1 / (pi E* s_i)) is positive semidefinite for any layout."""

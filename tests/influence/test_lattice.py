@@ -63,7 +63,7 @@ def assert_spans(lattice: Lattice, basis: Array) -> None:
 # Finding a lattice.
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from(sorted(BASES)),
     st.integers(3, 200),
@@ -123,7 +123,7 @@ def test_blur_is_a_bound(name: str, shift: float) -> None:
             assert abs(Fraction(float(point[c])) - site) <= Fraction(lattice.blur)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.sampled_from(sorted(BASES)), st.integers(0, 2**32 - 1), st.floats(0.3, 1.0))
 def test_holes_do_not_hide_a_lattice(name: str, seed: int, coverage: float) -> None:
     """Also where most sites are empty, except around the middle, where it is looked for."""
@@ -137,7 +137,7 @@ def test_holes_do_not_hide_a_lattice(name: str, seed: int, coverage: float) -> N
     assert_spans(lattice, basis)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(5, 200))
 def test_scattered_points_are_refused(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
@@ -232,7 +232,7 @@ def test_products(name: str, count: int, shift: float) -> None:
         assert_allclose(single, exact, rtol=0, atol=1e-6 * top)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.sampled_from(sorted(BASES)), st.integers(0, 2**32 - 1), st.integers(1, 60))
 def test_random_sublattices(name: str, seed: int, count: int) -> None:
     """`among` some, in any order, and `onto` others on the lattice and off it."""
@@ -260,8 +260,9 @@ def test_random_sublattices(name: str, seed: int, count: int) -> None:
             assert (coupling.falloff(loads, power) >= inverse**power @ loads).all()
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", BASES)
-@pytest.mark.parametrize("count", [30, 300, 3000])
+@pytest.mark.parametrize("count", [30, 300, 2000])
 def test_falloff(name: str, count: int) -> None:
     """An upper bound, high by at most a few per cent of the largest."""
     points = patch(turned(BASES[name], 0.3), count)
@@ -289,7 +290,7 @@ def test_the_matrix_is_the_dense_one() -> None:
         LatticeInfluence.assemble(points + 0.1, A.lattice, SCALE)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from(sorted(BASES)),
     st.integers(0, 2**32 - 1),
@@ -305,7 +306,7 @@ def test_crowding(name: str, seed: int, coverage: float, width: float) -> None:
     assert A.crowding(radii) == pytest.approx(dense.crowding(radii), rel=1e-12)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from(sorted(BASES)),
     st.integers(0, 2**32 - 1),
@@ -352,6 +353,7 @@ def test_passes_of_the_transforms() -> None:
             assert lost(fft.rfft(y), y) <= bound
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (8, 1), (2, 3), (33, 47), (50, 31)])
 @pytest.mark.parametrize("power", [1, 2, 3])
 def test_convolutions(shape: tuple[int, int], power: int) -> None:
@@ -380,7 +382,7 @@ def test_convolutions(shape: tuple[int, int], power: int) -> None:
             assert lost.max() <= box.bound_each(kernel, roundoff) * size
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from(sorted(BASES)),
     st.integers(0, 2**32 - 1),

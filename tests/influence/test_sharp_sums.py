@@ -160,6 +160,7 @@ def scattered_loads(rng: np.random.Generator, count: int) -> Array:
     return np.asarray(rng.choice([-1.0, 1.0], count) * rng.random(count) ** 3)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("order", [4, 12, 26])
 @pytest.mark.parametrize("crowded", [False, True])
 def test_loads_on_nodes(order: int, crowded: bool) -> None:
@@ -176,7 +177,7 @@ def test_loads_on_nodes(order: int, crowded: bool) -> None:
     assert field.high.shape == weights.shape
     missed = 0
     heavy = np.stack(np.unravel_index(np.argsort(-np.abs(plain), axis=None)[:200], plain.shape))
-    for a, b in rng.permutation(heavy.T)[:15].tolist():
+    for a, b in rng.permutation(heavy.T)[:8].tolist():
         true = total = Fraction(0)
         # A stencil begins at its cell, as nodes are counted from 1 - p/2.
         nodes = np.stack((a - placed.cells[:, 0], b - placed.cells[:, 1]), axis=1)
@@ -190,13 +191,14 @@ def test_loads_on_nodes(order: int, crowded: bool) -> None:
         found = Fraction(float(field.high[a, b])) + Fraction(float(field.low[a, b]))
         assert abs(found - true) <= min(error, 1e-19 * total + 1e-20)
         missed += abs(Fraction(float(plain[a, b])) - true) > 1e-19 * total + 1e-20
-    assert missed > 2
+    assert missed > 1
     met = np.zeros(weights.shape)
     for i, j in placed.cells.tolist():
         met[i : i + order, j : j + order] += 1
     assert sharp._met(product) == met.max()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("order", [4, 12, 26])
 def test_values_at_points(order: int) -> None:
     rng = np.random.default_rng(order)
@@ -212,7 +214,7 @@ def test_values_at_points(order: int) -> None:
     assert (exactly == np.rint(exactly)).all()
     plain = weights.from_nodes(whole + rest) * 2.0**-40
     missed = 0
-    for k in range(0, 200, 8):
+    for k in range(0, 200, 20):
         true = Fraction(0)
         factors = [
             [weight(float(placed.shares[k, c]), n + 1 - order // 2, order) for n in range(order)]
@@ -232,7 +234,7 @@ def test_values_at_points(order: int) -> None:
         found = (Fraction(float(exactly[k])) + Fraction(float(left[k]))) * Fraction(unit)
         assert abs(found - true) <= Fraction(rounding) * Fraction(unit)
         missed += abs(Fraction(float(plain[k])) - true) > Fraction(rounding) * Fraction(unit)
-    assert missed > 5
+    assert missed > 2
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

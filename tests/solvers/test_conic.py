@@ -304,8 +304,8 @@ def test_solvers_that_cvxpy_has_not(monkeypatch: pytest.MonkeyPatch) -> None:
     """Unknown, not installed, or not one for cones: an error that says which there are."""
     problem = problem_of(paper(), PAPER_APPROACH)
     for name, said in (
-        ("none", r"^conic in CVXPY \(NONE\).*: CVXPY knows no solver NONE; valid: .*CLARABEL"),
-        ("scss", r'knows no solver SCSS; did you mean "SCS"'),
+        ("none", r"^conic in CVXPY \(NONE\).*: CVXPY has no solver NONE; valid: .*CLARABEL"),
+        ("scss", r'has no solver SCSS; did you mean "SCS"'),
         ("OSQP", r"OSQP has no second-order cones; choose one of .*, or solvers.BristleQP"),
         ("highs", "HIGHS has no second-order cones"),
         ("gurobi", "GUROBI is not installed; .*; pip install gurobipy, or"),

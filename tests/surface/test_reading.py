@@ -142,7 +142,10 @@ def topographies() -> Any:
         return import_module("SurfaceTopography")
 
 
-@pytest.mark.skipif(find_spec("SurfaceTopography") is None, reason="the extra surface is missing")
+@pytest.mark.skipif(
+    find_spec("SurfaceTopography") is None,
+    reason="instruments' files are read by SurfaceTopography, which only they need: pip install it",
+)
 class TestInstruments:
     """Round trips through formats that SurfaceTopography writes, too."""
 

@@ -21,8 +21,8 @@ from sweep_files import SMALL, same, started, tables, told, toml
 import convexrough as cr
 from convexrough.sweeps.folder import open_folder
 
-CONTENTS = tables(sweep={"seeds": 60})
-SCENES, PARTS = 240, 30
+CONTENTS = tables(sweep={"seeds": 16, "measure": ["load"]})
+SCENES, PARTS = 64, 32
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ def test_workers_are_killed_at_any_moment(
         nonlocal left
         children = psutil.Process().children()
         workers = [each for each in children if "spawn_main" in " ".join(each.cmdline())]
-        if left and workers and "of 240 scenes" in news:
+        if left and workers and "of 64 scenes" in news:
             chance.choice(workers).kill()
             left -= 1
 
@@ -133,7 +133,7 @@ sys.exit(main(["sweep", "a.toml", "--workers", "2"]))
 @pytest.mark.parametrize("event", ["a-sweep/manifest.json", "a-sweep/parts/*.parquet"])
 def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, event: str) -> None:
     """As soon as there is a folder, and as soon as there is a part; the terminal tells workers."""
-    (tmp_path / "a.toml").write_text(toml(tables(sweep={"seeds": 1000})))
+    (tmp_path / "a.toml").write_text(toml(tables(sweep={"seeds": 1000, "measure": ["load"]})))
     process = scripted(tmp_path, INTERRUPTIBLE)
     while not list(tmp_path.glob(event)):
         assert process.poll() is None
@@ -158,7 +158,7 @@ import resource
 import convexrough as cr
 from sweep_files import told
 def fill(news):
-    if "of 240 scenes" in news:
+    if "of 64 scenes" in news:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
 try:
     with told(fill):

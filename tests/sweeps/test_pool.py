@@ -27,8 +27,9 @@ from convexrough.sweeps.sweep import run
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
 SPAWN = multiprocessing.get_context("spawn")
 
-PLAN = plan_of(tables(sweep={"seeds": 10}), Path("sweep"))
-WHOLE = cr.sweep(tables(sweep={"seeds": 10}), executor=ThreadPoolExecutor(1))
+MANY = tables(sweep={"seeds": 10, "measure": ["contact", "load"]})
+PLAN = plan_of(MANY, Path("sweep"))
+WHOLE = cr.sweep(MANY, executor=ThreadPoolExecutor(1))
 
 
 class Shuffled(Executor):
@@ -48,7 +49,7 @@ class Shuffled(Executor):
 
 @pytest.mark.parametrize("workers", [1, 2, 3])
 def test_processes(workers: int) -> None:
-    assert same(cr.sweep(tables(sweep={"seeds": 10}), workers=workers), WHOLE)
+    assert same(cr.sweep(MANY, workers=workers), WHOLE)
 
 
 @pytest.mark.parametrize(
@@ -58,7 +59,7 @@ def test_processes(workers: int) -> None:
 )
 def test_executors(executor: Any) -> None:
     given = executor()
-    assert same(cr.sweep(tables(sweep={"seeds": 10}), executor=given), WHOLE)
+    assert same(cr.sweep(MANY, executor=given), WHOLE)
     given.shutdown()
 
 
@@ -66,7 +67,7 @@ def test_executors(executor: Any) -> None:
 def test_batches(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan, "MOST_SCENES", most)
     with ThreadPoolExecutor(1) as here:
-        assert same(cr.sweep(tables(sweep={"seeds": 10}), executor=here), WHOLE)
+        assert same(cr.sweep(MANY, executor=here), WHOLE)
 
 
 def deadly(whole: Plan, worst: int) -> Plan:
@@ -169,12 +170,12 @@ def test_dask(cluster: Any) -> None:
 
 
 def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
-    contents = tables(sweep={"seeds": 60})
+    contents = tables(sweep={"seeds": 16, "measure": ["load"]})
     plan = plan_of(contents, Path("sweep"))
     killed: list[int] = []
 
     def kill(news: str) -> None:
-        if "of 240 scenes" in news and not killed:
+        if "of 64 scenes" in news and not killed:
             killed.append(random.choice(workers))
             os.kill(killed[0], signal.SIGKILL)
 

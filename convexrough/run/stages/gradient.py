@@ -23,7 +23,7 @@ from convexrough.tabular.units import UnitNames
 #: What a scene file may ask the gradient of, and its letter.
 LETTERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
 
-#: What it may ask it by, asperity by asperity, and the word for one of them.
+#: Parameters per asperity, and the name of one of them.
 EACH = {"heights": "height", "tip_radii": "tip_radius", "positions": "position"}
 
 #: What is one number for the whole scene.

@@ -1,4 +1,4 @@
-"""[shakedown]: how far a path may be scaled before somebody slides for ever."""
+"""[shakedown]: the largest factor of a path for which sliding ends."""
 
 from __future__ import annotations
 
