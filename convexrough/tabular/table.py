@@ -159,9 +159,9 @@ def read_table(
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
     others = [quote(name) for name in left if name.lower() not in INDEX]
     other = others[0] if len(others) == 1 == len(missing) else "NAME"
-    advice = f"; --column {{}}={other} names another" if how.scalable else ""
     mistakes += [
-        f"columns: found {_named(source)}, expected a column {each!r}{advice.format(each)}"
+        f"columns: found {_named(source)}, expected a column {each!r}"
+        + (f"; --column {each}={other} names another" if how.scalable else "")
         for each in missing
         if each not in how.columns
     ]
