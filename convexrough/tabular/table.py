@@ -158,10 +158,11 @@ def read_table(
     missing = [name for name in required if name not in places]
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
     others = [quote(name) for name in left if name.lower() not in INDEX]
-    other = others[0] if len(others) == 1 == len(missing) else "NAME"
-    advice = f"; --column {{}}={other} names another" if how.scalable else ""
+    short = len(others) == 1 == len(missing) and len(others[0]) < 40
+    other = others[0] if short else "NAME"
     mistakes += [
-        f"columns: found {_named(source)}, expected a column {each!r}{advice.format(each)}"
+        f"columns: found {_named(source)}, expected a column {each!r}"
+        + (f"; --column {each}={other} names another" if how.scalable else "")
         for each in missing
         if each not in how.columns
     ]

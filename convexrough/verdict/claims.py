@@ -244,7 +244,6 @@ class _Placing:
         self.how = f"matched by position, to {distances.max():.2g}"
         if far.mean() > 0.5 and (moved := self._moved(points, allowed)):
             self.mistakes.append(f"positions: {moved}")
-            return owners  # the cause says it of all
         for i in np.flatnonzero(far):
             found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"
             self._refuse(i, found, f"a position of the scene to {allowed:.3g}")

@@ -179,7 +179,11 @@ def test_the_command(command: Any, tmp_path: Path) -> None:
     assert (ran.status, ran.err) == (0, "")
     folder = tmp_path / "scene-programs"
     index = json.loads((folder / "index.json").read_text())
-    assert {path.name for path in folder.iterdir()} == {*index["programs"], "index.json"}
+    assert {path.name for path in folder.iterdir()} == {
+        *index["programs"],
+        "index.json",
+        "files.json",
+    }
     assert len(index["programs"]) == 8
     assert "least objective -1.78" in ran.out
     about = index["programs"]["scene.cones.json"]
