@@ -57,7 +57,7 @@ class Response(NamedTuple):
 class Springs(NamedTuple):
     """The contacts of a level as linear springs: what `Level.response` solves with.
 
-    touching  : (n,) whose springs are known;  doubtful : those that may or may not touch
+    touching  : (n,) whose springs are known;  doubtful : others that may touch, or just do
     slopes    : (n,) c = dP/dn, 0 where not touching;  stiffness : 1/c, likewise
     bound     : (n,) h, at most 1/c of any that may touch; infinite where open
     margin    : mu of the theorem, with H = diag(h); 0 where nothing is proved
@@ -155,7 +155,7 @@ class Level:
             slopes = np.where(inside, 1.0 / np.where(inside, stiffness.value, 1.0), 0.0)
             return Springs(inside, ~inside & False, slopes, stiffness, nowhere, 0.0)
         softness = 1.5 / self.problem.exact.coefficients * self.loads.cbrt()
-        touching = self.touching
+        touching = self.touching & self.loads.positive  # else nothing bounds its stiffness
         with np.errstate(divide="ignore"):
             known = np.maximum(found.stiffness, (1.0 - SAFETY) / softness.upper)
         bound = np.where(self.open, np.inf, known)

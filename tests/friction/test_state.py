@@ -179,3 +179,19 @@ def test_random_scenes(drawn: tuple[cr.Scene, float], fraction: float, nu: float
 def test_a_force_is_a_number(force: object) -> None:
     with pytest.raises(cr.InputError):
         cr.shear(pressed("paper"), force=force)  # type: ignore[arg-type]
+
+
+def test_onsets_do_not_depend_on_levels_found_before() -> None:
+    """At a root an asperity touches with a load that no ball tells from 0: its spring is unknown."""
+    asperities = cr.Asperities.hexagonal(
+        spacing=0.0025, tip_radius=0.02, within=0.0102, height_std=1e-6, seed=1
+    )
+    scene = cr.Scene(1.0, asperities, MATERIAL, FRICTION, geometry="summit")
+    onsets = []
+    for amplitudes in ((), (0.1, 0.2, 0.3, 0.37, 0.4, 0.5)):
+        contact = cr.press(scene, load=3e-7)
+        for amplitude in amplitudes:
+            cr.cycle(contact, maximum=amplitude * FRICTION * 3e-7)
+        onsets.append(cr.onset_of_sliding(contact))
+    assert np.isfinite(onsets[0]).sum() == (contact.status == "contact").sum()
+    assert_allclose(onsets[1], onsets[0], rtol=1e-15)
