@@ -14,6 +14,8 @@ PATH = click.Path(path_type=Path)
 proof_option = click.option(
     "--proof", is_flag=True, help="Write proof.json, which `convexrough check` verifies."
 )
+#: What figures can be saved as.
+FORMATS = ("png", "svg", "pdf")
 solver_option = click.option(
     "--solver", "solvers", metavar="NAME", multiple=True, callback=lambda *given: _from_here(given),
     help="A solver of the package, or your package.Class; may be repeated.",
@@ -29,6 +31,26 @@ def _from_here(given: tuple[Any, ...]) -> Any:
     if given[-1] and "" not in sys.path:
         sys.path.insert(0, "")
     return given[-1]
+
+
+def figure_options(command: Command) -> Command:
+    """How figures are saved: `formats`, a tuple, and `dpi`."""
+    for option in (
+        click.option("--dpi", type=click.IntRange(50, 600), default=200, show_default=True,
+                     help="Pixels per inch of figures."),
+        click.option("--formats", metavar="LIST", default="png,svg", show_default=True,
+                     callback=lambda *given: _formats(given[-1]),
+                     help="Formats of figures: png, svg, pdf."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+def _formats(given: str) -> tuple[str, ...]:
+    formats = tuple(each.strip().lower() for each in given.split(","))
+    if unknown := [each for each in formats if each not in FORMATS]:
+        raise click.BadParameter(f"found {unknown[0]!r}, expected {', '.join(FORMATS)}")
+    return formats
 
 
 def output_options(command: Command) -> Command:

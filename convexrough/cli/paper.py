@@ -6,14 +6,23 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.options import html_option, output_options
+from convexrough.cli.options import figure_options, html_option, output_options
 from convexrough.cli.speech import progress, say, written
 
 
 @click.command()
 @html_option
+@figure_options
 @output_options
-def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool, html: bool) -> int:
+def paper(
+    out: Path | None,
+    no_figures: bool,
+    force: bool,
+    as_json: bool,
+    html: bool,
+    formats: tuple[str, ...],
+    dpi: int,
+) -> int:
     """Reproduce the source paper's example (Dini and Hills 2009)."""
     from convexrough.paper import example
     from convexrough.paper.figure_data import figure_data
@@ -38,7 +47,7 @@ def paper(out: Path | None, no_figures: bool, force: bool, as_json: bool, html: 
         if not no_figures:
             from convexrough.paper.figures import paper_figures
 
-            files += write_figures(new, paper_figures(contact))
+            files += write_figures(new, paper_figures(contact), formats=formats, dpi=dpi)
         if html:
             page = slider_page(found[0], UnitNames())
             files.append(write_text(new / "slider.html", page))

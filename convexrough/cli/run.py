@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from convexrough.cli.options import PATH, html_option, output_options, proof_option
+from convexrough.cli.options import PATH, figure_options, html_option, output_options, proof_option
 from convexrough.cli.proof import proved
 from convexrough.cli.speech import DONE, NOT_CERTIFIED, blamed_on, progress, say, written
 from convexrough.errors import FileError
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 @click.argument("scene", type=PATH)
 @proof_option
 @html_option
+@figure_options
 @output_options
 def run(
     scene: Path,
@@ -32,6 +33,8 @@ def run(
     as_json: bool,
     html: bool,
     proof: bool,
+    formats: tuple[str, ...],
+    dpi: int,
 ) -> int:
     """Compute a scene file; write tables, certificate and figures.
 
@@ -63,7 +66,8 @@ def run(
             page = slider_page(results[0], file.units) if html else ""
         evidence = _proved(results) if proof else None
         with progress("writing results"):
-            files = write_results(new, results, figures=not no_figures, units=file.units)
+            saved: dict[str, Any] = {"formats": formats, "dpi": dpi}
+            files = write_results(new, results, figures=not no_figures, units=file.units, **saved)
             files.append(write_text(new / "scene.toml", file.text))
             if html:
                 files.append(write_text(new / "slider.html", page))

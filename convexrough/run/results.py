@@ -113,8 +113,11 @@ def write_results(
     figures: bool,
     units: UnitNames | None = None,
     more: Mapping[str, Any] | None = None,
+    **saved: Any,
 ) -> list[Path]:
     """Write the tables of all results, their figures, and summary.json with `more`; the paths.
+
+    saved : formats and dpi of figures, as for `write_figures`
 
     Raises FileError.
     """
@@ -127,7 +130,7 @@ def write_results(
         for result in results:
             tell(f"drawing {result.name}")
             drawn = result.figures(length_unit=units.length, force_unit=units.force)
-            written += write_figures(folder, drawn)
+            written += write_figures(folder, drawn, **saved)
     path = folder / "summary.json"
     write_json(path, summarise(results) | dict(more or {}))
     return [path, *written]
@@ -153,16 +156,22 @@ def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> list[
     return [_write_columns(folder / f"{name}.csv", table) for name, table in tables.items()]
 
 
-def write_figures(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
-    """Write each figure as PNG and SVG; the paths."""
+def write_figures(
+    folder: Path,
+    figures: Mapping[str, Figure],
+    *,
+    formats: Sequence[str] = ("png", "svg"),
+    dpi: int = 200,
+) -> list[Path]:
+    """Write each figure in each format; the paths."""
     from convexrough.plots import save  # matplotlib: only when it draws
 
     written = []
     for stem, figure in figures.items():
-        for kind in ("png", "svg"):
+        for kind in formats:
             path = folder / f"{stem}.{kind}"
             with replacing(path) as temporary:
-                save(figure, temporary, kind)
+                save(figure, temporary, kind, dpi)
             written.append(path)
             figure.set_layout_engine("none")  # laid out once: the second file takes half the time
     return written

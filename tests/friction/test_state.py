@@ -182,7 +182,7 @@ def test_a_force_is_a_number(force: object) -> None:
 
 
 def test_onsets_do_not_depend_on_levels_found_before() -> None:
-    """At a root an asperity touches with a load that no ball tells from 0: its spring is unknown."""
+    """At a root an asperity touches with a load that no ball tells from 0."""
     asperities = cr.Asperities.hexagonal(
         spacing=0.0025, tip_radius=0.02, within=0.0102, height_std=1e-6, seed=1
     )

@@ -148,7 +148,7 @@ def test_figures_without_a_smooth_reference(command: Any, tmp_path: Path) -> Non
     assert command("run", "scene.toml", "--out", "found").status == 0
     for kind in ("svg", "png"):
         drawn = {path.stem for path in (tmp_path / "found").glob(f"*.{kind}")}
-        assert drawn == {"pressure", "loads", "hysteresis", "loss"}
+        assert drawn == {"pressure", "loads", "hysteresis", "loss", "fretting"}
 
 
 def test_like_bodies_have_nothing_to_say(command: Any, tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Loop, cycles, loops
+from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.run.stage import Columns, Result, Stage, Summary, limit, numbers_of
 from convexrough.run.values import Fractions, Mistake, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
@@ -126,12 +127,21 @@ class Cycled(Result):
             chosen = stage.loop_asperities
         return loops(self.found, stage.loop_points or affordable, None, chosen)
 
+    @cached_property
+    def worn(self) -> list[Fretting]:
+        """Slip, losses and tractions of each asperity in each cycle."""
+        return [fretting(each) for each in self.found]
+
     def prepare(self, *, figures: bool) -> None:
         super().prepare(figures=figures)
-        _ = self.loops
+        _ = self.loops, self.worn
 
     def tables(self) -> dict[str, Columns]:
-        """With the points of loops, macroscopic ("total") and of some asperities."""
+        """With the fretting of each asperity, and loops: macroscopic ("total") and of some."""
+        touching = int(np.count_nonzero(self.contact.loads))
+        worn = dict(fretting_columns(self.worn))
+        for name in self.stage.labels:  # as fractions, as in the other tables
+            worn[name] = np.repeat([row[name] for row in self.known], touching)
         parts: list[tuple[float, float, str, Any, Any]] = []
         for row, loop in zip(self.known, self.loops, strict=True):
             ends = (row["maximum"], row["minimum"])
@@ -147,7 +157,7 @@ class Cycled(Result):
             name: np.concatenate(it) if name in ("force", "displacement") else np.repeat(it, sizes)
             for name, it in columns.items()
         }
-        return {**super().tables(), "loop": loop_table}
+        return {**super().tables(), "loop": loop_table, "fretting": worn}
 
     @property
     def smooth(self) -> bool:
@@ -163,6 +173,8 @@ class Cycled(Result):
         return [*super().lines(units), *([] if self.smooth else [said])]
 
     def figures(self, **units: Any) -> Mapping[str, Any]:
-        from convexrough.plots import cycle_figures  # matplotlib: only when it draws
+        from convexrough.plots import cycle_figures, fretting_figures  # only when it draws
 
-        return cycle_figures(self.found, loops=self.loops, **units)
+        widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
+        drawn = cycle_figures(self.found, loops=self.loops, **units)
+        return {**drawn, **fretting_figures(widest, **units)}
