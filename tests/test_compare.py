@@ -264,7 +264,7 @@ def test_command_in_json(command: Any, tmp_path: Path) -> None:
     ran = command("compare", "a.toml", "--json")
     assert (ran.status, ran.err) == (0, "")
     summary = json.loads(ran.out)
-    assert (summary["schema"], summary["version"]) == (1, cr.__version__)
+    assert (summary["schema"], summary["version"]) == (2, cr.__version__)
     assert summary["contradictions"] == []
     assert [row["solver"] for row in summary["compare"]] == NAMES
     for row in summary["compare"]:

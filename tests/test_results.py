@@ -81,6 +81,7 @@ def results() -> dict[str, Any]:
         cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)[0],
         cycle.gradient(),
         cr.fretting(cycle),
+        cr.program(scene, approach=PAPER_APPROACH),
         contact.change(cr.Direction(heights=1e-8)),
         state.change(cr.Direction(heights=1e-8)),
         cr.Direction(heights=1e-8),

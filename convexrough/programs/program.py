@@ -51,6 +51,10 @@ class Program(Record):
     constant    : what is added to the objective for the energy, in energy_unit: nothing under
         approach control, and the work of the level that the program counts from under load control
     off         : about how far an exact solution is from the contact's loads, over the largest
+
+    >>> program = cr.program(scene, "bristles", approach=5e-5, bristles=16)
+    >>> program.what, len(program.asperities)
+    ('quadratic, 16 bristles an asperity', 61)
     """
 
     form: Form
@@ -131,7 +135,7 @@ def program(
 
     >>> program = cr.program(scene, approach=5e-5)
     >>> program.data.cones
-    148
+    220
 
     Raises TooDenseError where the solution lies outside the boxes in which the program is exact,
     and SolverError where there is none to compare with.

@@ -149,7 +149,7 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
     >>> on_summits = cr.press(cr.Scene(1e4, scan.summits(), cr.Material(1.0, 0.3)), load=10.0)
     >>> whole = cr.surface.press_whole(scan, on_summits)
     >>> print(f"{on_summits.load / whole.load - 1:+.0%}")
-    +6%
+    -18%
     """
     checks.instance("surface", surface, Surface)
     checks.instance("contact", contact, Contact)

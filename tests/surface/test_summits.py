@@ -31,7 +31,7 @@ def test_summits_are_asperities_that_know_their_map() -> None:
     assert np.abs(summits.positions - place).max() <= 1.0
     assert np.abs(summits.heights - heights).max() < 0.05 * MAP.rms_height
     frame = summits.to_dataframe()
-    np.testing.assert_array_equal(frame["tip_radii"], summits.tip_radii)
+    np.testing.assert_array_equal(frame["tip_radius"], summits.tip_radii)
     again = pickle.loads(pickle.dumps(summits))
     np.testing.assert_array_equal(again.positions, summits.positions)
     assert again.origin.moments == origin.moments
