@@ -22,9 +22,6 @@ BANNED = {
     r"\bis no \w+ness\b|\bwhat is no\b": "say what it is",
 }
 
-#: Files, and folders, that still have such turns. Remove an entry when it is clean.
-KNOWN = ("convexrough/plots/",)
-
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 MODULES = sorted((ROOT / "convexrough").rglob("*.py"))
 
@@ -55,8 +52,7 @@ def found_in(text: str) -> list[str]:
 def test_no_banned_turn(path: Path) -> None:
     prose = prose_of_a_page if path.suffix == ".md" else prose_of_a_module
     found = found_in(prose(path))
-    if not str(path.relative_to(ROOT)).startswith(KNOWN):
-        assert not found, "\n".join(found)
+    assert not found, "\n".join(found)
 
 
 def test_banned_turns_are_found() -> None:

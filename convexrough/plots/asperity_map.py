@@ -145,7 +145,7 @@ def draw_outline(
 def status_layers(
     status: NDArray[np.str_], radii: Array, stick_radii: Array | None = None
 ) -> list[Layer]:
-    """A layer for each word of the status, and the stick discs inside those that slip in part."""
+    """A layer for each status, and the stick discs inside those that slip in part."""
     layers = [
         Layer(word, np.where(status == word, radii, 0.0), colour)
         for word, (colour, _) in LOOKS.items()
@@ -157,7 +157,7 @@ def status_layers(
 
 
 def status_handles(words: Iterable[str], *, stick: bool = False) -> list[Line2D]:
-    """For a legend: the words that there are, and stick discs."""
+    """The entries of a legend: each status that occurs, and stick discs."""
     entries = [each for word, each in LOOKS.items() if word in words]
     if stick and "partial" in words:
         entries.insert(0, (STICK, "stick disc"))

@@ -1,6 +1,6 @@
 """Points between those of a path, where they are few enough: loops are curved.
 
-This solves normal problems; what draws only asks for it where nobody has found these points before.
+This solves normal problems. Figures ask for it only where these points were not computed before.
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ def legend_outside(figure: Any, handles: Sequence[Any], place: str, ncols: int) 
 
 
 def no_contact_figure(*labels: tuple[str, str], width: float = DOUBLE) -> Figure:
-    """A panel for each pair of axis labels, and the words "no contact" in each."""
+    """A panel for each pair of axis labels, and the text "no contact" in each."""
     figure = Figure(figsize=(width, 2.6), layout="constrained")
     for axes, (x, y) in zip(figure.subplots(1, len(labels), squeeze=False)[0], labels, strict=True):
         label(axes, x, y)
