@@ -1,7 +1,8 @@
-"""Many scenes pressed together, and a cycle of each: rows of stacks, and of tables.
+"""Press many scenes at once, and compute a cycle of each.
 
-All scenes have as many asperities. Scenes at equal places share their coupling, so that a product
-for all of them is one product of matrices. What the rows do not prove is done one by one.
+All scenes have the same number of asperities. Scenes with the same positions and tip radii share
+one matrix, so that a product for all of them is one product of matrices. Scenes that this does not
+prove are solved one by one.
 """
 
 from __future__ import annotations
@@ -33,10 +34,10 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: Asperities of scenes that are pressed in rows, at most: of more, each is work enough.
+#: Scenes with more asperities are solved one by one: stacking them saves nothing.
 MOST = 512
 
-#: What a matrix for each of the rows in use at once may have of numbers, together.
+#: Largest total size of the matrices of all rows processed at once.
 MATRICES = 2**20
 
 
@@ -44,7 +45,7 @@ MATRICES = 2**20
 class Contacts(Table):
     """What `press_many` finds of m scenes with n asperities each. Errors are proved bounds.
 
-    `contacts[k]` is one of them, the same as from `press`, made when it is asked for.
+    `contacts[k]` is the `Contact` that `press` returns for scene k, made on first access.
 
     controls : (m,) what was prescribed: approaches [length], or loads [force] where `by_load`
     loads, approaches : (m,) totals [force], and D0 [length];  load_errors, approach_errors : (m,)

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-#: Names of attributes by what their arrays are along.
+#: Dimension names, and the attributes whose arrays have these dimensions.
 Along: TypeAlias = dict[tuple[str, ...], tuple[str, ...]]
 
-#: Counts, of which one is no other.
+#: Names that look plural but have no singular.
 COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
 
 #: How many values of an array are written out, and how many letters of a text.
@@ -69,7 +69,7 @@ class Record:
                 yield name, words
 
     def _headline(self) -> str:
-        """All of it in one line."""
+        """The record in one line."""
         parts = [str(getattr(self, name)) for name in ("scope", "solver") if hasattr(self, name)]
         if hasattr(self, "status"):
             parts.append(in_words(self.status))

@@ -1,7 +1,7 @@
 """Balls: numbers known to within a radius. A formula evaluated on balls proves its own error.
 
 The midpoint of a ball is a pair of float64 numbers, its radius a float64 number. Every operation
-returns a ball that holds all results of its operands' numbers, with its own rounding counted.
+returns a ball that contains the result for every choice of numbers in the operands.
 Where nothing is known (an overflow, a divisor that may be 0) the radius is infinite.
 """
 
@@ -23,7 +23,7 @@ from convexrough.numbers.pairs import CHUNK, PAIR_ROUNDOFF, Pair
 #: A factor above the rounding of a short chain of float64 operations on radii.
 UP = 1.0 + 2.0**-40
 
-#: Above what any one operation on pairs can lose by underflow.
+#: Upper bound on the underflow error of one operation on pairs.
 TINY = 2.0**-1000
 
 #: Numbers that stand for themselves: they become balls of radius 0.

@@ -1,7 +1,7 @@
-"""The folder of results: written beside its place, and renamed once.
+"""The results folder: written under another name beside its place, then renamed.
 
-A folder that is there already is only written to where that is asked for: what an earlier run
-wrote, as its `files.json` says, is replaced, and other files stay.
+An existing folder changes only with `force`: files of the earlier run, which its `files.json`
+lists, are replaced by the new ones when these are complete, and other files stay.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def write_results(
     more: Mapping[str, Any] | None = None,
     **saved: Any,
 ) -> list[Path]:
-    """Write the tables of all results, their figures, and summary.json with `more`; the paths.
+    """Write all tables, figures, and summary.json with `more`; return the paths.
 
     saved : formats and dpi of figures, as for `write_figures`
 
@@ -137,7 +137,7 @@ def write_results(
 
 
 def slider_page(pressed: Result, units: UnitNames) -> str:
-    """A page to move the shear force, as HTML: states are found and judged here.
+    """An HTML page with a slider for the shear force; its states are computed in this call.
 
     Raises InputError if the scene has no friction, or another base than a sphere.
     """
@@ -147,12 +147,12 @@ def slider_page(pressed: Result, units: UnitNames) -> str:
 
 
 def write_json(path: Path, summary: Summary) -> Path:
-    """Write a summary; the path."""
+    """Write a summary; return the path."""
     return write_text(path, to_json(summary) + "\n")
 
 
 def write_tables(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> list[Path]:
-    """Write each table, name -> columns, as NAME.csv; the paths."""
+    """Write each table, name -> columns, as NAME.csv; return the paths."""
     return [_write_columns(folder / f"{name}.csv", table) for name, table in tables.items()]
 
 
@@ -163,7 +163,7 @@ def write_figures(
     formats: Sequence[str] = ("png", "svg"),
     dpi: int = 200,
 ) -> list[Path]:
-    """Write each figure in each format; the paths."""
+    """Write each figure in each format; return the paths."""
     from convexrough.plots import save  # matplotlib: only when it draws
 
     written = []
@@ -190,7 +190,7 @@ def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
 
 
 def write_rows(path: Path, rows: Sequence[Sequence[Any]]) -> Path:
-    """Write CSV, of each float its repr; the path."""
+    """Write CSV, of each float its repr; return the path."""
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
     return path

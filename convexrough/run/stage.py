@@ -1,4 +1,4 @@
-"""A stage is a table of the scene file that computes a result, off which all else is read.
+"""A stage is a table of the scene file. It computes a result; all output is derived from that.
 
 A new stage is a subclass of `Stage` and one of `Result` in a file of `run/stages`, and a line in
 `STAGES` there (docs/architecture.md has one of 40 lines).
@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 Columns = dict[str, NDArray[Any]]
 Summary = dict[str, Any]
 
-#: Words of asperities, and keys of how many have them.
+#: Statuses of asperities; as keys, the number of asperities with that status.
 WORDS = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
-#: What numbers are in, by their names; all others are plain.
+#: Physical dimension of each number, by name; all others have none.
 KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
@@ -52,7 +52,7 @@ MOST_PRINTED = 20
 
 
 class Stage(Table):
-    """What is asked of a pressed contact: a table of the scene file, with its checks.
+    """A table of the scene file that asks for a result from a pressed contact, with its checks.
 
     name    : of the table;  frictional : it needs [friction]
     numbers : keys of its summary that are numbers, which a sweep can measure
@@ -65,11 +65,11 @@ class Stage(Table):
     labels: ClassVar[tuple[str, ...]] = ()
 
     def compute(self, contact: Contact) -> Result:
-        """What is found. Raises InputError, SolverError."""
+        """Compute the result. Raises InputError, SolverError."""
         raise NotImplementedError
 
     def fits(self, count: int) -> None:
-        """Whether it can be asked of so many asperities. Raises InputError."""
+        """Check that the stage exists for so many asperities. Raises InputError if not."""
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
@@ -115,7 +115,7 @@ class Result(Tabular, Drawn):
 
     @property
     def name(self) -> str:
-        """Of the table in the scene file, the key in the summary, and the table of numbers."""
+        """Name of the table in the scene file, of the key in the summary, and of the CSV file."""
         return self.stage.name
 
     def rows(self) -> list[Summary]:
@@ -124,7 +124,7 @@ class Result(Tabular, Drawn):
 
     @cached_property
     def known(self) -> list[Summary]:
-        """The rows, counted once."""
+        """`rows()`, computed once."""
         return self.rows()
 
     def summary(self) -> Any:
@@ -147,7 +147,7 @@ class Result(Tabular, Drawn):
         return {self.name: columns_of(self.known)}
 
     def figures(self, **units: Any) -> Mapping[str, Figure]:
-        """Figures by the stems of their files; units are only said."""
+        """Figures by the stems of their files; units are used for labels only."""
         return {}
 
     def prepare(self, *, figures: bool) -> None:
@@ -155,7 +155,7 @@ class Result(Tabular, Drawn):
         _ = self.known
 
     def lines(self, units: UnitNames) -> list[str]:
-        """A table for people."""
+        """The printed table, one string per line."""
         cut = self.known[-MOST_PRINTED:] if self.steps else self.known
         many = f"(the last {len(cut)} of {len(self.known)} rows; all are in {self.name}.csv)"
         printed = self.headings()
