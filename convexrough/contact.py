@@ -50,9 +50,9 @@ class Contact(Keeper, Table, Drawn):
     approach      : D0 [length];  load : total [force]
     prescribed_load : [force] None where the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : largest relative error of the indentations due to point forces in place of
-        pressures, to leading order: max sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i over the loaded
-        asperities
+    model_error   : largest relative error of the displacements D_i = D0 + d_i due to point forces
+        in place of pressures, to leading order: max sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i over
+        the loaded asperities
     crowding      : largest (a_i + a_j) / r_ij; above 1 contact discs overlap and the model fails
     covered       : number of open summits under the contact disc of a neighbour, where a point
         force does not represent the pressure
@@ -202,7 +202,7 @@ def press(
     solver : default `solvers.Newton()`; or its name in a scene file, such as "conic"
     start  : (n,) [force] initial loads; in the convex range the solution does not depend on them
     influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
-        on a lattice), "scattered" (transforms on a mesh); None for the cheapest that is exact
+        on a lattice), "scattered" (transforms on a mesh); None for the cheapest
     announce : called with one line of progress during long work
 
     Raises InputError for bad values and SolverError where the solver stops without a solution. A

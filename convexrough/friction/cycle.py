@@ -63,12 +63,12 @@ class Cycle(Table, Drawn):
 
     contact          : pressed with the highest load of the path
     loads, forces    : (m,) P and Q at the points of the path [force]
-    loss             : energy lost in each cycle but the first, both bodies [force length]
-    loss_first       : lost on the way from the start through the first cycle
+    loss             : energy lost per cycle, from the second cycle on, both bodies [force length]
+    loss_first       : energy lost from the unloaded start to the end of the first cycle
     loss_error, loss_first_error : proved bounds on |loss - solution|, infinite without proof
     status           : "stuck" where a cycle has no slip, "partial" where a disc sticks for ever,
-        "sliding" once in each direction per cycle, "intermittent" where contact is lost in the
-        cycle, "open" all along, or "undecided"
+        "sliding" where it slides as a whole once in each direction per cycle, "intermittent"
+        where contact is lost in the cycle, "open" where it never touches, or "undecided"
     slips            : [length] of gross slip, in each direction per cycle; nan where intermittent
     stick_radii      : [length] of the disc that sticks for ever
     slip_errors, stick_radius_errors : [length] proved bounds
@@ -80,7 +80,8 @@ class Cycle(Table, Drawn):
     displacement_amplitude : X_a, half the range of X at the points [length]
     displacement_error : proved bound on |X_a - solution| [length], infinite without proof
     order            : "proved" that no indentation falls with the load between L* and P, so that
-        loss and words hold; "proved for one step": no loss is proved; "fails": general steps answer
+        loss and statuses are proved; "proved for one step": no loss is proved; "fails": the
+        results come from general steps
     presses          : how many normal problems were solved
 
     >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)

@@ -37,14 +37,15 @@ class ShearCertificate(Table):
     """What is proved of a friction state. Arrays are (n,), in the scene's order.
 
     scope  : that of the contact it starts from, or "none" where nothing is proved
-    order  : "proved": no indentation falls between the levels of the state, so that words and
-        bounds hold for the state of every history of loading; "proved for one step": they hold for
-        the solution of the program with one step; "fails": nothing is proved
+    order  : "proved": no indentation falls as the load rises from P - Q/f to P, so that statuses
+        and bounds hold for the true state; "proved for one step": they hold for the result of one
+        general step (docs/theory/without-order.md); "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
     force_errors : [force];  slip_errors, stick_radius_errors : [length] bounds on the distance to
         the solution
-    force_error, displacement_error : [force], [length] likewise of Q and X; 0 of the prescribed one
+    force_error, displacement_error : [force], [length] bounds on the errors of Q and X; 0 for the
+        prescribed one
 
     >>> judged = cr.shear(contact, force=0.25 * contact.load).certificate
     >>> judged.scope, judged.holds, (judged.status == "sliding").sum().item()
@@ -107,7 +108,7 @@ class ShearState(Table, Drawn):
 
     @property
     def order(self) -> Order:
-        """What words and bounds rest on: that of the certificate."""
+        """On what statuses and bounds rest: `certificate.order`."""
         return self.certificate.order
 
     def gradient(

@@ -1,9 +1,9 @@
-"""The compliance operator of points on a lattice: a convolution, by fast Fourier transforms.
+"""The compliance operator of points on a lattice: a convolution, by Fourier transforms.
 
 Free space: the smallest box of sites that holds the asperities is padded with zeros to twice its
-size, so that no asperity feels a periodic image of another. The operator does not depend on heights or
-radii of the asperities. The rounding of the transforms is bounded in
-docs/theory/operators-lattice.md, "Rounding".
+size, so that no asperity feels a periodic image of another. Heights and radii of the asperities do
+not matter. The rounding of the transforms is bounded in docs/theory/operators-lattice.md,
+"Rounding".
 """
 
 from __future__ import annotations

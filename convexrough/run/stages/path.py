@@ -125,7 +125,7 @@ class Pathed(Steps):
     def doubts(self) -> Iterator[str]:
         (path,) = self.found
         if unsure := int((path.status == "undecided").sum()):
-            yield f"not certified: {unsure} words in path undecided"
+            yield f"not certified: {unsure} statuses in path undecided"
         yield from unproved_order(self, path.order)
 
     def lines(self, units: UnitNames) -> list[str]:
@@ -207,7 +207,7 @@ class Settled(Single):
 
     def doubts(self) -> Iterator[str]:
         if unsure := self.known[0]["undecided"]:
-            yield f"not certified: {unsure} words in steady undecided"
+            yield f"not certified: {unsure} statuses in steady undecided"
         for each in self.found:
             yield from unproved_order(self, each.order)
 
