@@ -41,7 +41,7 @@ NOT_OPEN = "they are held open, but their gaps are not proved"
 
 
 class Obstacle(NamedTuple):
-    """Why nothing is proved, and of which candidates."""
+    """The reason why nothing is proved, and the candidates that cause it."""
 
     reason: str
     which: Indices
@@ -52,8 +52,8 @@ class Proved:
     """The solution, as balls over the candidates, in own units.
 
     trial    : the loads that it was proved from
-    box      : where it is the only one
-    distance : || P - P* ||_H of the trial loads;  stiffness : (n,) H
+    box      : in which there is exactly one solution
+    distance : bound on || P - P* ||_H of the trial loads;  stiffness : (n,) the diagonal of H
     loads, indentation : (n,) P and D0 + d - A P, an indentation, or minus a gap
     approach : D0
     """
@@ -79,7 +79,7 @@ class Proved:
 
     @property
     def total(self) -> Ball:
-        """The sum of the loads: by Cauchy's inequality known better than by its terms."""
+        """The sum of the loads; Cauchy's inequality bounds its error better than the terms do."""
         trial = Ball.exact(self.trial.loads).sum()
         spread = self.distance * math.sqrt(float((1.0 / self.stiffness).sum())) * (1 + SAFETY)
         return Ball.around(trial.mid, trial.radius + spread + float(self.trial.missing.size))

@@ -44,7 +44,7 @@ class Program(Record):
     form        : "cones", "dual" or "bristles"
     what        : the same in words
     data        : P, q, A and the rest: a ConeProgram or a QuadraticProgram
-    asperities  : (m,) that the program is about, by their indices; all others carry nothing
+    asperities  : (m,) indices of the asperities in the program; it gives the others no load
     force_unit  : [force] of the loads
     energy_unit : [force length] of the objective
     objective   : its least value, in energy_unit; of the dual the greatest bound, times -1
@@ -127,7 +127,7 @@ def program(
     load: float | None = None,
     bristles: int = 64,
 ) -> Program:
-    """A scene as a program in standard form, with what leads back from its solution.
+    """A scene as a program in standard form, with the data that convert its solution to loads.
 
     form     : "cones" (the contact law itself), "dual" (a bound on its energy) or "bristles" (a
         quadratic program, off by about 0.4 / bristles^2 of the largest load)

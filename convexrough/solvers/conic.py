@@ -30,7 +30,7 @@ STOPPED = ("Solved", "AlmostSolved")
 
 @dataclass(frozen=True)
 class Conic(ConeSolver):
-    """Settings of the cone program through Clarabel, an interior-point method.
+    """Settings for solving the cone program with Clarabel, an interior-point method.
 
     tolerance      : Clarabel's, of the duality gap and of feasibility, in the problem's units
     max_iterations : Clarabel's
@@ -43,7 +43,7 @@ class Conic(ConeSolver):
         return "conic"
 
     def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
-        """What Clarabel makes of the program in these boxes, not yet judged."""
+        """Clarabel's answer to the program in these boxes, not yet checked."""
         lifted = LiftedProgram.accept(problem, boxes)
         raw = run_clarabel(
             lifted.apply(),
