@@ -214,8 +214,8 @@ class _Listing:
         return lines
 
 
-def _worst_first(claim: Claim, who: Indices) -> Indices:
-    return who[np.argsort(-claim.errors[who], kind="stable")]
+def _worst_first(claim: Claim, which: Indices) -> Indices:
+    return which[np.argsort(-claim.errors[which], kind="stable")]
 
 
 def _off(claim: Claim, name: str) -> str:

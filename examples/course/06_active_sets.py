@@ -146,7 +146,7 @@ assert np.allclose(delta + A @ (np.maximum(delta, 0) / k) ** 1.5, D, atol=1e-13)
 figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
 left.imshow([[int(c) for c in one] for one in sets[:24]], cmap="Greys", aspect="auto", vmax=1.6)
 left.set(xlabel="asperity", ylabel="pass", xticks=range(4), xticklabels=range(1, 5))
-left.set_title("who is thought to touch (dark), pass by pass")
+left.set_title("thought to touch (dark), pass by pass")
 contact = cr.press(scene, approach=APPROACH)
 right.set(aspect="equal", xlim=(-0.0025, 0.0025), ylim=(-0.0025, 0.0025))
 for number, (point, a) in enumerate(zip(points, contact.contact_radii, strict=True), start=1):
