@@ -15,11 +15,13 @@ gradient of a convex function of eta. All other asperities together bear at most
    r lambda(r) >= m and lambda(r) bounds from below the slope of this sum within r (`_shift`). On
    the circle |s| = r the convex function less T.s rises outwards, so its minimum is inside.
 3. The residual of q' = q(eta + s), with the displacement X + s, is
-   e_i = |v_i + (B (q' - q))_i| and what `stray` adds. A sliding component is P_i times a unit vector: on its face, with true loads.
+   e_i = |v_i + (B (q' - q))_i| and what `stray` adds. A sliding
+   component is P_i times a unit vector: on its face, with true loads.
 4. The theorem of `convex.theorem`:  || q* - q' ||_H <= || e ||_{H^-1} / mu,  h_i = 2 k_i / (3 P_i).
 5. The displacement. eta*_i = eta_i + w_i + (X* - X) with w_i = -v_i - (B (q* - q))_i.
    So |X* - X| is an s as in step 2, for sums that w changes.
-6. Statuses. i slides where |eta*_i| > k_i for sure, and does not where |eta*_i| < k_i or |q*_i| < P_i.
+6. Statuses. i slides where |eta*_i| > k_i for sure, and does not where |eta*_i| < k_i or where
+   |q*_i| < P_i.
 
 The energy E is convex: E(q) - E(q*) <= sum e_i |q_i - q*_i| + X.(sum q - T) of any forces q.
 docs/theory/vector-friction.md has the slopes of step 2, and what is left close to gross sliding.
