@@ -14,7 +14,7 @@ the gap) where they do not. Damped Newton finds the point; one interval Newton s
 arithmetic, proves it. The oracle shares no code with the package that it judges.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, log2
 from typing import Any, Literal, TypeAlias
@@ -202,6 +202,27 @@ def prove(problem: NormalMap, x: Balls, *, radius: arb) -> Balls:
     if not all(whole.contains_interior(part) for whole, part in zip(box, inside, strict=True)):
         raise NotProved("the interval Newton step leaves its box")
     return inside
+
+
+def gaps(scene: Any, loads: Sequence[arb], approach: arb, rows: Iterable[int]) -> list[arb]:
+    """k_i P_i^(2/3) + (A P)_i - D_i of some asperities of a scene, whatever the loads are."""
+    modulus, bend = arb(float(scene.material.contact_modulus)), 1 / arb(scene.sphere_radius)
+    tips = _exact(scene.asperities.tip_radii)
+    positions, bends = _exact(scene.asperities.positions), np.array([bend, bend])
+    points, descents = _contact_points(positions, tips, bends, scene.geometry)
+    touching = [j for j, load in enumerate(loads) if load > 0]
+    found = []
+    for i in rows:
+        gap = descents[i] - arb(float(scene.asperities.heights[i])) - approach
+        if loads[i] > 0:
+            law = _cube_root(9 * (bend + 1 / tips[i]) / (16 * modulus**2))
+            gap += law * _cube_root(loads[i] ** 2)
+        for j in touching:
+            if j != i:
+                x, y = points[i] - points[j]
+                gap += loads[j] / (arb.pi() * modulus * (x * x + y * y).sqrt())
+        found.append(gap)
+    return found
 
 
 def errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:
