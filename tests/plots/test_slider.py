@@ -106,9 +106,7 @@ def test_names_of_units_end_no_script(contact: cr.Contact) -> None:
     assert inside(text)["units"] == {"length": "</script>", "force": "<b>"}
 
 
-def test_of_many_some_can_be_followed(
-    contact: cr.Contact, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_many_some_can_be_followed(contact: cr.Contact, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slider, "MOST_FOLLOWED", 20)
     data = inside(page_of(contact))
     assert len(data["discs"]["index"]) == data["touching"] == 37
