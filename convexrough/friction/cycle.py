@@ -22,7 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.frames import Variables
 from convexrough.friction.curve import MemoryCurve, Piece
@@ -43,6 +42,7 @@ from convexrough.friction.shear import level_at
 from convexrough.friction.state import displacements_of, states_of, stick_radii, worded
 from convexrough.influence import Kind
 from convexrough.numbers.balls import Ball
+from convexrough.plottable import Plottable
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
@@ -58,7 +58,7 @@ CELLS = 64
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cycle(Table, Drawn):
+class Cycle(Table, Plottable):
     """A closed path of P and Q, repeated. Arrays are (n,), in the scene's order.
 
     contact          : pressed with the highest load of the path
@@ -164,14 +164,14 @@ class Cycle(Table, Drawn):
         n = len(self.scene)
         if self.contact.load == 0.0:
             return (frozen(np.zeros(n)),) * 3
-        levels = self.contact.keep(FrictionLevels)
+        levels = self.contact.cached(FrictionLevels)
         if self.order == "fails" and levels.proved:
             unknown = frozen(np.full(n, np.nan))
             return unknown, unknown, frozen(np.full(n, np.inf))
         slip, slide = shared(levels, self._later, CELLS)
         partial, gross = (frozen(levels.to_scene(each.value)) for each in (slip, slide))
-        doubt = 0.0 if self.order == "proved" else np.inf
-        return partial, gross, frozen(levels.to_scene(slip.error + slide.error) + doubt)
+        uncertainty = 0.0 if self.order == "proved" else np.inf
+        return partial, gross, frozen(levels.to_scene(slip.error + slide.error) + uncertainty)
 
     @cached_property
     def _later(self) -> list[Piece]:
@@ -318,7 +318,7 @@ def cycles(
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
         if contact.load > 0.0:
-            levels = contact.keep(FrictionLevels)
+            levels = contact.cached(FrictionLevels)
             heights = [levels.load - level_at("displacement", levels, x) for x in amplitudes]
             ends = [(height, -height) for height in heights]
             return _at_the_load(contact, ends, [(float(f * h), -float(f * h)) for h in heights])
@@ -338,7 +338,7 @@ def cycles(
         return [_still(contact, np.zeros(2), np.array(each)) for each in forces]
     if announce is not None:
         announce("pressing at the level of a cycle")
-    load = contact.keep(FrictionLevels).load
+    load = contact.cached(FrictionLevels).load
     points = [[point_at(load, Q, contact.scene)[1] for Q in each] for each in forces]
     return _at_the_load(contact, points, forces)
 
@@ -349,7 +349,7 @@ def _at_the_load(
     forces: Sequence[tuple[float, float]],
 ) -> list[Cycle]:
     """Cycles between two T each, at the load of the contact."""
-    load = contact.keep(FrictionLevels).load
+    load = contact.cached(FrictionLevels).load
     paths = [[(load, T) for T in each] for each in heights]
     held = np.full(2, float(load))
     asked = [(path, held.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
@@ -401,7 +401,7 @@ def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
 ) -> list[Cycle]:
     """Of closed paths with these points, P and Q each, from one state on."""
-    levels, closed = contact.keep(FrictionLevels), [_Closed(start, path) for path, _, _ in asked]
+    levels, closed = contact.cached(FrictionLevels), [_Closed(start, path) for path, _, _ in asked]
     needed = [
         levels_needed(each.curves, [*each.first, *each.later]) | {each.still, each.least}
         for each in closed
@@ -428,7 +428,7 @@ def _cycle(
     moved: Ball,
 ) -> Cycle:
     """One of them. spent : the first time, and later;  moved : X of its curves."""
-    levels, (points, loads, forces) = contact.keep(FrictionLevels), path
+    levels, (points, loads, forces) = contact.cached(FrictionLevels), path
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
     amplitude, amplitude_error = (float(part) for part in rounded(half))
@@ -560,7 +560,7 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices, announce: Announce | None) 
     if contact.load == 0.0:
         none = frozen(np.zeros((len(forces), len(chosen))))
         return Loop(chosen, frozen(forces), frozen(np.zeros(len(forces))), none, none)
-    levels, f = contact.keep(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
+    levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
     P, top, bottom = levels.load, *(point_at(levels.load, Q, contact.scene)[1] for Q in (high, low))
     drops = [2 * Fraction(each) / f for each in way.tolist()]
     heights = [max(top - drop, bottom) for drop in drops]

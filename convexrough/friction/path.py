@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.general_step import Stepper, followed
@@ -28,6 +27,7 @@ from convexrough.friction.state import States, states_of, used_by, words
 from convexrough.influence import Kind
 from convexrough.numbers.balls import TINY, UP, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
+from convexrough.plottable import Plottable
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
@@ -40,7 +40,7 @@ Point = tuple[Fraction, Fraction]  # (P, T = Q / f)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Path(Table, Drawn):
+class Path(Table, Plottable):
     """A sequence of m points (P, Q), with straight segments between. Errors are proved bounds.
 
     loads, forces  : (m,) P and Q [force]
@@ -202,7 +202,7 @@ def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = 
     Q = checks.bearable("forces", checks.array("forces", forces), f * contact.load)
     if contact.load == 0.0 or len(Q) == 0:
         return History(contact, **_nothing(contact, Q))
-    load = contact.keep(FrictionLevels).load
+    load = contact.cached(FrictionLevels).load
     points = [point_at(load, q, contact.scene) for q in Q.tolist()]
     start = MemoryCurve.pressed(load)
     fields = _followed(contact, start, points, None, Stepper)
@@ -225,7 +225,7 @@ def walk(
         raise InputError("steps", found=steps, expected="a whole number, at least 1")
     curve = MemoryCurve()
     if start is not None:
-        curve = MemoryCurve.pressed(_same_scene(scene, start).keep(FrictionLevels).load)
+        curve = MemoryCurve.pressed(_same_scene(scene, start).cached(FrictionLevels).load)
         influence = influence or start.influence
     contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence, announce)
     Q = frozen(np.array(forces, dtype=np.float64))
@@ -298,7 +298,7 @@ def _followed(
     stepper: type[Stepper],
 ) -> dict[str, Any]:
     """All fields of a path but its contact and its forces."""
-    levels = contact.keep(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     curves, costs = follow(start, points)
     pieces = [piece for each in costs for piece in each]
     needed = levels_needed(curves, pieces)
