@@ -58,7 +58,6 @@ def results() -> dict[str, Any]:
         cr.shear_vector(contact, force=Q),
         cycle,
         cycle.loop(16, asperities=[0, 3]),
-        cr.history(contact, forces=[Q, -Q / 2]),
         cr.verify(scene, wrong, approach=PAPER_APPROACH),
         compare(scene, approach=PAPER_APPROACH, solvers=few),
         cr.smooth(scene, load=contact.load),
@@ -106,7 +105,7 @@ def test_every_kind_is_here() -> None:
     sweeps = {"SweepTable"}  # tested in tests/sweeps
     assert public - settings - sweeps <= set(NAMES)
     assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "Fretting",
-                          "History", "Verdict", "Comparison", "LoadPath", "Shakedown",
+                          "Verdict", "Comparison", "LoadPath", "Shakedown",
                           "MemoryCurve", "PhaseLosses", "PathComparison",
                           "Gradient", "Surface", "Summits", "Provability"}  # fmt: skip
 
@@ -233,7 +232,7 @@ def columns(result: Any) -> dict[str, np.ndarray[Any, Any]]:
 def test_a_data_frame_has_the_arrays(name: str) -> None:
     result = results()[name]
     frame = result.to_dataframe()
-    rows = {"History": "point", "Loop": "point", "Comparison": "entry", "LoadPath": "point"}
+    rows = {"Loop": "point", "Comparison": "entry", "LoadPath": "point"}
     rows |= {"MemoryCurve": "vertex", "PhaseLosses": "ellipse", "PathComparison": "entry"}
     rows |= {"Provability": "level", "Contacts": "scene", "Cycles": "scene"}
     assert frame.index.name == rows.get(name, "asperity")
@@ -260,7 +259,7 @@ def test_a_data_set_has_the_arrays(name: str) -> None:
 
 
 def test_asperities_can_be_found_by_name() -> None:
-    contact, past = results()["Contact"], results()["History"]
+    contact, past = results()["Contact"], results()["LoadPath"]
     x, y = contact.scene.asperities.positions.T
     frame = contact.to_dataframe()
     np.testing.assert_array_equal(frame["x"], x)

@@ -168,7 +168,7 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
     contact = state.contact
     checks.instance("direction", direction, Direction)
     sheared = Frictional.of(state)
-    if sheared.height(state.force) == sheared.known.load:
+    if abs(sheared.known.height(state.force)) == sheared.known.load:
         expected = "a force below f P, where the derivative is finite"
         raise InputError("force", found=f"{state.force}: gross sliding", expected=expected)
     sign = -1.0 if state.force < 0 else 1.0
