@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks, solvers, threads
 from convexrough.arrays import Array, Indices, frozen
+from convexrough.cached import Cached
 from convexrough.convex.newton_step import correct
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
 from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
-from convexrough.kept import Keeper
 from convexrough.normal.certificate import Certificate, certificate_of, certify_on
 from convexrough.normal.level import Level, Levels
 from convexrough.normal.problem import NormalProblem
@@ -28,6 +27,7 @@ from convexrough.normal.proved import Obstacle, proved
 from convexrough.normal.refine import refined_loads, refines
 from convexrough.normal.units import Units
 from convexrough.numbers.balls import Ball
+from convexrough.plottable import Plottable
 from convexrough.progress import Announce
 from convexrough.record import LINE, Along, Table
 from convexrough.scene.base import along
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Contact(Keeper, Table, Drawn):
+class Contact(Cached, Table, Plottable):
     """A solved normal contact. Arrays are (n,), in the order of the scene's asperities.
 
     loads         : [force]
@@ -123,7 +123,7 @@ class Contact(Keeper, Table, Drawn):
 
         refuse_many(self.scene)
         by_load, n = self.prescribed_load is not None, len(self.scene)
-        levels, held = self.keep(levels_of), []
+        levels, held = self.cached(levels_of), []
         for state in sheared:
             drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
             level = levels.below(Ball.exact(drop / Fraction(levels.problem.units.force)))
@@ -232,7 +232,7 @@ def solve(
 def levels_of(contact: Contact) -> Levels:
     """The normal solutions of a contact's scene at loads up to its own.
 
-    `contact.keep(levels_of)` gives the same ones each time.
+    `contact.cached(levels_of)` gives the same ones each time.
     """
     scene, load = contact.scene, contact.prescribed_load
     approach = contact.approach if load is None else None
@@ -339,7 +339,7 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
         return 0.0, 0.0
     A: Influence = problem.influence
     if len(touching) < len(problem):
-        A = A.among(touching)
+        A = A.restricted(touching)
     a = radii[touching]
     moved = A.scale * A.falloff(solution.loads[touching] * a**2 / 10, 3)
     return float((moved / prescribed[touching]).max()), A.crowding(a)
@@ -380,11 +380,11 @@ def closest_changes(contact: Contact) -> Array:
     scale = units.force / units.length / (np.pi * scene.material.contact_modulus)
     A = couple(scene, touching, scale, contact.influence)
     slopes = 1.5 * (loads / units.force) / (indentations / units.length)
-    rise = np.zeros(len(touching))
+    lift = np.zeros(len(touching))
     for R, axes in scene.curved:
         squares = (scene.asperities.positions[touching, axes] ** 2).sum(axis=1)
-        rise += squares * rho / (2.0 * R * (R + rho)) / units.length
-    deeper = rise - _nearer(scene, touching, A, loads / units.force)
+        lift += squares * rho / (2.0 * R * (R + rho)) / units.length
+    deeper = lift - _nearer(scene, touching, A, loads / units.force)
     change = correct(A, shells(A), np.sqrt(slopes), -deeper, balanced=False, tolerance=1e-3)
     gains[touching] = slopes * change * units.force
     return frozen(gains)

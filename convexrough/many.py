@@ -136,9 +136,9 @@ class Contacts(Table):
     @property
     def _together(self) -> list[_Pressed]:
         """Those proved in rows; a copy presses again."""
-        if "_kept" not in self.__dict__:
-            self.__dict__["_kept"] = list(_in_rows(self.scenes, self.controls, self.by_load))
-        rows: list[_Pressed] = self.__dict__["_kept"]
+        if "_pressed" not in self.__dict__:
+            self.__dict__["_pressed"] = list(_in_rows(self.scenes, self.controls, self.by_load))
+        rows: list[_Pressed] = self.__dict__["_pressed"]
         return rows
 
 
@@ -241,7 +241,7 @@ def press_many(
         alone=frozen(np.flatnonzero(alone)),
         **{each: frozen(values) for each, values in totals.items()},
     )
-    contacts.__dict__.update(_kept=rows, _known=known)
+    contacts.__dict__.update(_pressed=rows, _known=known)
     return contacts
 
 

@@ -46,7 +46,7 @@ class Sloppy:
             raise self.instead
         solution = Newton().solve(problem, start)
         noise = np.random.default_rng(0).uniform(-1, 1, len(problem)) * solution.loads.max()
-        noise[problem.ceiling + problem.offsets < 1e-9] = 0.0
+        noise[problem.approach_bound + problem.offsets < 1e-9] = 0.0
         loads = np.maximum(solution.loads + self.error * noise, 0.0)
         return replace(solution, loads=loads, refine=False, trial=None)
 

@@ -198,8 +198,8 @@ def test_errors_pass_between_processes(error: cr.ConvexroughError) -> None:
 def test_a_pickled_contact_goes_on() -> None:
     contact = results()["Contact"]
     again = pickle.loads(pickle.dumps(contact))
-    assert "_kept" in vars(contact)
-    assert "_kept" not in vars(again)  # what is made from a contact is made again, not carried
+    assert "_cache" in vars(contact)
+    assert "_cache" not in vars(again)  # what is made from a contact is made again, not carried
     force = 0.25 * contact.load
     state = cr.shear(again, force=force)
     np.testing.assert_array_equal(state.forces, results()["ShearState"].forces)

@@ -129,9 +129,9 @@ def _panel(family: Family, size: int, quick: bool, patience: float, say: Announc
         say(f"{family}, about {size:,}: {attempt.solver}, {attempt.setting}")
         rows.append(measure_attempt(family, each, attempt, right, patience))
     for _ in range(ROUNDS):
-        rivals = better_than_default(rows)
+        better = better_than_default(rows)
         for i, row in enumerate(rows):
-            if rivals and (row.default or row in rivals):
+            if better and (row.default or row in better):
                 again = measure_attempt(family, each, tried[i], None, patience)
                 if again.outcome == "answered":
                     rows[i] = replace(row, seconds=min(row.seconds, again.seconds))

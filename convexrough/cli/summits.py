@@ -114,8 +114,8 @@ def summits(
         files = _written(out, scanned, figures=not no_figures)
     lines = [*report.describe_surface(scanned), *written(out.parent, files)]
     echo(report.surface_summary(scanned), lines, as_json)
-    for doubt in report.doubts_of_surface(scanned):
-        say_aside("warning", doubt)
+    for message in report.warnings_about(scanned):
+        say_aside("warning", message)
     if scanned.curve is None:
         say_aside("hint", "--scene or --radius presses on them: how strong must the pruning be?")
     return DONE if scanned.certified else NOT_CERTIFIED

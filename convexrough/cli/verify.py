@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from convexrough.atomic import write_text
 from convexrough.cli.options import PATH, Command, json_option, proof_option
 from convexrough.cli.proof import proved
 from convexrough.cli.speech import (
@@ -23,7 +24,6 @@ from convexrough.cli.speech import (
     written,
 )
 from convexrough.errors import FileError, InputError
-from convexrough.whole import write_text
 
 if TYPE_CHECKING:
     from convexrough.proof import Proof

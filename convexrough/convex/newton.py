@@ -3,7 +3,7 @@
 Pressing, shear and vector friction are problems of one kind. Forces p(eta) are a monotone function
 of an unknown eta, what each asperity takes up itself, and with the coupling A the law is
 
-    F(eta) = eta + A p(eta) - rise = 0,
+    F(eta) = eta + A p(eta) - X = 0,
 
 once differentiable: no active set is guessed. It is the condition of the least of an energy
 Phi(p), convex in the convex range. A step d solves F + F' d = 0, as well as it is asked to, and is

@@ -22,7 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.frames import Variables
 from convexrough.friction.curve import MemoryCurve, Piece
@@ -36,6 +35,7 @@ from convexrough.friction.state import displacements_of, stick_radii, worded
 from convexrough.friction.walk import Point, Walk, levels_needed
 from convexrough.influence import Kind
 from convexrough.numbers.balls import Ball
+from convexrough.plottable import Plottable
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
@@ -51,7 +51,7 @@ CELLS = 64
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cycle(Table, Drawn):
+class Cycle(Table, Plottable):
     """A closed path of P and Q, repeated. Arrays are (n,), in the scene's order.
 
     contact          : pressed with the highest load of the path
@@ -154,19 +154,19 @@ class Cycle(Table, Drawn):
 
     @cached_property
     def _shares(self) -> tuple[Array, Array, Array]:
-        levels, n = self.contact.keep(FrictionLevels), len(self.scene)
+        levels, n = self.contact.cached(FrictionLevels), len(self.scene)
         if self.order == "fails" and levels.proved:
             unknown = frozen(np.full(n, np.nan))
             return unknown, unknown, frozen(np.full(n, np.inf))
         slip, slide = shared(levels, self._later, CELLS)
         partial, gross = (frozen(levels.to_scene(each.value)) for each in (slip, slide))
-        doubt = 0.0 if self.order == "proved" else np.inf
-        return partial, gross, frozen(levels.to_scene(slip.error + slide.error) + doubt)
+        uncertainty = 0.0 if self.order == "proved" else np.inf
+        return partial, gross, frozen(levels.to_scene(slip.error + slide.error) + uncertainty)
 
     @cached_property
     def _later(self) -> list[Piece]:
         """What the front runs through each time but the first."""
-        levels = self.contact.keep(FrictionLevels)
+        levels = self.contact.cached(FrictionLevels)
         pairs = zip(map(Fraction, self.loads.tolist()), self.forces.tolist(), strict=True)
         points = [(P, height_at(P, Q, self.scene)) for P, Q in pairs]
         return _Closed.around(levels, MemoryCurve(), points).later
@@ -301,7 +301,7 @@ def cycles(
     """
     checks.instance("contact", contact, Contact)
     f = checks.friction(contact.scene.friction)
-    limit, levels = f * contact.load, contact.keep(FrictionLevels)
+    limit, levels = f * contact.load, contact.cached(FrictionLevels)
     checks.exactly_one("maximum", maximum, "displacement", displacement)
     if displacement is not None:
         if minimum is not None:
@@ -333,7 +333,7 @@ def _at_the_load(
     forces: Sequence[tuple[float, float]],
 ) -> list[Cycle]:
     """Cycles between two T each, at the load of the contact."""
-    load = contact.keep(FrictionLevels).load
+    load = contact.cached(FrictionLevels).load
     paths = [[(load, T) for T in each] for each in heights]
     held = np.full(2, float(load))
     asked = [(path, held.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
@@ -422,7 +422,7 @@ def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
 ) -> list[Cycle]:
     """Of closed paths with these points, P and Q each, from one state on."""
-    levels = contact.keep(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
     levels.prepare(load for each in closed for load in each.needed)
     for needed in sorted((each.needed for each in closed), key=min):
@@ -543,7 +543,7 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices, announce: Announce | None) 
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))
     forces[len(way) - 1], forces[-1] = low, high
-    levels, f = contact.keep(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
+    levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
     P, top, bottom = levels.load, levels.height(high), levels.height(low)
     drops = [2 * Fraction(each) / f for each in way.tolist()]
     heights = [top, bottom, *(max(top - drop, bottom) for drop in drops)]

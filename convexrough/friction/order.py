@@ -119,7 +119,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     rising : (n,) all that may touch at the highest load of the path
     """
     found = upper.solution
-    if found is None or (found.box.held & ~upper.open).any():
+    if found is None or (found.box.fixed_open & ~upper.open).any():
         return False
     span = _Span.of(upper, lower, found)
     rates = span.rates(np.ones(len(span.c)))
@@ -170,8 +170,8 @@ def proved_in_rows(rows: Stack, boxes: Boxes, high: Rows, low: Rows) -> NDArray[
     below, m = inverse.bounds(lambda m: _delta(c_in, depth, steep, m * drop))
     most = np.zeros(c.shape)
     np.put_along_axis(most, order, c_in * m, axis=1)
-    felt = rows.apply(most) * (1.0 + 1.01 * (entry_error + (c.shape[1] + 2) * ROUNDOFF))
-    rates = 1.0 - felt * (1 + SAFETY) - SAFETY
+    coupled = rows.apply(most) * (1.0 + 1.01 * (entry_error + (c.shape[1] + 2) * ROUNDOFF))
+    rates = 1.0 - coupled * (1 + SAFETY) - SAFETY
     stays = (rates > 0) | (-high.indentation.upper > drop * -rates * (1 + SAFETY))
     rising = (~inside | (below > 0)).all(axis=1) & (support | stays).all(axis=1)
     return np.asarray(rising & (mu[:, 0] > 0))
@@ -215,8 +215,10 @@ class _Span(NamedTuple):
     def rates(self, m: Array) -> Array:
         """(n,) lower bounds on y_i(C) = 1 - (A C y(C))_i for 0 <= y <= m."""
         influence, most = self.upper.problem.influence, self.c * m
-        felt = influence.apply(most)
-        return np.asarray(1.0 - (felt + influence.rounding(most).of(felt)) * (1 + SAFETY) - SAFETY)
+        coupled = influence.apply(most)
+        return np.asarray(
+            1.0 - (coupled + influence.rounding(most).of(coupled)) * (1 + SAFETY) - SAFETY
+        )
 
     def delta(self, m: Array) -> Array:
         """Of the support."""
@@ -304,8 +306,8 @@ class _Inverse(NamedTuple):
         m = m[span.support]
         by_change = falls @ (span.delta(m) * m / self.w[0])
         off = sizes * (self.error[0] + self.lost[0] * float(np.linalg.norm(self.v[0])))
-        felt = weighted @ self.v[0]
-        return np.asarray(1.0 - felt - (by_change + off) * (1 + SAFETY) - SAFETY * (1 + felt))
+        coupled = weighted @ self.v[0]
+        return np.asarray(1.0 - coupled - (by_change + off) * (1 + SAFETY) - SAFETY * (1 + coupled))
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import Stepper
@@ -24,6 +23,7 @@ from convexrough.friction.levels import FrictionLevels, height_at
 from convexrough.friction.order import Order
 from convexrough.friction.walk import Point, Walk
 from convexrough.influence import Kind
+from convexrough.plottable import Plottable
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoadPath(Table, Drawn):
+class LoadPath(Table, Plottable):
     """A sequence of m points (P, Q), with straight segments between. Errors are proved bounds.
 
     loads, forces  : (m,) P and Q [force]
@@ -171,7 +171,7 @@ def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = 
     Q = checks.bearable("forces", checks.array("forces", forces), f * contact.load)
     if len(Q) == 0:
         raise InputError("forces", found="none", expected="at least one")
-    levels = contact.keep(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     points = [(levels.load, levels.height(force)) for force in Q.tolist()]
     return _path(contact, Q, Walk(levels, MemoryCurve.pressed(levels.load), points))
 
@@ -195,10 +195,10 @@ def walk(
         if start.scene is not scene:
             expected = "one of this scene"
             raise InputError("start", found="a contact of another scene", expected=expected)
-        curve = MemoryCurve.pressed(start.keep(FrictionLevels).load)
+        curve = MemoryCurve.pressed(start.cached(FrictionLevels).load)
         influence = influence or start.influence
     contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence, announce)
-    levels = contact.keep(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     return _path(
         contact, np.array(forces, dtype=float), Walk(levels, curve, points, steps, stepper)
     )

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle, steady
 from convexrough.friction.order import Order
 from convexrough.friction.shapes import elliptic_path
 from convexrough.influence import Kind
+from convexrough.plottable import Plottable
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.scene.asperities import Asperities
@@ -28,7 +28,7 @@ UNSURE_FIRST: tuple[Order, ...] = ("fails", "proved for one step", "proved")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PhaseLosses(Table, Drawn):
+class PhaseLosses(Table, Plottable):
     """Losses of ellipses  P = load + factor load_amplitude cos t,  Q alike with sin(t + phase).
 
     A row for each ellipse, c of them: all phases of the first factor, then of the next.

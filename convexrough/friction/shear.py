@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import followed
@@ -21,6 +20,7 @@ from convexrough.friction.order import Order
 from convexrough.friction.state import stick_radii
 from convexrough.friction.walk import Walk
 from convexrough.normal.boxes import Scope
+from convexrough.plottable import Plottable
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
@@ -74,7 +74,7 @@ class ShearCertificate(Table):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ShearState(Table, Drawn):
+class ShearState(Table, Plottable):
     """A friction state. Arrays are (n,), in the order of the scene's asperities.
 
     force         : Q [force];  displacement : X of the deep points, both bodies [length]
@@ -182,7 +182,7 @@ def shear(
         displacement = checks.finite("displacement", displacement)
     else:
         force = one_force("force", force, friction * contact.load)
-    levels = contact.keep(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     if announce is not None:
         announce("pressing at the load P - Q / f")
     if force is not None:
@@ -230,18 +230,18 @@ def _state(
         squared = contact.scene.relative_radii * walk.general.fronts[0]
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
         total = float(walk.points[0][1]) * checks.friction(contact.scene.friction)
-        doubt = 0.0
+        force_uncertainty = 0.0
     else:
         level = levels.at(levels.load - abs(height))
         radii, radius_errors = stick_radii(levels, level)
         size, off = rounded((levels.top.load - level.load) * levels.force_unit)
-        total, doubt = float(np.copysign(size, displacement or 0.0)), float(off)
+        total, force_uncertainty = float(np.copysign(size, displacement or 0.0)), float(off)
     error = float(found.displacement_errors[0]) if displacement is None else 0.0
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
     most = np.abs(found.drifts[0]) + found.drift_errors[0]  # where it may or may not touch
     slip_errors = np.where(loaded, found.drift_errors[0], 0.0) + np.where(unsure, most, 0.0)
     if order == "fails":
-        error = doubt = np.inf
+        error = force_uncertainty = np.inf
         slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
     status = walk.status()[0]
     certificate = ShearCertificate(
@@ -251,7 +251,7 @@ def _state(
         force_errors=found.force_errors[0],
         slip_errors=frozen(slip_errors),
         stick_radius_errors=frozen(radius_errors),
-        force_error=doubt if force is None else 0.0,
+        force_error=force_uncertainty if force is None else 0.0,
         displacement_error=error,
     )
     return ShearState(

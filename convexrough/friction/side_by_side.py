@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike
 
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import SolverError
 from convexrough.frames import Variables
 from convexrough.friction.conic_step import ConicStepper
 from convexrough.friction.order import Order
 from convexrough.friction.path import LoadPath, walk
 from convexrough.influence import Kind
+from convexrough.plottable import Plottable
 from convexrough.progress import Announce
 from convexrough.record import LINE, Record, Table
 from convexrough.scene.scene import Scene
@@ -58,7 +58,7 @@ class PathEntry(Record):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PathComparison(Table, Drawn):
+class PathComparison(Table, Plottable):
     """All entries, the general step first.
 
     order : of the indentations at the levels used, on which the memory curve rests

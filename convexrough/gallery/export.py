@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from convexrough import gallery
+from convexrough.atomic import to_json
 from convexrough.gallery.pack import packed
 from convexrough.progress import tell
 from convexrough.tabular.columns import markdown
 from convexrough.version import __version__
-from convexrough.whole import to_json
 
 HEADING = ["case", "what is hard", "files", "asperities", "touching", "variables", "condition"]
 HEADING += ["spread", "proved"]

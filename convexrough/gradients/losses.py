@@ -14,7 +14,7 @@ from convexrough.friction.cycle import Cycle
 from convexrough.friction.levels import height_at
 from convexrough.friction.path import LoadPath
 from convexrough.gradients.along import NONE, Along, Walk
-from convexrough.gradients.gradient import Gradient, Holding, Number, held
+from convexrough.gradients.gradient import Gradient, Holding, Number, control_held
 from convexrough.gradients.pulled import Part
 from convexrough.gradients.states import Frictional
 from convexrough.numbers.balls import Ball
@@ -27,7 +27,7 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
     T = (max - min) / (2 f); else what the second time around costs.
     """
     contact, sheared = cycle.contact, Frictional.of(cycle)
-    holding = held(contact, holding)
+    holding = control_held(contact, holding)
     if (cycle.loads != float(sheared.known.load)).any():
         m = len(cycle.loads)
         first = [(k % m, Fraction(0), Fraction(0)) for k in range(m + 1)]
@@ -64,7 +64,7 @@ def path_gradient(
 ) -> Gradient:
     """As `LoadPath.gradient`."""
     sheared, m = Frictional.of(path), len(path.forces)
-    holding = held(path.contact, holding)
+    holding = control_held(path.contact, holding)
     spent, far = (
         checks.array(name, 0.0 if given is None else given, length=m, one="force")
         for name, given in (("losses", losses), ("displacements", displacements))
@@ -72,7 +72,7 @@ def path_gradient(
     if losses is None and displacements is None:
         spent = np.eye(m)[-1]
     known = sheared.known
-    if path.held and any(known.height(force) == known.load for force in path.forces.tolist()):
+    if path.held and any(abs(known.height(force)) == known.load for force in path.forces.tolist()):
         expected = "forces below f P: where all slide, a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
     later = np.cumsum(spent[::-1])[::-1]  # what is lost at a step counts in all that follow

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from convexrough import checker, checks
 from convexrough.arrays import Array
+from convexrough.atomic import replacing
 from convexrough.errors import InputError, ProofError
 from convexrough.normal.level import Level
 from convexrough.numbers.pairs import Pair
@@ -24,7 +25,6 @@ from convexrough.proof.arguments import Trial
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
-from convexrough.whole import replacing
 
 
 class Sheared(Protocol):

@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from convexrough.atomic import remove_unfinished, replacing, to_json, unfinished, write_text
 from convexrough.errors import FileError
 from convexrough.progress import tell
 from convexrough.run.scene_file import SceneFile
 from convexrough.run.stage import Result, Summary
 from convexrough.run.summary import headed, summarise
 from convexrough.tabular.units import UnitNames
-from convexrough.whole import remove_unfinished, replacing, to_json, unfinished, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -90,7 +90,7 @@ class Boxes:
     @classmethod
     def choose(cls, problem: NormalProblem, *, five: bool = False) -> Boxes:
         """A little wider than the a priori bounds, and S_i not above what the form can do."""
-        bounds = problem.bounds(problem.ceiling)
+        bounds = problem.bounds(problem.approach_bound)
         members = np.flatnonzero(bounds > NEGLIGIBLE * bounds.max())
         bounds, k = bounds[members], problem.coefficients[members]
         limit = FIVE_CONES_LIMIT if five else FOUR_CONES_LIMIT

@@ -65,7 +65,7 @@ class Newton:
     ) -> Solution:
         """Loads of the candidates, from any start that is not negative (own units)."""
         indentation = _start(problem, start)
-        highest = float(np.maximum(problem.ceiling + problem.offsets, 0.0).max())
+        highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
         if len(problem) > ALL_ITERATED and start is None:
             indentation = on_constraint(problem, indentation)
@@ -101,7 +101,7 @@ class Newton:
         return replace(answer, refine=not self.tolerance > 0)
 
     def _refines(self, problem: NormalProblem) -> bool:
-        return problem.influence.sharp and not self.tolerance > 0
+        return problem.influence.cheap_sums and not self.tolerance > 0
 
     def _iterate(
         self,
@@ -111,7 +111,7 @@ class Newton:
         announce: Announce | None,
     ) -> tuple[Pressed, int]:
         """The solution of some of the candidates: all others carry nothing."""
-        part = problem if len(near) == len(problem) else problem.among(near)
+        part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
 
         def tell(step: int, state: Pressed) -> None:

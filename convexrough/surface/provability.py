@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import SolverError
+from convexrough.plottable import Plottable
 from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.scene.asperities import Asperities
@@ -35,7 +35,7 @@ Press = Callable[[Asperities], Contact]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Provability(Table, Drawn):
+class Provability(Table, Plottable):
     """Contacts at stronger and stronger pruning. Arrays are (m,), a value for each pruning.
 
     prune, heights : part of Sz, and [length] that a hill must be prominent

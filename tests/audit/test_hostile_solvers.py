@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from friction_scenes import FRICTION, lengths, pressed
 from scenes import NAMED, PAPER_APPROACH, paper, reference
-from word_audit import Tally, require
+from status_audit import Tally, require
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
@@ -112,7 +112,7 @@ class VectorLiar:
         return self.spoil(FrictionNewton().solve(problem, total), np.random.default_rng(self.seed))
 
 
-@pytest.mark.parametrize("field", ["increments", "slips", "rise"])
+@pytest.mark.parametrize("field", ["increments", "slips", "displacement"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_what_are_no_forces_is_an_error(field: str, value: float) -> None:
     def spoil(state: Any, rng: np.random.Generator) -> Any:
@@ -125,7 +125,7 @@ def test_what_are_no_forces_is_an_error(field: str, value: float) -> None:
         shear_vector(contact, force=0.3 * FRICTION * contact.load, solver=VectorLiar(spoil))
 
 
-@pytest.mark.parametrize("field", ["increments", "slips", "rise", "total"])
+@pytest.mark.parametrize("field", ["increments", "slips", "displacement", "total"])
 @pytest.mark.sample(2)
 def test_wrong_forces_are_never_called_right(field: str) -> None:
     contact = pressed("paper")

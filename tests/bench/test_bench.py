@@ -10,7 +10,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from drawn import words
+from figure_checks import words
 from matplotlib.text import Text
 
 import convexrough as cr

@@ -21,7 +21,7 @@ from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.shells import fitted_shells, shells
 from convexrough.roundoff import ROUNDOFF
-from convexrough.scene.lattice import BLUR, Lattice
+from convexrough.scene.lattice import SITE_ERROR, Lattice
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def test_a_lattice_is_found(name: str, count: int, angle: float, shift: float, s
     assert abs(a @ b) <= 0.5 * (a @ a) * (1 + 1e-8)
     apart = inverse_distances(points, points).max()
     assert lattice.spacing == pytest.approx(1 / apart, rel=1e-9)
-    assert lattice.blur <= 2 * BLUR * np.abs(points).max()
+    assert lattice.site_error <= 2 * SITE_ERROR * np.abs(points).max()
     sites = lattice.sites(points)
     assert sites is not None
     assert len(np.unique(sites, axis=0)) == len(points)
@@ -120,7 +120,7 @@ def test_blur_is_a_bound(name: str, shift: float) -> None:
                 (Fraction(float(x)) * k for x, k in ((basis[0, c], i), (basis[1, c], j))),
                 Fraction(float(origin[c])),
             )
-            assert abs(Fraction(float(point[c])) - site) <= Fraction(lattice.blur)
+            assert abs(Fraction(float(point[c])) - site) <= Fraction(lattice.site_error)
 
 
 @settings(max_examples=25, deadline=None)
@@ -241,7 +241,7 @@ def test_random_sublattices(name: str, seed: int, count: int) -> None:
     A = operator(points)
     which = rng.permutation(300)[:count]
     others = np.setdiff1d(np.arange(300), which)
-    part, loads = A.among(which), rng.random(count) ** 9
+    part, loads = A.restricted(which), rng.random(count) ** 9
     assert len(part) == count
     assert (part.points == points[which]).all()
     exact, rest = inverse_sums(points[which], points[which], loads, SCALE)
@@ -285,7 +285,7 @@ def test_the_matrix_is_the_dense_one() -> None:
     assert (A.separations() <= dense.separations()).all()
     assert_allclose(A.separations(), dense.separations(), rtol=1e-12)
     assert_allclose(shells(A), shells(dense), rtol=1e-12)
-    assert A.among(np.array([5])).separations() == np.inf
+    assert A.restricted(np.array([5])).separations() == np.inf
     with pytest.raises(ValueError, match="off the lattice"):
         LatticeInfluence.assemble(points + 0.1, A.lattice, SCALE)
 

@@ -172,7 +172,7 @@ def test_among_and_onto() -> None:
     operator = ScatteredInfluence(points, SCALE)
     which = np.flatnonzero(points[:, 0] > 0.1)
     loads = rng.random(len(which))
-    part = operator.among(which)
+    part = operator.restricted(which)
     assert len(part) == len(which)
     assert_allclose(part.apply(loads), DenseInfluence.assemble(points[which], SCALE).apply(loads))
     others = np.concatenate((rng.uniform(-2, 2, (200, 2)), points[:5]))
@@ -214,9 +214,9 @@ def test_the_most_crowded_pair_is_not_one_of_nearest_neighbours() -> None:
 def test_point_error_is_counted() -> None:
     rng = np.random.default_rng(8)
     points = jittered(rng)
-    blur = 1e-13
-    moved = points + rng.choice([-blur, blur], points.shape)
-    operator = ScatteredInfluence(points, SCALE, blur)
+    error = 1e-13
+    moved = points + rng.choice([-error, error], points.shape)
+    operator = ScatteredInfluence(points, SCALE, error)
     loads = rng.random(len(points))
     computed = operator.apply(loads)
     true, rest = inverse_sums(moved[:200], moved, loads, SCALE)

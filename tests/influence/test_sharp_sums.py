@@ -324,10 +324,10 @@ def test_near_pairs_are_as_sharp_as_others() -> None:
 
 def test_points_that_are_not_known() -> None:
     rng = np.random.default_rng(8)
-    points, blur = jittered(rng), 1e-13
-    moved = points + rng.choice([-blur, blur], points.shape)
+    points, error = jittered(rng), 1e-13
+    moved = points + rng.choice([-error, error], points.shape)
     loads = rng.random(len(points))
-    found = sums(ScatteredInfluence(points, 1.0, blur), loads)
+    found = sums(ScatteredInfluence(points, 1.0, error), loads)
     exactly = sums(ScatteredInfluence(points, 1.0), loads)
     with ctx.workprec(200):
         offs = [abs(value(found, row) - exact(moved, loads, row)) for row in range(0, 3900, 300)]

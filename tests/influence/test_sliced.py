@@ -174,7 +174,7 @@ def test_nothing_to_add_up() -> None:
     assert not found.radius.any()
 
 
-def blurred(seed: int, count: int) -> Array:
+def perturbed(seed: int, count: int) -> Array:
     """Points of a lattice, off their sites by rounding and as much as is allowed."""
     rng = np.random.default_rng(seed)
     basis = np.array([[1.0, 0.1], [0.45, 0.8]]) * 1e-3
@@ -189,7 +189,7 @@ def blurred(seed: int, count: int) -> Array:
 @pytest.mark.parametrize("slices", [2, 3, 4])
 def test_points_are_where_they_are(seed: int, slices: int) -> None:
     """What points are off their sites is taken into account."""
-    points = blurred(seed, 120)
+    points = perturbed(seed, 120)
     lattice = Lattice.through(points)
     assert lattice is not None
     A = LatticeInfluence.assemble(points, lattice, 1.0)

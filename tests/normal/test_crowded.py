@@ -1,4 +1,4 @@
-"""Crowded contacts: what is held open, shells that overlap, and what rivals must be like."""
+"""Crowded contacts: what is fixed open, overlapping shells, and what other solutions are like."""
 
 import itertools
 from typing import Any
@@ -90,9 +90,9 @@ def test_random_points_are_proved(seed: int) -> None:
         assert contact.crowding > 1.5
         assert certificate.scope == "local"
         assert certificate.holds
-        assert certificate.held == (contact.status == "open").sum()
+        assert certificate.fixed_open == (contact.status == "open").sum()
         assert certificate.load_error < 1e-6 * contact.loads.max()
-        assert "held open" in certificate.meaning
+        assert "fixed open" in certificate.meaning
         sheared = cr.shear(contact, force=0.1 * 0.5 * contact.load)
         assert sheared.certificate.scope in ("local", "none")
 
@@ -115,7 +115,7 @@ def all_states(scene: cr.Scene, approach: float) -> list[Any]:
 
 
 @pytest.mark.parametrize("distance", [2e-4, 4e-4, 6e-4, 1e-3])
-def test_rivals_are_as_the_certificate_says(distance: float) -> None:
+def test_other_solutions_are_as_the_certificate_says(distance: float) -> None:
     """Twins, where there are two or three solutions: each is judged, and says true things."""
     points = np.array([[0.0, 0.0], [distance, 0.0], [3e-3, 0.0]])
     scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, geometry="summit")
@@ -136,8 +136,8 @@ def test_rivals_are_as_the_certificate_says(distance: float) -> None:
                 continue
             radii = np.cbrt(0.75 * other * scene.relative_radii)
             crowding = float((np.add.outer(radii, radii) * inverse).max())
-            assert crowding > judged.rival_crowding
-            assert not judged.rival_covers or (radii > nearest).any()
+            assert crowding > judged.other_solutions_crowding
+            assert not judged.other_solutions_cover or (radii > nearest).any()
     assert judged_any or distance == 4e-4  # crowding just above pi: only both touching is found
 
 
@@ -217,8 +217,8 @@ def test_sparse_elimination_proves_no_more_than_is_true(seed: int, count: int, l
     errors = np.full(len(i), 1e-5)
     proved = proved_sparse_margin(diagonal, (i, j), full[i, j], CROWDED_MARGINS, errors)
     assert proved <= max(lift, 0.0)
-    blurred = lift - 1e-5 * float((matrix != 0).sum(axis=1).max())
-    assert proved >= 0.4 * blurred or blurred < 3e-4 or proved == CROWDED_MARGINS[-1]
+    perturbed = lift - 1e-5 * float((matrix != 0).sum(axis=1).max())
+    assert proved >= 0.4 * perturbed or perturbed < 3e-4 or proved == CROWDED_MARGINS[-1]
 
 
 def test_the_largest_margin() -> None:

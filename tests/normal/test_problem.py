@@ -64,7 +64,7 @@ def test_the_gap_is_the_gradient_of_the_energy(name: str, kind: Kind) -> None:
     scene, approach = NAMED[name]
     problem = assembled(scene, approach=approach, influence=kind)
     rng = np.random.default_rng(0)
-    loads = problem.bounds(problem.ceiling) * rng.uniform(0.1, 0.9, len(problem))
+    loads = problem.bounds(problem.approach_bound) * rng.uniform(0.1, 0.9, len(problem))
     gap = problem.gap(loads, problem.influence.apply(loads), problem.approach or 0.0)
     direction = rng.standard_normal(len(problem)) * loads
     step = 1e-5
@@ -86,7 +86,7 @@ def test_own_units_are_exact_and_of_order_one(name: str, kind: Kind) -> None:
     ours = problem.coefficients[0] * problem.units.length / k[0]
     assert ours == pytest.approx(problem.units.force ** (2 / 3), rel=1e-15)
     # The contact law in the scene's own units, written out.
-    loads = problem.bounds(problem.ceiling) / 3
+    loads = problem.bounds(problem.approach_bound) / 3
     force, length = problem.units.force, problem.units.length
     raw = problem.to_scene(loads) * force
     points = scene.contact_points
@@ -113,7 +113,7 @@ def test_a_priori_bounds(drawn: Case) -> None:
     scene, approach, kind = drawn
     contact = cr.press(scene, approach=approach)
     problem = assembled(scene, approach=approach, influence=kind)
-    bounds = problem.bounds(problem.ceiling) * problem.units.force
+    bounds = problem.bounds(problem.approach_bound) * problem.units.force
     assert (contact.loads[problem.candidates] <= bounds).all()
     if contact.load > 0:
         assert highest_approach(scene, contact.load, kind) >= approach * (1 - 1e-12)
@@ -150,7 +150,7 @@ def test_convexity_number(drawn: Case, size: float) -> None:
     problem = assembled(scene, approach=approach, influence=kind)
     if len(problem) == 0:
         return
-    loads = problem.bounds(problem.ceiling) * size
+    loads = problem.bounds(problem.approach_bound) * size
     root = 1 / np.sqrt(problem.stiffness(loads))
     hessian = np.eye(len(problem)) + root[:, None] * problem.influence.matrix * root
     theta = problem.convexity_number(loads)
@@ -199,7 +199,7 @@ def test_manufactured_contacts(
     if len(problem) < count:
         return
     touching = rng.random(count) < 0.6
-    largest = problem.bounds(problem.ceiling) * problem.units.force
+    largest = problem.bounds(problem.approach_bound) * problem.units.force
     loads = np.where(touching, largest * rng.random(count), 0.0)
     gaps = np.where(touching, 0.0, approach * rng.random(count))
     k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
@@ -262,7 +262,7 @@ def test_every_newton_step_lowers_the_energy(make: Any, kind: Kind) -> None:
         scene, approach = make(seed, 20, 4.0, 0.5)
         problem = assembled(scene, approach=approach, influence=kind)
         rng = np.random.default_rng(seed)
-        start = problem.bounds(problem.ceiling) * rng.random(len(problem)) ** 3
+        start = problem.bounds(problem.approach_bound) * rng.random(len(problem)) ** 3
         law = Pressing(problem, float(np.abs(problem.offsets).max()))
         state = law.evaluate(hertz.indentation(start, problem.coefficients))
         for _ in range(12):
@@ -291,7 +291,7 @@ def test_the_residual_is_not_below_the_truth(kind: Kind) -> None:
             gap = exact_gap(scene, exact, PAPER_APPROACH)[problem.candidates]
             wrong = [abs(g) if P > 0 else -g for g, P in zip(gap, loads.high, strict=True)]
             truth = float(max(wrong) / arb(problem.units.length))
-        assert truth <= solution.residual <= 1e-22 * problem.ceiling
+        assert truth <= solution.residual <= 1e-22 * problem.approach_bound
     assert problem.residual(solution.loads * 1.01, solution.approach) > 1e-3
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawn import discs, fits, words
+from figure_checks import discs, fits, words
 from matplotlib.colors import to_rgba
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, ONE, PAPER, ROUGH, TWO, follow
@@ -124,8 +124,8 @@ def test_the_map_changes_at_the_limits(name: str) -> None:
         x, y = (at * unit_p or fixed), at * unit_t
         if y < 1:
             here = counts[int(y * n), int(x * n)]
-            blur = 1.5 / n / max(unit_p, unit_t)
-            low, high = (int((factors < at + side * blur).sum()) for side in (-1, 1))
+            error = 1.5 / n / max(unit_p, unit_t)
+            low, high = (int((factors < at + side * error).sum()) for side in (-1, 1))
             assert low <= here <= high
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 import pytest
-from drawn import fits, words
+from figure_checks import fits, words
 from matplotlib.collections import EllipseCollection
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel

@@ -57,7 +57,7 @@ def test_what_is_made_on_a_lattice_need_not_be_looked_for(pattern: Any, within: 
             for row in lattice.basis.T
         ]
         off = [abs(Fraction(x) - y) for x, y in zip(point, there, strict=True)]
-        assert max(off) <= lattice.blur / 4
+        assert max(off) <= lattice.site_error / 4
     assert lattice.spacing == pytest.approx(0.7, rel=1e-15)
     assert (made.order == np.lexsort(sites.T[::-1])).all()
     found = Layout(made.points)

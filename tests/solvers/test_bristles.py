@@ -107,7 +107,7 @@ def test_a_box_cut_to_the_convex_range(control: str, matrices: list[Any]) -> Non
     wide = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.03)
     scene, approach = cr.Scene(1.0, wide, MATERIAL, geometry="summit"), 5e-4
     problem = NormalProblem.assemble(scene, approach=approach)
-    assert problem.convexity_number(problem.bounds(problem.ceiling)) > 1.5
+    assert problem.convexity_number(problem.bounds(problem.approach_bound)) > 1.5
     reference, prescribed = pressed(scene, approach, control)
     contact = cr.press(scene, solver=BristleQP(32), **prescribed)
     assert len(matrices) == 1

@@ -122,14 +122,14 @@ def test_a_model_is_solved_again_at_another_approach(solver: ConicCVXPY) -> None
     model = solver.model(problem)
     for part in (1.0, 0.9, 0.2, 0.7):
         expected = cr.press(paper(), approach=part * PAPER_APPROACH)
-        found = model.solve(part * problem.ceiling)
+        found = model.solve(part * problem.approach_bound)
         assert_allclose(
             problem.to_scene(found.loads) * problem.units.force,
             expected.loads,
             atol=1e-12 * expected.loads.max(),
         )
     with pytest.raises(cr.InputError, match="approach: found"):
-        model.solve(1.01 * problem.ceiling)
+        model.solve(1.01 * problem.approach_bound)
 
 
 @pytest.mark.parametrize("solver", [*SOLVERS, OTHERS[1]], ids=by_name)  # SCS takes many steps

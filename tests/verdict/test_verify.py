@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawn import fits, words
+from figure_checks import fits, words
 from scene_files import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
