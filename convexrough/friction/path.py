@@ -24,7 +24,6 @@ from convexrough.friction.order import Order
 from convexrough.friction.walk import Point, Walk
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
@@ -135,7 +134,6 @@ def load_path(
     start: Contact | None = None,
     influence: Kind | None = None,
     steps: int | None = None,
-    announce: Announce | None = None,
 ) -> LoadPath:
     """Any path of the total load P and the shear force Q, |Q| <= f P, straight between its points.
 
@@ -144,7 +142,6 @@ def load_path(
     influence : how to couple the asperities; None for the cheapest that is exact
     steps     : take the general step, which assumes no order, so many times per segment; None for
         the memory curve, and as many as are needed where order fails. Nothing is proved of them.
-    announce  : told in a line how far long work has come
 
     Raises InputError for an empty path, loads that are negative, shear beyond f P (where, and by
     how much) or left at a load of 0; SolverError where a normal problem is not solved.
@@ -154,13 +151,11 @@ def load_path(
     >>> (path.displacements > 0).tolist(), path.presses
     ([False, True, True], 4)
     """
-    return walk(scene, loads, forces, start, influence, steps, announce)
+    return walk(scene, loads, forces, start, influence, steps)
 
 
-def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = None) -> LoadPath:
+def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     """Any sequence of shear forces (m,) [force], |Q| <= f P, from the freshly pressed contact.
-
-    announce : told in a line how far long work has come
 
     >>> past = cr.history(contact, forces=contact.load * np.array([0.4, 0.0]))
     >>> print([f"{moved:.3g}" for moved in past.displacements])  # the way back is not the way there
@@ -183,7 +178,6 @@ def walk(
     start: Contact | None = None,
     influence: Kind | None = None,
     steps: int | None = None,
-    announce: Announce | None = None,
     stepper: type[Stepper] = Stepper,
 ) -> LoadPath:
     """`load_path`, with a choice of how a general step is solved."""
@@ -197,19 +191,17 @@ def walk(
             raise InputError("start", found="a contact of another scene", expected=expected)
         curve = MemoryCurve.pressed(start.cached(FrictionLevels).load)
         influence = influence or start.influence
-    contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence, announce)
+    contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence)
     levels = contact.cached(FrictionLevels)
     return _path(
         contact, np.array(forces, dtype=float), Walk(levels, curve, points, steps, stepper)
     )
 
 
-def pressed_for(
-    scene: Scene, loads: Iterable[Fraction], influence: Kind | None, announce: Announce | None
-) -> Contact:
+def pressed_for(scene: Scene, loads: Iterable[Fraction], influence: Kind | None) -> Contact:
     """The scene at the highest of these loads; at the first touch where that is 0."""
     if highest := float(max(loads)):
-        return press(scene, load=highest, influence=influence, announce=announce)
+        return press(scene, load=highest, influence=influence)
     return press(scene, approach=-float(scene.offsets.max()))
 
 

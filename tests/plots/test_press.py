@@ -77,7 +77,6 @@ CASES: dict[str, Callable[[], cr.Contact]] = {
     "steel": lambda: cr.press(steel(), approach=0.5e-6),
     "2000": lambda: dense(3e-4),
     "5000": lambda: dense(1.9e-4),
-    "20000": lambda: dense(1e-4),
     "nothing": lambda: cr.press(paper(), approach=-1e-6),
     "undecided": lambda: doubted("global", 6),
     "not proved": lambda: doubted("none", 37),
