@@ -41,7 +41,7 @@ class Sloppy:
     instead: Exception | None = None
     name: str = "sloppy"
 
-    def solve(self, problem: NormalProblem, start: Any = None, announce: Any = None) -> Solution:
+    def solve(self, problem: NormalProblem, start: Any = None) -> Solution:
         if self.instead is not None:
             raise self.instead
         solution = Newton().solve(problem, start)
@@ -141,12 +141,10 @@ def test_solvers_that_do_not_answer() -> None:
 def test_without_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     solve = Newton.solve
 
-    def fail(
-        self: Newton, problem: NormalProblem, start: Any = None, announce: Any = None
-    ) -> Solution:
+    def fail(self: Newton, problem: NormalProblem, start: Any = None) -> Solution:
         if self.tolerance == Newton().tolerance:
             raise cr.SolverError("newton: stopped")
-        return solve(self, problem, start, announce)
+        return solve(self, problem, start)
 
     monkeypatch.setattr(Newton, "solve", fail)
     comparison = compare(paper(), approach=5e-5, solvers=[BristleQP(16), Newton(tolerance=1e-3)])
@@ -339,7 +337,7 @@ from convexrough.solvers import Newton
 @dataclass(frozen=True)
 class Mine:
     name: str = "mine"
-    def solve(self, problem, start=None, announce=None):
+    def solve(self, problem, start=None):
         return Newton().solve(problem)
 
 class NoSolver: ...

@@ -373,16 +373,16 @@ def test_few_touching_under_a_load(kind: Kind, seed: int) -> None:
 
 
 @pytest.mark.parametrize("approach", [0.0, -1e-6, 5e-5])
-def test_news_of_the_steps(approach: float) -> None:
+def test_progress_of_the_steps(approach: float, caplog: pytest.LogCaptureFixture) -> None:
     asperities = cr.Asperities.square(
         spacing=2.5e-3, tip_radius=0.02, within=0.01, height_std=1e-5, seed=1
     )
-    news: list[str] = []
+    caplog.set_level("INFO", logger="convexrough")
     cr.press(
         cr.Scene(1.0, asperities, MATERIAL, geometry="summit"),
         approach=approach,
-        announce=news.append,
     )
+    news = caplog.messages
     assert news[-1] == "certifying"
     assert news[0].startswith("step 1, residual ")
     assert " touching" in news[0]
