@@ -109,8 +109,15 @@ class Tables:
             study = self._study(number, last)
             scene, highest = build_scene(self.path, study, layouts)
             normal, solver = study.normal, study.solver
-            given = normal.approach, normal.load, study.stages
-            return Asked(scene, *given, solver.name, solver.influence, highest)
+            return Asked(
+                scene,
+                normal.approach,
+                normal.load,
+                study.stages,
+                solver.name,
+                solver.influence,
+                highest,
+            )
 
         return ask
 
@@ -161,10 +168,10 @@ class Objects:
 
     def opened(self) -> Ask:
         def ask(number: int) -> Asked:
-            place = number - self.first
-            control = float(self.controls[place])
-            given = (None, control) if self.by_load else (control, None)
-            return Asked(self.scenes[place], *given, self.stages)
+            scene = self.scenes[number - self.first]
+            control = float(self.controls[number - self.first])
+            approach, load = (None, control) if self.by_load else (control, None)
+            return Asked(scene, approach, load, self.stages)
 
         return ask
 
