@@ -26,8 +26,8 @@ def _count(status: str) -> Callable[[Found], Array]:
     return lambda found: (found["status"] == status).sum(axis=1)
 
 
-#: Numbers of summaries, from what rows find: `Contacts`, and `Cycles` with their force amplitudes
-#: and the amplitudes and scales of smooth spheres.
+#: Numbers of summaries, from what rows find. Beside the names of `Contacts` and `Cycles`: force
+#: amplitudes, displacement amplitudes where proved, and losses and scales of smooth spheres.
 NORMAL: dict[str, Callable[[Found], Array]] = {
     **{name: _count(name) for name in ("contact", "open", "undecided")},
     "approach": lambda found: found["approaches"],
@@ -43,10 +43,8 @@ CYCLE: dict[str, Callable[[Found], Array]] = {
     "force_amplitude": lambda found: found["amplitudes"],
     "displacement_amplitude": lambda found: found["displacement_amplitudes"],
     "displacement_error": lambda found: found["displacement_errors"],
-    "secant_stiffness": lambda found: found["amplitudes"] / found["displacement_amplitudes"],
-    "loss_factor": lambda found: (
-        found["losses"] / (np.pi * found["amplitudes"] * found["displacement_amplitudes"])
-    ),
+    "secant_stiffness": lambda found: found["amplitudes"] / found["moved"],
+    "loss_factor": lambda found: found["losses"] / (np.pi * found["amplitudes"] * found["moved"]),
     "loss_normalised": lambda found: found["losses"] / found["scales"],
     "smooth_normalised": lambda found: found["smooth"],
     "loss_over_smooth": lambda found: found["losses"] / found["scales"] / found["smooth"],
@@ -113,7 +111,8 @@ def _known(
             proved, fields = rows.cycles(high * limits, low * limits, friction)
             good &= proved
             half = (high - low) / 2.0
-            fields |= {"amplitudes": half * limits, "scales": scales}
+            moved = np.where(proved, fields["displacement_amplitudes"], np.nan)  # never 0
+            fields |= {"amplitudes": half * limits, "scales": scales, "moved": moved}
             fields["smooth"] = np.where(np.isnan(scales), np.nan, mindlin.loss(half))
             cycle = {name: number(fields) for name, number in CYCLE.items()}
             for k, known in enumerate(numbers):
