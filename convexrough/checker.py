@@ -159,7 +159,7 @@ def table(value: Any, *keys: str) -> list[Any]:
     return [value[key] for key in keys]
 
 
-def listed(values: Any, n: int | None = None) -> list[Any]:
+def as_list(values: Any, n: int | None = None) -> list[Any]:
     if not isinstance(values, list) or (n is not None and len(values) != n):
         raise Unreadable("expected a list" + (f" of {n}" if n is not None else ""))
     return values
@@ -177,7 +177,7 @@ def number(text: Any) -> Fraction:
 
 
 def numbers(values: Any, n: int | None = None) -> list[Fraction]:
-    return [number(text) for text in listed(values, n)]
+    return [number(text) for text in as_list(values, n)]
 
 
 def added(texts: Any) -> Fraction:
@@ -206,7 +206,7 @@ class Scene(NamedTuple):
 
 def curvatures(value: Any) -> list[Fraction]:
     """Of the base along x and y: 1 / R of one radius for both or of one for each, 0 of "inf"."""
-    radii = listed(value, 2) if isinstance(value, list) else [value, value]
+    radii = as_list(value, 2) if isinstance(value, list) else [value, value]
     found = [Fraction(0) if text == "inf" else number(text) for text in radii]
     if any(text != "inf" and radius <= 0 for text, radius in zip(radii, found, strict=True)):
         raise Refused("a radius of the base is not positive")
@@ -221,7 +221,7 @@ def read_scene(given: Any) -> Scene:
     base, E, nu, f, geometry, *values = table(given, *SINGLE, *SEVERAL)
     bends, modulus, ratio = curvatures(base), number(E), number(nu)
     friction = Fraction(0) if f is None else number(f)
-    x, y, heights, tips = (numbers(value, len(listed(values[0]))) for value in values)
+    x, y, heights, tips = (numbers(value, len(as_list(values[0]))) for value in values)
     if not 0 < len(x) <= MOST_ASPERITIES:
         raise Refused(f"{len(x)} asperities; from 1 to {MOST_ASPERITIES} can be checked in minutes")
     if min(modulus, *tips) <= 0 or friction < 0 or not 0 <= ratio <= Fraction(1, 2):
@@ -244,10 +244,10 @@ def read_scene(given: Any) -> Scene:
 # Convexity ----------------------------------------------------------------------------------------
 
 
-def distances(scene: Scene, among: list[int], tell: Tell) -> Iterator[tuple[int, list[int]]]:
-    """Of each asperity: its number, and integers m with m - 2 < r_ij < m + 3 for `among` (1)."""
-    place = {j: k for k, j in enumerate(among)}
-    points = [scene.points[j] for j in among]
+def distances(scene: Scene, chosen: list[int], tell: Tell) -> Iterator[tuple[int, list[int]]]:
+    """Of each asperity: its number, and integers m with m - 2 < r_ij < m + 3 for `chosen` (1)."""
+    place = {j: k for k, j in enumerate(chosen)}
+    points = [scene.points[j] for j in chosen]
     for i, (p, q) in enumerate(scene.points):
         apart = [math.isqrt((x - p) ** 2 + (y - q) ** 2) for x, y in points]
         if i in place:
@@ -262,7 +262,7 @@ def distances(scene: Scene, among: list[int], tell: Tell) -> Iterator[tuple[int,
 class Box(NamedTuple):
     """Radii 0 <= a_i <= b_i, where the Hessian is at least 1 - theta of its local part."""
 
-    radii: list[Fraction]  # b_i; those with b_i = 0 are held open
+    radii: list[Fraction]  # b_i; those with b_i = 0 are fixed open
     able: list[int]  # the others
     theta: Fraction
 
@@ -336,7 +336,7 @@ class State(NamedTuple):
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
     """That there is one solution in the box with this load, or with the approach of the place."""
     radii, centre = table(place, "radii", "approach")
-    a = [added(radius) for radius in listed(radii, len(scene.points))]
+    a = [added(radius) for radius in as_list(radii, len(scene.points))]
     approach, b, R, d = added(centre), box.radii, scene.radii, scene.offsets
     everyone = range(len(a))
     if min(a) < 0 or any(a[i] > b[i] for i in everyone):
@@ -354,8 +354,8 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
     off = [gaps[i].size() if a[i] > 0 else max(-gaps[i].low, Fraction(0)) for i in everyone]
     misfit = added_up([Interval(off[i]) * off[i] * (2 * b[i]) for i in box.able]).root()
     distance = misfit / (1 - box.theta)
-    doubt = [(distance * interval(2 * radius).root()).high for radius in b]
-    if any(near[i].high + doubt[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
+    error = [(distance * interval(2 * radius).root()).high for radius in b]
+    if any(near[i].high + error[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
         raise Refused("the solution may be outside the box")
 
     # (8) How deep each asperity is pressed: by the approach, less what the others push.
@@ -363,9 +363,9 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
     shift = Fraction(0)
     if load is not None:
         known = [
-            (local[i] * doubt[i] / near[i] + gaps[i].size() + moved[i]).high
+            (local[i] * error[i] / near[i] + gaps[i].size() + moved[i]).high
             for i in box.able
-            if doubt[i] < near[i].low
+            if error[i] < near[i].low
         ]
         if not known:
             raise Refused("no asperity is sure enough to touch to tell the approach")
@@ -374,7 +374,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
     depths = [trial[i].wider(moved[i] + shift) for i in everyone]
     depths = [Interval(x.low, min(x.high, (D0 + d[i]).high)) for i, x in enumerate(depths)]
     if any(b[i] == 0 and depths[i].high > 0 for i in everyone):
-        raise Refused("an asperity that may touch is held open")
+        raise Refused("an asperity that may touch is fixed open")
     deep = [depth.positive_part() for depth in depths]
     loads = [(x * x * x * R[i]).root() * Fraction(4, 3) for i, x in enumerate(deep)]
 
@@ -437,7 +437,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
     reach = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
     weights = [math.ceil(2 * a * scene.grid) for a in reach]
     parts, wholes = (ONE / PI.high).as_integer_ratio()
-    rows: dict[int, list[int]] = {}  # of A C, in parts of ONE, less than `blur` too small
+    rows: dict[int, list[int]] = {}  # of A C, in parts of ONE, less than `rounding` too small
     sums: dict[int, int] = {}
     for i, apart in distances(scene, near, tell):
         if (state.approach + scene.offsets[i]).high > 0:
@@ -445,10 +445,10 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
             sums[i] = sum(row)
             if len(near) <= MOST_INVERTED:
                 rows[i] = row
-    blur = 2 + (max(sums.values(), default=0) >> 68)
-    missed = {i: Fraction(each + blur * len(near) - ONE) for i, each in sums.items()}
+    rounding = 2 + (max(sums.values(), default=0) >> 68)
+    missed = {i: Fraction(each + rounding * len(near) - ONE) for i, each in sums.items()}
     if any(missed[i] > 0 for i in near):
-        missed = missed_by_inverse(rows, near, blur, tell) if rows else {near[0]: Fraction(1)}
+        missed = missed_by_inverse(rows, near, rounding, tell) if rows else {near[0]: Fraction(1)}
     if any(missed[i] >= 0 for i in near):
         return Fraction(0)
     falls = [-state.depths[i].high * ONE / each for i, each in missed.items() if each > 0]
@@ -456,7 +456,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
 
 
 def missed_by_inverse(
-    rows: dict[int, list[int]], near: list[int], blur: int, tell: Tell
+    rows: dict[int, list[int]], near: list[int], rounding: int, tell: Tell
 ) -> dict[int, Fraction]:
     """sum_k!=i max(-H_ik, 0) - H_ii in parts of ONE, rounded up: from any X near (I + A C)^-1."""
     n, place = len(near), {i: k for k, i in enumerate(near)}
@@ -481,12 +481,12 @@ def missed_by_inverse(
         sum(abs(ONE * (ONE * (j == k) - X[k][j]) - x) for j, x in enumerate(products[i]))
         for k, i in enumerate(near)
     )
-    felt = blur * sum(sizes)
-    rest = Fraction(left + felt, ONE * ONE)  # the largest row sum of I - (I + A C) X
+    lost = rounding * sum(sizes)
+    rest = Fraction(left + lost, ONE * ONE)  # the largest row sum of I - (I + A C) X
     if 2 * rest > 1:
         return dict.fromkeys(rows, Fraction(1))
-    widest = ONE + max(map(sum, rows.values())) + blur * n
-    off = 2 * rest * max(sizes) * widest / ONE + Fraction(felt, ONE) + n
+    widest = ONE + max(map(sum, rows.values())) + rounding * n
+    off = 2 * rest * max(sizes) * widest / ONE + Fraction(lost, ONE) + n
     found = {}
     for i, product in products.items():
         row = [-x // ONE for x in product] if i not in place else X[place[i]]
@@ -550,7 +550,7 @@ def prove(document: Any, tell: Tell) -> dict[str, Any]:
         raise Unreadable("there is no ceiling under a prescribed approach")
     box = read_box(scene, convexity, tell)
     state = prove_state(scene, box, pressed, load, tell)
-    ordered = ordered_fall(scene, box, state, tell) if listed(sheared) else Fraction(0)
+    ordered = ordered_fall(scene, box, state, tell) if as_list(sheared) else Fraction(0)
     return {
         "scope": scope(scene, box, state, top),
         "approach": state.approach,
@@ -576,7 +576,7 @@ def hold(what: str, claimed: Any, proved: Any) -> None:
         for key, claim in zip(proved, table(claimed, *proved), strict=True):
             hold(f"{what} {key}", claim, proved[key])
     elif isinstance(proved, list):
-        for i, claim in enumerate(listed(claimed, len(proved))):
+        for i, claim in enumerate(as_list(claimed, len(proved))):
             hold(f"{what} [{i}]", claim, proved[i])
     elif not isinstance(proved, Interval):
         if claimed not in (proved, WEAKER.get(proved, proved and "undecided")):

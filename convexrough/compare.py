@@ -22,13 +22,13 @@ import numpy as np
 from convexrough import solvers
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press
-from convexrough.drawn import Drawn
 from convexrough.errors import ConvexroughError, InputError, SolverError
 from convexrough.frames import Variables
 from convexrough.influence import Kind
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
-from convexrough.progress import Announce
+from convexrough.plottable import Plottable
+from convexrough.progress import LOGGER
 from convexrough.record import LINE, Record, Table, in_words
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
@@ -64,7 +64,7 @@ class Entry(Record):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Table, Drawn):
+class Comparison(Table, Plottable):
     """All entries, that of the reference (Newton's method) first.
 
     contradictions : sentences about pairs of certified results, at least one of global scope, that
@@ -121,7 +121,6 @@ def compare(
     load: float | None = None,
     solvers: Sequence[solvers.Solver] | None = None,
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> Comparison:
     """Press on the scene with every solver.
 
@@ -129,7 +128,6 @@ def compare(
     solvers  : settings objects; the default is `every_solver()`. Newton's method is the reference
         and always the first
     influence : compliance operator, as for `press`
-    announce : called with the name of each solver before it starts
 
     Raises InputError where the reference refuses the input. Errors of the other solvers are in
     their entries.
@@ -138,8 +136,7 @@ def compare(
     others = every_solver() if solvers is None else solvers
     entries: list[Entry] = []
     for solver in (reference, *(each for each in others if each != reference)):
-        if announce is not None:
-            announce(solver.name)
+        LOGGER.info(solver.name)
         known = entries[0].contact if entries else None
         pressed = partial(press, scene, approach=approach, load=load, influence=influence)
         entries.append(_enter(solver, pressed, known))
@@ -264,7 +261,7 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
                 f"{bounds[1][i]:.2g}"
                 for i in where[np.argsort(-apart[where])]
             )
-            lines.append(f"{kind} of asperities {listed(each)}")
+            lines.append(f"{kind} of asperities {joined(each)}")
 
     note("loads", (first.loads, second.loads), (one.load_errors, other.load_errors))
     note("gaps", (one.gaps, other.gaps), (one.gap_errors, other.gap_errors))
@@ -276,11 +273,11 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
     proved = (one.status != "undecided") & (other.status != "undecided")
     if len(where := np.flatnonzero(proved & (one.status != other.status))):
         each = (f"{i}: {one.status[i]} and {other.status[i]}" for i in where)
-        lines.append(f"words of asperities {listed(each)}")
+        lines.append(f"words of asperities {joined(each)}")
     return [f"{first.name} and {second.name}: {line}" for line in lines]
 
 
-def listed(items: Iterator[str]) -> str:
+def joined(items: Iterator[str]) -> str:
     """The first few items as text, and the number of the others."""
     named = list(items)
     more = f"; and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""

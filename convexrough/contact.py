@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks, solvers, threads
 from convexrough.arrays import Array, Indices, frozen
+from convexrough.cached import Cached
 from convexrough.convex.newton_step import correct
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
 from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
-from convexrough.kept import Keeper
 from convexrough.normal.certificate import Certificate, certificate_of, certify_on
 from convexrough.normal.level import Level, Levels
 from convexrough.normal.problem import NormalProblem
@@ -28,7 +27,8 @@ from convexrough.normal.proved import Obstacle, proved
 from convexrough.normal.refine import refined_loads, refines
 from convexrough.normal.units import Units
 from convexrough.numbers.balls import Ball
-from convexrough.progress import Announce
+from convexrough.plottable import Plottable
+from convexrough.progress import LOGGER
 from convexrough.record import LINE, Along, Table
 from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Contact(Keeper, Table, Drawn):
+class Contact(Cached, Table, Plottable):
     """A solved normal contact. Arrays are (n,), in the order of the scene's asperities.
 
     loads         : [force]
@@ -110,11 +110,10 @@ class Contact(Keeper, Table, Drawn):
         yield from super()._rows()
         yield from (("warning", each[:LINE]) for each in self.warnings)
 
-    def proof(self, *, sheared: Sequence[Sheared] = (), announce: Announce | None = None) -> Proof:
+    def proof(self, *, sheared: Sequence[Sheared] = ()) -> Proof:
         """A proof file for `convexrough check` and other checkers; `.save(path)` writes it.
 
         sheared : shear states of this contact to prove as well, with the losses of their cycles
-        announce : called with one line of progress during long work
 
         Raises InputError for scenes too large for exact arithmetic, and ProofError where nothing is
         proved.
@@ -123,7 +122,7 @@ class Contact(Keeper, Table, Drawn):
 
         refuse_many(self.scene)
         by_load, n = self.prescribed_load is not None, len(self.scene)
-        levels, held = self.keep(levels_of), []
+        levels, held = self.cached(levels_of), []
         for state in sheared:
             drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
             level = levels.below(Ball.exact(drop / Fraction(levels.problem.units.force)))
@@ -134,7 +133,6 @@ class Contact(Keeper, Table, Drawn):
             approach=None if by_load else self.approach,
             load=self.prescribed_load,
             sheared=held,
-            announce=announce,
         )
 
     def gradient(
@@ -195,7 +193,6 @@ def press(
     solver: Solver | str | None = None,
     start: ArrayLike | None = None,
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> Contact:
     """Press the sphere on the asperities by an approach [length] or with a load [force].
 
@@ -203,7 +200,6 @@ def press(
     start  : (n,) [force] initial loads; in the convex range the solution does not depend on them
     influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
         on a lattice), "scattered" (transforms on a mesh); None for the cheapest
-    announce : called with one line of progress during long work
 
     Raises InputError for bad values and SolverError where the solver stops without a solution. A
     solution without a certificate is returned: check `contact.certificate.scope`.
@@ -216,23 +212,22 @@ def press(
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
-    return _contact(problem, solver, start, announce, began)
+    return _contact(problem, solver, start, began)
 
 
 def solve(
     problem: NormalProblem,
     solver: Solver | str | None = None,
     start: ArrayLike | None = None,
-    announce: Announce | None = None,
 ) -> Contact:
     """`press` for an assembled problem; the other arguments are as for `press`."""
-    return _contact(problem, solvers.named(solver), start, announce, time.perf_counter())
+    return _contact(problem, solvers.named(solver), start, time.perf_counter())
 
 
 def levels_of(contact: Contact) -> Levels:
     """The normal solutions of a contact's scene at loads up to its own.
 
-    `contact.keep(levels_of)` gives the same ones each time.
+    `contact.cached(levels_of)` gives the same ones each time.
     """
     scene, load = contact.scene, contact.prescribed_load
     approach = contact.approach if load is None else None
@@ -262,7 +257,6 @@ def _contact(
     problem: NormalProblem,
     solver: Solver,
     start: ArrayLike | None,
-    announce: Announce | None,
     began: float,
 ) -> Contact:
     scene = problem.scene
@@ -275,9 +269,8 @@ def _contact(
         if len(problem) == 0:  # too small an approach for anything to touch
             solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
         else:
-            solution = _solved(solver, problem, first, announce)
-        if announce is not None:
-            announce("certifying")
+            solution = _solved(solver, problem, first)
+        LOGGER.info("certifying")
         if solution.refine and len(problem) and refines(problem):
             state = solution.trial
             if state is None or not np.array_equal(state.loads.high, solution.loads):
@@ -311,12 +304,10 @@ def _contact(
     return contact
 
 
-def _solved(
-    solver: Solver, problem: NormalProblem, start: Array | None, announce: Announce | None
-) -> Solution:
+def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solution:
     """The solver's solution, checked; an error gets its last loads in scene units and order."""
     try:
-        solution = solver.solve(problem, start, announce)
+        solution = solver.solve(problem, start)
     except SolverError as error:
         if error.iterate is not None:
             error.iterate = problem.to_scene(error.iterate * problem.units.force)
@@ -339,7 +330,7 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
         return 0.0, 0.0
     A: Influence = problem.influence
     if len(touching) < len(problem):
-        A = A.among(touching)
+        A = A.restricted(touching)
     a = radii[touching]
     moved = A.scale * A.falloff(solution.loads[touching] * a**2 / 10, 3)
     return float((moved / prescribed[touching]).max()), A.crowding(a)
@@ -380,11 +371,11 @@ def closest_changes(contact: Contact) -> Array:
     scale = units.force / units.length / (np.pi * scene.material.contact_modulus)
     A = couple(scene, touching, scale, contact.influence)
     slopes = 1.5 * (loads / units.force) / (indentations / units.length)
-    rise = np.zeros(len(touching))
+    lift = np.zeros(len(touching))
     for R, axes in scene.curved:
         squares = (scene.asperities.positions[touching, axes] ** 2).sum(axis=1)
-        rise += squares * rho / (2.0 * R * (R + rho)) / units.length
-    deeper = rise - _nearer(scene, touching, A, loads / units.force)
+        lift += squares * rho / (2.0 * R * (R + rho)) / units.length
+    deeper = lift - _nearer(scene, touching, A, loads / units.force)
     change = correct(A, shells(A), np.sqrt(slopes), -deeper, balanced=False, tolerance=1e-3)
     gains[touching] = slopes * change * units.force
     return frozen(gains)

@@ -121,9 +121,9 @@ class Contacts(Table):
     @property
     def _together(self) -> list[PressedRows]:
         """Those proved in rows; a copy presses again."""
-        if "_kept" not in self.__dict__:
-            self.__dict__["_kept"] = in_rows(self.scenes, self.controls, self.by_load)
-        rows: list[PressedRows] = self.__dict__["_kept"]
+        if "_pressed" not in self.__dict__:
+            self.__dict__["_pressed"] = in_rows(self.scenes, self.controls, self.by_load)
+        rows: list[PressedRows] = self.__dict__["_pressed"]
         return rows
 
 
@@ -217,7 +217,7 @@ def press_many(
         alone=frozen(np.flatnonzero(alone)),
         **{each: frozen(values) for each, values in fields.items()},
     )
-    contacts.__dict__.update(_kept=rows, _known=known)
+    contacts.__dict__.update(_pressed=rows, _known=known)
     return contacts
 
 

@@ -45,9 +45,9 @@ class Record:
             for name, it in self._rows()
         )
         table = f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
-        picture = self._picture() if hasattr(self, "_picture") else ""  # of `Drawn`
-        beside = "display:flex;flex-wrap:wrap;align-items:start;gap:1em"
-        return f"<div style='{beside}'>{table}{picture}</div>"
+        picture = self._picture() if hasattr(self, "_picture") else ""  # of `Plottable`
+        style = "display:flex;flex-wrap:wrap;align-items:start;gap:1em"
+        return f"<div style='{style}'>{table}{picture}</div>"
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields without the cache, which is made again when needed."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough.arrays import Indices
-from convexrough.compare import Answer, contradictions, listed
+from convexrough.compare import Answer, contradictions, joined
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.shear import ShearCertificate
@@ -118,7 +118,7 @@ def assert_agree(
             differ = f"loads differ by {apart.max() / largest:.2g} of the largest"
             raise AssertionError(
                 f"{one.name} and {other.name}: {differ}, expected {within:g}: "
-                f"asperities {listed(each)}"
+                f"asperities {joined(each)}"
             )
 
 
@@ -186,7 +186,7 @@ def _described(claim: Claim, name: str, scene: Scene, which: Indices) -> str:
     def solved(i: int) -> str:
         return "" if nearby is None else f", solved {nearby[0][i]:.6g}"
 
-    return listed(
+    return joined(
         f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g}) has {name} {claim.values[i]:.6g} +- "
         f"{claim.errors[i]:.2g}{solved(i)}, {claim.status[i]}"
         for i in which

@@ -85,7 +85,7 @@ class Oracle:
         on = self.touching
         self.inner = self.A[np.ix_(on, on)]
         self.P, self.approach = self._press(mid(loads[on]), approach, steps)
-        self.ceilings = self.k[on] * cube_root(self.P) ** 2
+        self.thresholds = self.k[on] * cube_root(self.P) ** 2
 
     def _press(self, P: Balls, approach: Balls, steps: int) -> tuple[Balls, Balls]:
         k, d, s = self.k[self.touching], self.offsets[self.touching], self.setup
@@ -132,7 +132,7 @@ class Oracle:
 
     def friction(self, T: Balls, eta: Balls, steps: int = 4) -> "Sheared":
         """The increments u with sum T: eta + A u(eta) = Delta, from eta near it."""
-        C, n, rise = self.ceilings, len(self.P), arb(0)
+        C, n, displacement = self.thresholds, len(self.P), arb(0)
         eta = mid(eta)
         for step in range(steps + 1):
             size = np.array([abs(e) for e in eta]) / C
@@ -144,9 +144,9 @@ class Oracle:
             matrix = np.full((n + 1, n + 1), arb(0))
             matrix[:n, :n] = self.inner * c + np.diag(np.full(n, arb(1)))
             matrix[:n, n], matrix[n, :n] = arb(-1), c
-            change = solve(matrix, np.append(eta + self.inner @ u - rise, u.sum() - T))
-            eta, rise = mid(eta - change[:n]), (rise - change[n]).mid()
-        return Sheared(self, T, eta, u, rise)
+            change = solve(matrix, np.append(eta + self.inner @ u - displacement, u.sum() - T))
+            eta, displacement = mid(eta - change[:n]), (displacement - change[n]).mid()
+        return Sheared(self, T, eta, u, displacement)
 
 
 @dataclass(frozen=True)
@@ -157,11 +157,11 @@ class Sheared:
     T: Balls
     eta: Balls
     u: Balls
-    rise: Balls
+    displacement: Balls
 
     @property
     def displacement(self) -> Balls:
-        return self.oracle.ratio * self.oracle.setup.friction * self.rise
+        return self.oracle.ratio * self.oracle.setup.friction * self.displacement
 
     @property
     def forces(self) -> Balls:
@@ -171,7 +171,7 @@ class Sheared:
     def slips(self) -> Balls:
         beyond = [
             e - c if e > c else e + c if e < -c else arb(0)
-            for e, c in zip(self.eta, self.oracle.ceilings, strict=True)
+            for e, c in zip(self.eta, self.oracle.thresholds, strict=True)
         ]
         return self.oracle.ratio * self.oracle.setup.friction * np.array(beyond)
 
@@ -182,9 +182,9 @@ class Sheared:
         t = np.array([abs(each) for each in u / P])
         left = np.array([max((1 - each).mid(), arb(0)) for each in t])
         psi = t - arb(3) / 5 * (1 - cube_root(left) ** 5)
-        energy = (P * self.oracle.ceilings * psi).sum() + (u @ (self.oracle.inner @ u)) / 2
+        energy = (P * self.oracle.thresholds * psi).sum() + (u @ (self.oracle.inner @ u)) / 2
         f = self.oracle.setup.friction
-        return 8 * self.oracle.ratio * f * f * (self.T * self.rise / 2 - energy)
+        return 8 * self.oracle.ratio * f * f * (self.T * self.displacement / 2 - energy)
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ class Level(Oracle):
 
     def __init__(self, setup: Setup, start: cr.Contact) -> None:
         super().__init__(setup, exact(start.loads), arb(start.approach), 7)
-        left = self.ceilings + self.inner @ self.P - self.offsets[self.touching] - self.approach
+        left = self.thresholds + self.inner @ self.P - self.offsets[self.touching] - self.approach
         assert max(abs(left), default=arb(0)) < abs(self.approach) * arb(10) ** (15 - DIGITS)
         assert all(load > 0 for load in self.P)
         assert all(gap > 0 for gap in np.delete(self.gaps, self.touching))
@@ -90,14 +90,14 @@ class Level(Oracle):
     @in_digits
     def energy(self) -> Balls:
         """V(L)."""
-        own = 3 * self.ceilings / 5 + self.inner @ self.P / 2 - self.offsets[self.touching]
+        own = 3 * self.thresholds / 5 + self.inner @ self.P / 2 - self.offsets[self.touching]
         return own @ self.P
 
     @cached_property
     @in_digits
     def tangent(self) -> tuple[Balls, Balls]:
         """q = dP_i/dL of those that touch, and S = dD0/dL."""
-        matrix = self.inner + np.diag(2 * self.ceilings / (3 * self.P))
+        matrix = self.inner + np.diag(2 * self.thresholds / (3 * self.P))
         y = solve(matrix, np.full(len(self.P), arb(1)))
         return y / y.sum(), 1 / y.sum()
 
@@ -212,25 +212,25 @@ class Friction:
         P, slips = self.pressed.P, self.slips[on]
         left = self.held.loads[on] / P
         e = 1 - cube_root(left) ** 5 - 5 * (1 - left) / 6 * (1 + cube_root(left) ** 2)
-        own = arb(24) / 5 * self.travel * self.f * P * self.pressed.ceilings * e
+        own = arb(24) / 5 * self.travel * self.f * P * self.pressed.thresholds * e
         return self.pressed._spread(own + 4 * self.f * P * slips)
 
     @in_digits
     def loss_slopes(self, holding: Holding = "load") -> Slopes:
         """dW at constant Q; with the approach held P follows."""
         T, f, unit = self.T, self.f, 8 * self.travel * self.f
-        rise = self.pressed.approach - self.held.approach
+        displacement = self.pressed.approach - self.held.approach
         S, s = self.pressed.tangent[1], self.held.tangent[1]
         ends = zip(
             self.pressed.energy_slopes, self.held.energy_slopes,
             self.pressed.approach_slopes, self.held.approach_slopes, strict=True,
         )  # fmt: skip
         partial = Slopes(*(unit * (a - b - T / 2 * (c + d)) for a, b, c, d in ends))
-        by_force = unit / (2 * f) * (T * s - rise)
+        by_force = unit / (2 * f) * (T * s - displacement)
         return self._held(holding, partial._replace(
             poisson_ratio=self._by_ratio(self.energy),
             friction=2 * self.energy / f - T * by_force,
-            control=unit * (rise - T * (S + s) / 2),
+            control=unit * (displacement - T * (S + s) / 2),
             force=by_force,
         ))  # fmt: skip
 
@@ -322,7 +322,7 @@ class Bristles:
         s = (np.arange(count) + 0.5) / count
         self.limits = 1 - s * s
         self.bent = np.zeros((len(self.P), count))
-        self.deflection, self.rise, self.lost = np.zeros(len(self.P)), 0.0, 0.0
+        self.deflection, self.displacement, self.lost = np.zeros(len(self.P)), 0.0, 0.0
 
     @property
     def forces(self) -> Array:
@@ -330,7 +330,7 @@ class Bristles:
 
     @property
     def displacement(self) -> float:
-        return self.ratio * self.f * self.rise
+        return self.ratio * self.f * self.displacement
 
     def to(self, forces: Array) -> "Bristles":
         """Follow the force Q through these values."""
@@ -340,21 +340,23 @@ class Bristles:
 
     def _step(self, T: float) -> None:
         """eta + A u(eta) = Delta, sum u = T, by Newton on the clamped bristles."""
-        eta, rise, n = self.deflection, self.rise, len(self.P)
+        eta, displacement, n = self.deflection, self.displacement, len(self.P)
         for _ in range(60):
             tried = self.bent + ((eta - self.deflection) / self.C)[:, None]
             bent = np.clip(tried, -self.limits, self.limits)
             u, c = 1.5 * self.P * bent.mean(axis=1), 1.5 * self.P / self.C * (tried == bent).mean(1)
             matrix = np.block([[np.eye(n) + self.A * c, -np.ones((n, 1))], [c, np.zeros((1, 1))]])
-            change = np.linalg.solve(matrix, np.append(eta + self.A @ u - rise, u.sum() - T))
-            eta, rise = eta - change[:n], rise - change[n]
+            change = np.linalg.solve(
+                matrix, np.append(eta + self.A @ u - displacement, u.sum() - T)
+            )
+            eta, displacement = eta - change[:n], displacement - change[n]
             if np.abs(change[:n]).max() <= 1e-13 * self.C.max():
                 break
         else:
             raise ArithmeticError("Newton did not arrive: take smaller steps")
         slid = (np.abs(tried - bent) * self.limits).mean(axis=1)
         self.lost += self.ratio * self.f**2 * 1.5 * float((self.P * self.C) @ slid)
-        self.bent, self.deflection, self.rise = bent, eta, rise
+        self.bent, self.deflection, self.displacement = bent, eta, displacement
 
 
 def cycle_loss(contact: cr.Contact, force: float, steps: int = 50, count: int = 700) -> float:

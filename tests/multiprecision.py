@@ -14,7 +14,7 @@ the gap) where they do not. Damped Newton finds the point; one interval Newton s
 arithmetic, proves it. The oracle shares no code with the package that it judges.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, log2
 from typing import Any, Literal, TypeAlias
@@ -202,6 +202,38 @@ def prove(problem: NormalMap, x: Balls, *, radius: arb) -> Balls:
     if not all(whole.contains_interior(part) for whole, part in zip(box, inside, strict=True)):
         raise NotProved("the interval Newton step leaves its box")
     return inside
+
+
+def gaps(scene: Any, loads: Sequence[arb], approach: arb, rows: Iterable[int]) -> list[arb]:
+    """k_i P_i^(2/3) + (A P)_i - D_i of some asperities of a scene, whatever the loads are."""
+    return [local + sunk - shape - approach for _, local, sunk, shape in _terms(scene, loads, rows)]
+
+
+def energy(scene: Any, loads: Sequence[arb], approach: arb) -> arb:
+    """Phi(P) = sum P_i (3/5 k_i P_i^(2/3) + (A P)_i / 2 - D_i)."""
+    terms = _terms(scene, loads, range(len(loads)))
+    parts = [P * (3 * local / 5 + sunk / 2 - shape - approach) for P, local, sunk, shape in terms]
+    return sum(parts, ZERO)
+
+
+def _terms(
+    scene: Any, loads: Sequence[arb], rows: Iterable[int]
+) -> Iterator[tuple[arb, arb, arb, arb]]:
+    """P_i, k_i P_i^(2/3), (A P)_i and d_i of some asperities."""
+    modulus, bend = arb(float(scene.material.contact_modulus)), 1 / arb(float(scene.sphere_radius))
+    tips, heights = _exact(scene.asperities.tip_radii), _exact(scene.asperities.heights)
+    positions, bends = _exact(scene.asperities.positions), np.array([bend, bend])
+    points, descents = _contact_points(positions, tips, bends, scene.geometry)
+    touching = [j for j, load in enumerate(loads) if load > 0]
+    for i in rows:
+        law = (9 * (bend + 1 / tips[i]) / (16 * modulus**2)).root(3)
+        sunk = ZERO
+        for j in touching:
+            if j != i:
+                x, y = points[i] - points[j]
+                sunk += loads[j] / (arb.pi() * modulus * (x * x + y * y).sqrt())
+        local = law * loads[i].root(3) ** 2 if loads[i] > 0 else ZERO
+        yield loads[i], local, sunk, heights[i] - descents[i]
 
 
 def errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:

@@ -55,10 +55,10 @@ def _false_shear(
         false += _outside(f"slip {i}", claim["slips"][i], slip)
         if P > 0:
             relative = 1 / (bend + 1 / _number(scene["tip_radii"][i]))
-            ceiling = (9 * P * P / (16 * modulus * modulus * relative)).root(3)
+            threshold = (9 * P * P / (16 * modulus * modulus * relative)).root(3)
             t = 1 - p / P
             e = 1 - (1 - t) * _cube_root(1 - t) ** 2 - 5 * t / 6 * (1 + _cube_root(1 - t) ** 2)
-            loss += arb(24) / 5 * travel * f * ceiling * P * e + 4 * f * P * slip
+            loss += arb(24) / 5 * travel * f * threshold * P * e + 4 * f * P * slip
     if claim["loss"] is None:
         return false
     between = _solved(scene, state["held"]["radii"], {"load": pressed.load - force / (2 * f)})

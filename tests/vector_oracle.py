@@ -38,13 +38,13 @@ class VectorReference:
     """A proved state of the loaded asperities; every ball contains the true value.
 
     forces : (n, 2) over f [force];  slips : (n, 2) over c_t f [length]
-    rise   : (2,) X over c_t f [length]
+    displacement : (2,) X over c_t f [length]
     sliding : (n,)
     """
 
     forces: Balls
     slips: Balls
-    rise: Balls
+    displacement: Balls
     sliding: list[bool]
 
 
@@ -53,7 +53,7 @@ class VectorMap:
     """F and its derivative; the unknowns are eta_x, eta_y of each asperity, then X."""
 
     loads: Balls
-    ceilings: Balls
+    thresholds: Balls
     kernel: Balls  # (2n, 2n)
     total: Balls  # (2,) T
     unit: Any  # a length over a force, so that every row of F is a length
@@ -63,13 +63,13 @@ class VectorMap:
         length = (eta @ eta).sqrt()
         if not length > 0:
             raise NotProved("a displacement may be zero")
-        share = length / self.ceilings[i]
+        share = length / self.thresholds[i]
         if share > 1:
             size, slope = self.loads[i], arb(0)
         elif share < 1:
             root = (1 - share).sqrt()
             size = self.loads[i] * (1 - root**3)
-            slope = arb(3) / 2 * self.loads[i] / self.ceilings[i] * root
+            slope = arb(3) / 2 * self.loads[i] / self.thresholds[i] * root
         else:
             raise NotProved("an asperity slides or sticks, by less than its ball")
         along = np.outer(eta, eta) / (length * length)
@@ -79,14 +79,16 @@ class VectorMap:
     def evaluate(self, x: Balls) -> tuple[Balls, Balls]:
         """F and its derivative."""
         n = len(self.loads)
-        eta, rise = x[:-2], x[-2:]
+        eta, displacement = x[:-2], x[-2:]
         pairs = [self.force(i, eta[2 * i : 2 * i + 2]) for i in range(n)]
         q = np.concatenate([force for force, _ in pairs])
         stiff = np.full((2 * n, 2 * n), arb(0))
         for i, (_, slope) in enumerate(pairs):
             stiff[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = slope
         missing = q.reshape(-1, 2).sum(axis=0) - self.total
-        value = np.concatenate((eta + self.kernel @ q - np.tile(rise, n), self.unit * missing))
+        value = np.concatenate(
+            (eta + self.kernel @ q - np.tile(displacement, n), self.unit * missing)
+        )
         jacobian = np.full((2 * n + 2, 2 * n + 2), arb(0))
         jacobian[:-2, :-2] = self.kernel @ stiff
         for k in range(2 * n):
@@ -97,14 +99,14 @@ class VectorMap:
 
 
 def solve_vectors(
-    scene: cr.Scene, loads: list[Any], force: Any, start: Any, rise: Any, digits: int = 50
+    scene: cr.Scene, loads: list[Any], force: Any, start: Any, displacement: Any, digits: int = 50
 ) -> VectorReference:
     """The friction state of the asperities with loads > 0, under the force (2,), to `digits`.
 
-    start : (n, 2) forces [force] near the solution;  rise : (2,) displacement near it
+    start : (n, 2) forces [force] near the solution;  displacement : (2,) near it
     """
     with ctx.workdps(digits + GUARD_DIGITS):
-        problem, x = _problem(scene, loads, force, start, rise)
+        problem, x = _problem(scene, loads, force, start, displacement)
         size = max(float(abs(value)) for value in x)
         x = _newton(problem, x, tolerance=arb(size) * arb(10) ** (-digits - GUARD_DIGITS // 2))
         box = np.array([arb(each, arb(size) * arb(10) ** (-digits)) for each in x])
@@ -115,7 +117,7 @@ def solve_vectors(
 
 
 def _problem(
-    scene: cr.Scene, loads: list[Any], force: Any, start: Any, rise: Any
+    scene: cr.Scene, loads: list[Any], force: Any, start: Any, displacement: Any
 ) -> tuple[VectorMap, Balls]:
     touching = [i for i, load in enumerate(loads) if load > 0]
     P = np.array([loads[i] for i in touching])
@@ -128,7 +130,7 @@ def _problem(
         scene.geometry,
     )
     relative = 1 / (1 / radius + 1 / tips)
-    ceilings = np.array(
+    thresholds = np.array(
         [(9 * p * p / (16 * E * E * R)).root(3) for p, R in zip(P, relative, strict=True)]
     )
     friction = arb(scene.friction)
@@ -136,10 +138,14 @@ def _problem(
     kernel = _kernel(points, _influence(points, E), nu / (2 - nu))
     total = np.array([arb(float(each)) for each in force]) / friction
     q = _exact(np.asarray(start)[touching].reshape(-1)) / friction
-    X = _exact(rise) / travel if np.isfinite(rise).all() else _near_the_limit(P, kernel, total)
+    X = (
+        _exact(displacement) / travel
+        if np.isfinite(displacement).all()
+        else _near_the_limit(P, kernel, total)
+    )
     eta = np.tile(X, len(P)) - kernel @ q
     unit = (X @ X).sqrt() / (total @ total).sqrt()
-    return VectorMap(P, ceilings, kernel, total, _mid(unit)), _mid(np.concatenate((eta, X)))
+    return VectorMap(P, thresholds, kernel, total, _mid(unit)), _mid(np.concatenate((eta, X)))
 
 
 def _near_the_limit(P: Balls, kernel: Balls, total: Balls) -> Balls:
@@ -192,11 +198,11 @@ def _state(problem: VectorMap, x: Balls) -> VectorReference:
     eta = x[:-2].reshape(-1, 2)
     forces = np.array([problem.force(i, each)[0] for i, each in enumerate(eta)])
     lengths = [(each @ each).sqrt() for each in eta]
-    sliding = [bool(a > k) for a, k in zip(lengths, problem.ceilings, strict=True)]
+    sliding = [bool(a > k) for a, k in zip(lengths, problem.thresholds, strict=True)]
     slips = np.array(
         [
             each * (1 - k / a) if slides else each * 0
-            for each, a, k, slides in zip(eta, lengths, problem.ceilings, sliding, strict=True)
+            for each, a, k, slides in zip(eta, lengths, problem.thresholds, sliding, strict=True)
         ]
     )
     return VectorReference(forces, slips, x[-2:], sliding)

@@ -7,13 +7,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from convexrough.atomic import replacing, write_text
 from convexrough.bench.measure import TASKS
 from convexrough.bench.rows import Bench, Row, frontier
 from convexrough.errors import FileError
 from convexrough.run.results import write_figures, write_json, write_tables
 from convexrough.tabular.columns import aligned, markdown
 from convexrough.version import __version__
-from convexrough.whole import replacing, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

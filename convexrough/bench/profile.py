@@ -14,7 +14,7 @@ from convexrough.frames import Variables
 from convexrough.gallery.cases import case, names
 from convexrough.plots.notebook import Figure
 from convexrough.plots.style import SINGLE, TICK, label
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.record import Table
 from convexrough.solvers import Newton, Solver
 
@@ -93,24 +93,21 @@ def profile_of(
     *,
     cases: Sequence[str] = (),
     within: float = 1e-3,
-    announce: Announce | None = None,
 ) -> Profile:
     """Time solvers on the hard cases, once each, and judge what they answer.
 
     solvers : settings objects; the default is every one of `compare`. Newton's method is the first
     cases   : names of cases or families; all, if none is given
     within  : how far loads may be from the answer, over the largest, to be right
-    announce : told the name of each case before it starts
     """
-    rivals = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
+    others = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
     wanted = names(*cases)
-    seconds = np.full((len(rivals), len(wanted)), np.inf)
-    outcomes = [[""] * len(wanted) for _ in rivals]
+    seconds = np.full((len(others), len(wanted)), np.inf)
+    outcomes = [[""] * len(wanted) for _ in others]
     for column, name in enumerate(wanted):
-        if announce is not None:
-            announce(name)
+        LOGGER.info(name)
         hard = case(name)
-        entries = compare(hard.scene, **hard.control, solvers=rivals).entries
+        entries = compare(hard.scene, **hard.control, solvers=others).entries
         for row, entry in enumerate(entries):
             outcomes[row][column] = entry.outcome
             if (found := entry.contact) is not None:
@@ -118,7 +115,7 @@ def profile_of(
                 outcomes[row][column] = "right" if near else "wrong"
                 seconds[row, column] = found.seconds if near else np.inf
     return Profile(
-        solvers=tuple(each.name for each in rivals),
+        solvers=tuple(each.name for each in others),
         cases=wanted,
         seconds=frozen(seconds),
         outcomes=tuple(map(tuple, outcomes)),

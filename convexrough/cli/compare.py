@@ -33,11 +33,10 @@ def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named
-    from convexrough.progress import tell
     from convexrough.run import comparison as report
     from convexrough.run.scene_file import read_scene
 
-    rivals = [solver_named(name) for name in solvers] or None
+    chosen = [solver_named(name) for name in solvers] or None
     file = read_scene(scene)
     with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities"):
         comparison = compare_solvers(
@@ -45,8 +44,7 @@ def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
             approach=file.approach,
             load=file.load,
             influence=file.influence,
-            solvers=rivals,
-            announce=tell,
+            solvers=chosen,
         )
     summary = report.comparison_summary(comparison)
     echo(summary, report.describe_comparison(summary, file.units), as_json)

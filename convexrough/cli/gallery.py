@@ -11,7 +11,7 @@ from convexrough.cli.speech import DONE, echo, progress
 
 
 @click.command()
-@click.option("--list", "listed", is_flag=True, help="List the cases (default).")
+@click.option("--list", "show_list", is_flag=True, help="List the cases (default).")
 @click.option("--export", metavar="DIR", type=PATH, help="Folder for programs and answers.")
 @click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
 @click.option("--profile", is_flag=True, help="Time every solver and check its solutions.")
@@ -19,7 +19,7 @@ from convexrough.cli.speech import DONE, echo, progress
 @click.argument("names", nargs=-1)
 @json_option
 def gallery(
-    listed: bool,
+    show_list: bool,
     export: Path | None,
     force: bool,
     profile: bool,
@@ -34,26 +34,25 @@ def gallery(
     --profile computes a performance profile of all solvers, or of those given by --solver.
     """
     from convexrough import gallery as wing
+    from convexrough.atomic import write_text
     from convexrough.compare import solver_named
     from convexrough.gallery.export import exported
-    from convexrough.progress import tell
     from convexrough.run.results import results_folder
     from convexrough.tabular.columns import aligned
-    from convexrough.whole import write_text
 
     wanted = wing.names(*names)
     if profile or solvers:
-        rivals = [solver_named(each) for each in solvers]
+        chosen = [solver_named(each) for each in solvers]
         from convexrough.bench.profile import profile_of
 
         with progress("timing"):
-            table = profile_of(rivals or None, cases=wanted, announce=tell).rows()
+            table = profile_of(chosen or None, cases=wanted).rows()
         found = [dict(zip(table[0], row, strict=True)) for row in table[1:]]
         echo({"profile": found}, aligned(table, left=1), as_json)
         return DONE
     cases = [wing.case(name) for name in wanted]
     lines = []
-    if listed or export is None:
+    if show_list or export is None:
         heading = ["case", "family", "what is hard", "asperities", "touching"]
         rows = [
             [case.name, case.family, case.why, str(len(case)), str(case.touching.sum())]

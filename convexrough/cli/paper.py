@@ -24,6 +24,7 @@ def paper(
     dpi: int,
 ) -> int:
     """Reproduce the source paper's example (Dini and Hills 2009)."""
+    from convexrough.atomic import write_text
     from convexrough.paper import example
     from convexrough.paper.figure_data import figure_data
     from convexrough.run.results import (
@@ -34,7 +35,6 @@ def paper(
         write_tables,
     )
     from convexrough.tabular.units import UnitNames
-    from convexrough.whole import write_text
 
     folder = out or Path("paper-results")
     with results_folder(folder, force=force) as new, progress("reproducing the paper"):

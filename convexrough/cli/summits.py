@@ -114,8 +114,8 @@ def summits(
         files = _written(out, scanned, figures=not no_figures)
     lines = [*report.describe_surface(scanned), *written(out.parent, files)]
     echo(report.surface_summary(scanned), lines, as_json)
-    for doubt in report.doubts_of_surface(scanned):
-        say_aside("warning", doubt)
+    for message in report.warnings_about(scanned):
+        say_aside("warning", message)
     if scanned.curve is None:
         say_aside("hint", "--scene or --radius presses on them: how strong must the pruning be?")
     return DONE if scanned.certified else NOT_CERTIFIED
@@ -186,7 +186,6 @@ def _read(path: Path, *, pixel: str | None, detrend: str, **options: Any) -> Sur
 
 def _scan(surface: Surface, prune: float, fit: int, how: dict[str, Any]) -> Scanned:
     """All of it; in the unit of the scene, if that names one."""
-    from convexrough.progress import tell
     from convexrough.surface import provability
     from convexrough.surface.provability import LEVELS
     from convexrough.surface.report import Scanned
@@ -207,7 +206,7 @@ def _scan(surface: Surface, prune: float, fit: int, how: dict[str, Any]) -> Scan
     if file is None and how["radius"] is None:
         return Scanned(surface, maxima, chosen)
     press = _pressing(file, **how)
-    curve = provability(maxima, press, levels=[*LEVELS, prune], announce=tell)
+    curve = provability(maxima, press, levels=[*LEVELS, prune])
     try:
         contact = press(chosen)
     except SolverError:

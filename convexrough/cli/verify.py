@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from convexrough.atomic import write_text
 from convexrough.cli.options import PATH, Command, json_option, proof_option
 from convexrough.cli.proof import proved
 from convexrough.cli.speech import (
@@ -23,7 +24,6 @@ from convexrough.cli.speech import (
     written,
 )
 from convexrough.errors import FileError, InputError
-from convexrough.whole import write_text
 
 if TYPE_CHECKING:
     from convexrough.proof import Proof
@@ -189,7 +189,6 @@ def _written(
 
 def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
     """The proof of the claimed loads."""
-    from convexrough.progress import tell
     from convexrough.proof import prove
 
     verdict = found.verdict
@@ -199,4 +198,4 @@ def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
     ]
     control: Any = {"approach": file.approach, "load": file.load}
     with blamed_on(scene):
-        return prove(file.scene, claimed, **control, announce=tell)
+        return prove(file.scene, claimed, **control)

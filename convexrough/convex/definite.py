@@ -60,8 +60,8 @@ def proved_margin(
     entry_error : e, bound on the error of each entry relative to it
     """
     n = len(couplings)
-    blur = entry_error * float(np.abs(couplings).sum(axis=1).max())
-    slack = 1.1 * (blur + (n + 2) * n * ROUNDOFF)
+    perturbation = entry_error * float(np.abs(couplings).sum(axis=1).max())
+    slack = 1.1 * (perturbation + (n + 2) * n * ROUNDOFF)
     trial = couplings.copy()
     for margin in margins:
         np.fill_diagonal(trial, 1.0 - (margin + spare) - slack)
@@ -91,8 +91,8 @@ def proved_sparse_margin(
 
     n = len(diagonal)
     (i, j), every = pairs, np.arange(n)
-    blur = np.bincount(i, errors, n) + np.bincount(j, errors, n)
-    off = float(blur.max(initial=0.0)) + 4 * ROUNDOFF
+    perturbation = np.bincount(i, errors, n) + np.bincount(j, errors, n)
+    off = float(perturbation.max(initial=0.0)) + 4 * ROUNDOFF
     where = (np.concatenate((every, i, j)), np.concatenate((every, j, i)))
 
     def proved(margin: float) -> bool:

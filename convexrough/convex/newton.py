@@ -3,7 +3,7 @@
 Pressing, shear and vector friction are problems of one kind. Forces p(eta) are a monotone function
 of an unknown eta, what each asperity takes up itself, and with the coupling A the law is
 
-    F(eta) = eta + A p(eta) - rise = 0,
+    F(eta) = eta + A p(eta) - X = 0,
 
 once differentiable: no active set is guessed. It is the condition of the least of an energy
 Phi(p), convex in the convex range. A step d solves F + F' d = 0, as well as it is asked to, and is
@@ -120,20 +120,20 @@ def solve(
     stopping: Stopping,
     *,
     before: float = np.inf,
-    tell: Callable[[int, Point], object] | None = None,
+    report: Callable[[int, Point], object] | None = None,
 ) -> tuple[Point, int]:
     """The state that is as good as it gets, and how many steps it took.
 
     before : 2-norm of the defect that the start can be said to come from, for the first step
-    tell   : called before each step with its number, from 1, and the state
+    report : called before each step with its number, from 1, and the state
 
     It ends where  residual <= tolerance * scale;  or, once  residual <= accurate * scale,  where
     the defect is small beside rounding, which a certificate has to allow for anyway, or where a
     step does not halve the residual (the better of the two states is the answer). Else SolverError.
     """
     for step in range(1, stopping.most + 1):
-        if tell is not None:
-            tell(step, state)
+        if report is not None:
+            report(step, state)
         accurate = state.residual <= stopping.accurate * state.scale
         size, noise = math.sqrt(np.vdot(state.defect, state.defect)), law.noise(state)
         done = state.residual <= max(stopping.tolerance * state.scale, 0.0)

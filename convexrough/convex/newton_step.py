@@ -7,7 +7,7 @@ W = diag(c)^(1/2) a step from the defect F is (docs/theory/newton.md, "The norma
 
 where beta is 0, or such that the loads keep their sum: sum W y = 0. The matrix is the Hessian of
 the energy, scaled by its local part: positive definite in the convex range, and 1 where c is 0, so
-asperities without load cost nothing and no load has to be kept away from zero. A W y is at hand
+asperities without load cost nothing and no load has to be kept away from zero. A W y is known
 when conjugate gradients end, and with it what happens to every asperity, touching or not.
 
 Where the matrix is not positive definite the shells are added, which makes it so for any layout.
@@ -24,7 +24,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import SolverError
 from convexrough.influence.coupling import Influence, Smoother
 
-#: Up to so many touching asperities, a Cholesky factor is cheapest: with a matrix at hand, and
+#: Up to so many touching asperities, a Cholesky factor is cheapest: with a stored matrix, and
 #: without. Heuristics, from timings: a step is the same to what it is asked for.
 FACTORISED, FACTORISED_UNSTORED = 1500, 100
 
@@ -60,7 +60,7 @@ def correct(
     touching = root.nonzero()[0]
     if len(touching) == 0:
         return -defect
-    direct = len(touching) <= (FACTORISED if influence.at_hand else FACTORISED_UNSTORED)
+    direct = len(touching) <= (FACTORISED if influence.stored else FACTORISED_UNSTORED)
     for extra in (None, shells):
         try:
             if direct:
@@ -114,7 +114,7 @@ def _iterate(
     tolerance: float,
 ) -> Array:
     """Preconditioned conjugate gradients: docs/theory/newton.md, "Many"."""
-    single = not influence.at_hand
+    single = not influence.stored
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
     size = float(np.abs(defect).max()) or 1.0

@@ -37,7 +37,7 @@ class ConicStepper(Stepper):
     """Steps by the cone program, through Clarabel."""
 
     def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
-        program = StepProgram.accept(self, now, level, total)
+        program = StepProgram.assemble(self, now, level, total)
         raw = run_clarabel(program.apply(), "conic step", TOLERANCE, max_step_fraction=STEP)
         forces, x = program.invert(raw)
         own = np.maximum(level.indentations, 0.0)
@@ -47,7 +47,13 @@ class ConicStepper(Stepper):
         moved = x - self.A @ (forces - now.carried)
         work = now.work + 0.5 * (float(now.carried.sum()) + total) * x
         return Bundle(
-            now.load, level, tuple(curves), forces, now.positions + moved, now.rise + x, work
+            now.load,
+            level,
+            tuple(curves),
+            forces,
+            now.positions + moved,
+            now.displacement + x,
+            work,
         )
 
 
@@ -72,7 +78,7 @@ class StepProgram:
     pieces: tuple[tuple[int, Piece], ...]
 
     @classmethod
-    def accept(cls, stepper: Stepper, now: Bundle, level: Snapshot, total: float) -> StepProgram:
+    def assemble(cls, stepper: Stepper, now: Bundle, level: Snapshot, total: float) -> StepProgram:
         """Raises SolverError where no shells that the cones allow make the coupling convex."""
         which = np.flatnonzero(level.loads > 0)
         k, own = stepper.coefficients[which], level.indentations[which]
@@ -182,7 +188,7 @@ class StepProgram:
         return csc_matrix(rows), np.append(plain, lifts.constant)
 
     def invert(self, raw: RawAnswer) -> tuple[Array, float]:
-        """(N,) forces of all asperities of the scene, and the rise."""
+        """(N,) forces of all asperities of the scene, and the displacement."""
         n, unit = len(self.which), float(self.energies.max())
         forces = np.zeros(len(self.now.carried))
         forces[self.which] = np.clip(raw.x[:n], -1.0, 1.0) * self.loads

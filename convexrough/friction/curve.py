@@ -24,9 +24,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.frames import Variables
+from convexrough.plottable import Plottable
 from convexrough.record import Along, Table, in_words
 
 
@@ -45,13 +45,13 @@ class Piece(NamedTuple):
     load_after: Fraction
 
     @property
-    def held(self) -> bool:
+    def at_constant_load(self) -> bool:
         """The load stays."""
         return self.load_before == self.load_after
 
 
 @dataclass(frozen=True, repr=False)
-class MemoryCurve(Table, Drawn):
+class MemoryCurve(Table, Plottable):
     """A state: vertices (levels[k], heights[k]) from the origin, slopes[k] from k to k + 1.
 
     front : level L down to which the contact slipped last; None where all of it stuck last
@@ -128,12 +128,12 @@ class MemoryCurve(Table, Drawn):
 
     def _stroke(self, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
         """As much of the segment as one of the rules covers."""
-        rise, shear = load - self.load, height - self.height
-        if rise > 0 and abs(shear) <= rise:
-            return self._with(shear / rise, load, height), []
-        if rise >= 0:
+        added, shear = load - self.load, height - self.height
+        if added > 0 and abs(shear) <= added:
+            return self._with(shear / added, load, height), []
+        if added >= 0:
             return self._slip(1 if shear > 0 else -1, load, height)
-        lean = shear - self.slopes[-1] * rise  # over the old curve, or under it
+        lean = shear - self.slopes[-1] * added  # over the old curve, or under it
         sign = 1 if lean > 0 else -1
         if lean == 0:
             return self._run_back(load, height), []
@@ -171,8 +171,8 @@ class MemoryCurve(Table, Drawn):
         The line of slope c that ends at the moving point meets the lower end of a layer when a part
         of the segment is done. Layers that have this slope already are passed at once.
         """
-        rise = load - self.load
-        rate = (height - self.height) - sign * rise
+        added = load - self.load
+        rate = (height - self.height) - sign * added
         pieces: list[Piece] = []
         done, front, k = Fraction(0), Fraction(0), 0
         for k in reversed(range(len(self.slopes))):
@@ -184,7 +184,7 @@ class MemoryCurve(Table, Drawn):
                 front = high - (high - front) * (1 - done) / (part - done)
             at, done = done, min(part, Fraction(1))
             if front < high:
-                loads = self.load + at * rise, self.load + done * rise
+                loads = self.load + at * added, self.load + done * added
                 pieces.append(Piece(sign, self.slopes[k], high, front, *loads))
             if done == 1:
                 break

@@ -22,7 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.frames import Variables
 from convexrough.friction.curve import MemoryCurve, Piece
@@ -43,7 +42,8 @@ from convexrough.friction.shear import level_at
 from convexrough.friction.state import displacements_of, states_of, stick_radii, worded
 from convexrough.influence import Kind
 from convexrough.numbers.balls import Ball
-from convexrough.progress import Announce
+from convexrough.plottable import Plottable
+from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 from convexrough.sphere import mindlin
@@ -58,7 +58,7 @@ CELLS = 64
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cycle(Table, Drawn):
+class Cycle(Table, Plottable):
     """A closed path of P and Q, repeated. Arrays are (n,), in the scene's order.
 
     contact          : pressed with the highest load of the path
@@ -164,14 +164,14 @@ class Cycle(Table, Drawn):
         n = len(self.scene)
         if self.contact.load == 0.0:
             return (frozen(np.zeros(n)),) * 3
-        levels = self.contact.keep(FrictionLevels)
+        levels = self.contact.cached(FrictionLevels)
         if self.order == "fails" and levels.proved:
             unknown = frozen(np.full(n, np.nan))
             return unknown, unknown, frozen(np.full(n, np.inf))
         slip, slide = shared(levels, self._later, CELLS)
         partial, gross = (frozen(levels.to_scene(each.value)) for each in (slip, slide))
-        doubt = 0.0 if self.order == "proved" else np.inf
-        return partial, gross, frozen(levels.to_scene(slip.error + slide.error) + doubt)
+        uncertainty = 0.0 if self.order == "proved" else np.inf
+        return partial, gross, frozen(levels.to_scene(slip.error + slide.error) + uncertainty)
 
     @cached_property
     def _later(self) -> list[Piece]:
@@ -220,17 +220,15 @@ class Cycle(Table, Drawn):
     def loop(
         self,
         points: int = 200,
-        announce: Announce | None = None,
         asperities: ArrayLike | None = None,
     ) -> Loop:
         """The loop through about `points` points, as many down as up, denser at the ends.
 
-        announce   : told in a line how far long work has come
         asperities : indices of those whose own loops to keep, default all
 
         Raises InputError where the load varies.
         """
-        return loops([self], points, announce, asperities)[0]
+        return loops([self], points, asperities)[0]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -274,12 +272,10 @@ def cycle(
     maximum: float | None = None,
     minimum: float | None = None,
     displacement: float | None = None,
-    announce: Announce | None = None,
 ) -> Cycle:
     """The steady cycle between two shear forces [force]; `minimum` defaults to -maximum.
 
     displacement : amplitude of X [length] of a symmetric cycle, instead of its forces
-    announce     : told in a line how far long work has come
 
     Raises InputError where the scene has no friction, the minimum exceeds the maximum, or either
     exceeds f P in size, or the displacement that of gross sliding.
@@ -291,7 +287,7 @@ def cycle(
     upper = None if maximum is None else [maximum]
     lower = None if minimum is None else [minimum]
     moved = None if displacement is None else [displacement]
-    return cycles(contact, upper, lower, displacement=moved, announce=announce)[0]
+    return cycles(contact, upper, lower, displacement=moved)[0]
 
 
 def cycles(
@@ -300,7 +296,6 @@ def cycles(
     minimum: ArrayLike | None = None,
     *,
     displacement: ArrayLike | None = None,
-    announce: Announce | None = None,
 ) -> list[Cycle]:
     """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives.
 
@@ -318,7 +313,7 @@ def cycles(
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
         if contact.load > 0.0:
-            levels = contact.keep(FrictionLevels)
+            levels = contact.cached(FrictionLevels)
             heights = [levels.load - level_at("displacement", levels, x) for x in amplitudes]
             ends = [(height, -height) for height in heights]
             return _at_the_load(contact, ends, [(float(f * h), -float(f * h)) for h in heights])
@@ -336,9 +331,8 @@ def cycles(
     forces = list(zip(upper.tolist(), lower.tolist(), strict=True))
     if contact.load == 0.0:
         return [_still(contact, np.zeros(2), np.array(each)) for each in forces]
-    if announce is not None:
-        announce("pressing at the level of a cycle")
-    load = contact.keep(FrictionLevels).load
+    LOGGER.info("pressing at the level of a cycle")
+    load = contact.cached(FrictionLevels).load
     points = [[point_at(load, Q, contact.scene)[1] for Q in each] for each in forces]
     return _at_the_load(contact, points, forces)
 
@@ -349,7 +343,7 @@ def _at_the_load(
     forces: Sequence[tuple[float, float]],
 ) -> list[Cycle]:
     """Cycles between two T each, at the load of the contact."""
-    load = contact.keep(FrictionLevels).load
+    load = contact.cached(FrictionLevels).load
     paths = [[(load, T) for T in each] for each in heights]
     held = np.full(2, float(load))
     asked = [(path, held.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
@@ -362,12 +356,11 @@ def steady(
     loads: ArrayLike,
     forces: ArrayLike,
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> Cycle:
     """The steady state of a closed path of P and Q, |Q| <= f P, straight between its points.
 
     loads, forces : (m,) P and Q at its points [force]; from the last it goes back to the first
-    influence, announce : as in `load_path`
+    influence : as in `load_path`
 
     Raises what `load_path` raises.
 
@@ -377,7 +370,7 @@ def steady(
     ('0.3500', 12)
     """
     points = points_of(scene, loads, forces)
-    contact = pressed_for(scene, [load for load, _ in points], influence, announce)
+    contact = pressed_for(scene, [load for load, _ in points], influence)
     P, Q = (np.array(each, dtype=np.float64) for each in (loads, forces))
     if contact.load == 0.0:
         return _still(contact, P, Q)
@@ -401,7 +394,7 @@ def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
 ) -> list[Cycle]:
     """Of closed paths with these points, P and Q each, from one state on."""
-    levels, closed = contact.keep(FrictionLevels), [_Closed(start, path) for path, _, _ in asked]
+    levels, closed = contact.cached(FrictionLevels), [_Closed(start, path) for path, _, _ in asked]
     needed = [
         levels_needed(each.curves, [*each.first, *each.later]) | {each.still, each.least}
         for each in closed
@@ -428,7 +421,7 @@ def _cycle(
     moved: Ball,
 ) -> Cycle:
     """One of them. spent : the first time, and later;  moved : X of its curves."""
-    levels, (points, loads, forces) = contact.keep(FrictionLevels), path
+    levels, (points, loads, forces) = contact.cached(FrictionLevels), path
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
     amplitude, amplitude_error = (float(part) for part in rounded(half))
@@ -523,7 +516,6 @@ def _still(contact: Contact, loads: Array, forces: Array) -> Cycle:
 def loops(
     cycles: Sequence[Cycle],
     points: int = 200,
-    announce: Announce | None = None,
     asperities: ArrayLike | None = None,
 ) -> list[Loop]:
     """The loops of several cycles of one contact at constant load, which share their levels.
@@ -545,13 +537,10 @@ def loops(
     chosen = indices("asperities", asperities, len(contact.scene))
     widest = max(each.force_amplitude for each in cycles)
     shared = widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))
-    return [
-        _loop(each, shared[1:][shared[1:] < each.force_amplitude], chosen, announce)
-        for each in cycles
-    ]
+    return [_loop(each, shared[1:][shared[1:] < each.force_amplitude], chosen) for each in cycles]
 
 
-def _loop(cycle: Cycle, way: Array, chosen: Indices, announce: Announce | None) -> Loop:
+def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
     """Through the points where Q has gone by twice as much as `way` says, down and up again."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
@@ -560,7 +549,7 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices, announce: Announce | None) 
     if contact.load == 0.0:
         none = frozen(np.zeros((len(forces), len(chosen))))
         return Loop(chosen, frozen(forces), frozen(np.zeros(len(forces))), none, none)
-    levels, f = contact.keep(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
+    levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
     P, top, bottom = levels.load, *(point_at(levels.load, Q, contact.scene)[1] for Q in (high, low))
     drops = [2 * Fraction(each) / f for each in way.tolist()]
     heights = [max(top - drop, bottom) for drop in drops]
@@ -568,8 +557,7 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices, announce: Announce | None) 
     heights[len(way) - 1], heights[-1] = bottom, top
     ways = [(P, height) for height in heights]
     begin = follow(MemoryCurve.pressed(P), [(P, top), (P, bottom), (P, top)])[0][-1]
-    if announce is not None:
-        announce(f"{len(way) - 1} levels of a loop")
+    LOGGER.info(f"{len(way) - 1} levels of a loop")
     if cycle.order == "fails" and levels.proved:
         points = [(P, top), (P, bottom), *ways]
         found = followed(levels, MemoryCurve.pressed(P), points, 1).states

@@ -23,16 +23,16 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.shear import shear
+from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fretting(Table, Drawn):
+class Fretting(Table, Plottable):
     """Fretting of each asperity in a steady cycle at constant load; arrays are (n,), 0 where open.
 
     status           : that of the cycle

@@ -48,7 +48,7 @@ SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 class Bundle:
     """The state after a step: own curves, T_i (n,) and positions (n,) own + drift over c_t f.
 
-    load : P, by name;  rise : X / (c_t f);  work : of T along the rise, over c_t f^2
+    load : P, by name;  displacement : X / (c_t f);  work : of T along it, over c_t f^2
     """
 
     load: Fraction
@@ -56,7 +56,7 @@ class Bundle:
     curves: tuple[MemoryCurve, ...]
     carried: Array
     positions: Array
-    rise: float = 0.0
+    displacement: float = 0.0
     work: float = 0.0
 
     @property
@@ -106,7 +106,7 @@ class Stepper:
         level = self.levels.snapshot(load)
         if load == 0:
             nothing = self.start(MemoryCurve())
-            return replace(nothing, work=now.work - now.rise * float(now.carried.sum()) / 2)
+            return replace(nothing, work=now.work - now.displacement * float(now.carried.sum()) / 2)
         try:
             return replace(self._solve(now, level, float(height)), load=load)
         except SolverError:
@@ -138,9 +138,9 @@ class Stepper:
             found = f"a residual of {iterate.residual / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
         moved = now.positions + iterate.eta
-        rise = now.rise + iterate.x
+        displacement = now.displacement + iterate.x
         work = now.work + 0.5 * (float(now.carried.sum()) + total) * iterate.x
-        return Bundle(now.load, level, iterate.curves, iterate.carried, moved, rise, work)
+        return Bundle(now.load, level, iterate.curves, iterate.carried, moved, displacement, work)
 
     def stored(self, state: Bundle) -> float:
         """The elastic energy over c_t f^2: own deflections along the curves, and the coupling."""
@@ -150,10 +150,10 @@ class Stepper:
             levels = np.array([float(level) for level in curve.levels])
             loads = hertz.load(levels, k)
             for j, slope in enumerate(map(float, curve.slopes)):
-                run, rise = levels[j + 1] - levels[j], loads[j + 1] - loads[j]
+                run, added = levels[j + 1] - levels[j], loads[j + 1] - loads[j]
                 own += slope * (carried - slope * loads[j]) * run
                 own += 0.4 * slope**2 * (loads[j + 1] * levels[j + 1] - loads[j] * levels[j])
-                carried += slope * rise
+                carried += slope * added
         return own + 0.5 * float(state.carried @ self.A @ state.carried)
 
 
@@ -212,7 +212,7 @@ def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) 
     own = travel * np.array([each.deflections for each in bundles])
     forces = f * np.array([each.carried for each in bundles])
     spent = np.array([each.work - stepper.stored(each) for each in bundles])
-    displacements = travel * np.array([each.rise for each in bundles])
+    displacements = travel * np.array([each.displacement for each in bundles])
     parts = (displacements, forces, positions, positions - own)
     unknown = (np.full(part.shape, np.inf) for part in parts)
     fields = (frozen(each) for pair in zip(parts, unknown, strict=True) for each in pair)

@@ -36,15 +36,15 @@ Made = TypeVar("Made")
 
 
 class FrictionLevels:
-    """The levels of a contact, named by rational loads [force]; `contact.keep(FrictionLevels)`.
+    """The levels of a contact, named by rational loads [force]; `contact.cached(FrictionLevels)`.
 
     scene : with friction;  load : P;  candidates : (n,) of N asperities of the scene
     """
 
     def __init__(self, contact: Contact) -> None:
-        self._levels = contact.keep(levels_of)
+        self._levels = contact.cached(levels_of)
         self._named: dict[Fraction, Level] = {}
-        self._kept: dict[Any, Any] = {}
+        self._cache: dict[Any, Any] = {}
         self._ordered: Fraction | None = None  # down to where order is proved
         self.scene = contact.scene
         self.by_load = contact.prescribed_load is not None
@@ -153,16 +153,18 @@ class FrictionLevels:
         asked = frozenset({*loads, self.load})
         if self._ordered is not None and min(asked) >= self._ordered:
             return "proved"
-        found = self.keep((order_between, asked, most), lambda: order_between(self.at, asked, most))
+        found = self.cached(
+            (order_between, asked, most), lambda: order_between(self.at, asked, most)
+        )
         if found == "proved":
             self._ordered = min(asked)
         return found
 
-    def keep(self, name: Any, make: Callable[[], Made]) -> Made:
+    def cached(self, name: Any, make: Callable[[], Made]) -> Made:
         """make(), once for each name."""
-        if name not in self._kept:
-            self._kept[name] = make()
-        made: Made = self._kept[name]
+        if name not in self._cache:
+            self._cache[name] = make()
+        made: Made = self._cache[name]
         return made
 
     def snapshot(self, load: Fraction) -> Snapshot:
@@ -194,9 +196,9 @@ class FrictionLevels:
         radius[others] += float(level.approach.error)
         if level.trial is not None:
             loads = level.trial.loads.high
-            felt = self._beyond.apply(loads)
-            high[others] -= felt
-            radius[others] += self._beyond.rounding(loads).of(felt) + 4 * ROUNDOFF * felt
+            coupled = self._beyond.apply(loads)
+            high[others] -= coupled
+            radius[others] += self._beyond.rounding(loads).of(coupled) + 4 * ROUNDOFF * coupled
             radius[others] += level.solution.moves(self._beyond) if level.solution else np.inf
         return Ball(Pair(high, low), radius * (1 + SAFETY))
 
@@ -235,7 +237,7 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     'proved'
     """
     checks.instance("contact", contact, Contact)
-    return contact.keep(FrictionLevels).order([Fraction(0)], most)
+    return contact.cached(FrictionLevels).order([Fraction(0)], most)
 
 
 class Snapshot(NamedTuple):

@@ -66,8 +66,11 @@ def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
 def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     """(k,) of -dB/dL along each piece."""
     levels.prepare(load for piece in pieces for load in piece[2:])
-    held = np.array([piece.held for piece in pieces], dtype=bool)
-    at, found = [(p.load_after, end) for p in pieces if p.held for end in p[2:4]], list[Ball]()
+    still = np.array([piece.at_constant_load for piece in pieces], dtype=bool)
+    at, found = (
+        [(p.load_after, end) for p in pieces if p.at_constant_load for end in p[2:4]],
+        list[Ball](),
+    )
     known = list(dict.fromkeys(at))
     for start in range(0, len(known), some := max(1, NUMBERS // len(levels.candidates))):
         slip, slide = _of_pairs(levels, known[start : start + some])
@@ -75,8 +78,8 @@ def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     place = {pair: k for k, pair in enumerate(known)}
     total = joined([*found, Ball.exact(np.zeros(0))])
     before, lost = (total[[place[pair] for pair in at[end::2]]] for end in (0, 1))
-    moving = front_integrals(levels, [piece for piece in pieces if not piece.held])
-    back = np.argsort(np.argsort(~held, kind="stable"))
+    moving = front_integrals(levels, [piece for piece in pieces if not piece.at_constant_load])
+    back = np.argsort(np.argsort(~still, kind="stable"))
     return joined([lost - before, moving])[back]
 
 
@@ -164,7 +167,11 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Pair, Pair]]()  # weight, loads and fronts at both ends
     for piece in pieces:
-        cut = 1 if piece.held else max(1, round(cells * float((piece.top - piece.bottom) / run)))
+        cut = (
+            1
+            if piece.at_constant_load
+            else max(1, round(cells * float((piece.top - piece.bottom) / run)))
+        )
         steps = [Fraction(k, cut) for k in range(cut + 1)]
         edges = [
             (

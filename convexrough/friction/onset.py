@@ -61,8 +61,8 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     loaded = np.flatnonzero(contact.loads[asked])
     if len(loaded) == 0:
         return frozen(onsets)
-    levels = contact.keep(FrictionLevels)
-    if not levels.top.problem.influence.at_hand and len(loaded) > MOST_ONSETS:
+    levels = contact.cached(FrictionLevels)
+    if not levels.top.problem.influence.stored and len(loaded) > MOST_ONSETS:
         raise InputError(
             "which",
             found=f"{len(loaded):,} loaded asperities",

@@ -119,7 +119,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     rising : (n,) all that may touch at the highest load of the path
     """
     found = upper.solution
-    if found is None or (found.box.held & ~upper.open).any():
+    if found is None or (found.box.fixed_open & ~upper.open).any():
         return False
     span = _Span.of(upper, lower, found)
     rates = span.rates(np.ones(len(span.c)))
@@ -173,8 +173,8 @@ def proved_in_rows(rows: Stack, boxes: Boxes, high: Rows, low: Rows) -> NDArray[
     positive = (~inside | (below > 0)).all(axis=1) & (mu[:, 0] > 0)
     most = np.zeros(c.shape)
     np.put_along_axis(most, order, c_in * m, axis=1)
-    felt = rows.apply(most) * (1.0 + 1.01 * (entry_error + (c.shape[1] + 2) * ROUNDOFF))
-    rates = 1.0 - felt * (1 + SAFETY) - SAFETY
+    coupled = rows.apply(most) * (1.0 + 1.01 * (entry_error + (c.shape[1] + 2) * ROUNDOFF))
+    rates = 1.0 - coupled * (1 + SAFETY) - SAFETY
 
     def stays(which: Indices) -> NDArray[np.bool_]:
         fallen = drop[which] * -rates[which] * (1 + SAFETY)
@@ -235,8 +235,10 @@ class _Span(NamedTuple):
     def rates(self, m: Array) -> Array:
         """(n,) lower bounds on y_i(C) = 1 - (A C y(C))_i for 0 <= y <= m."""
         influence, most = self.upper.problem.influence, self.c * m
-        felt = influence.apply(most)
-        return np.asarray(1.0 - (felt + influence.rounding(most).of(felt)) * (1 + SAFETY) - SAFETY)
+        coupled = influence.apply(most)
+        return np.asarray(
+            1.0 - (coupled + influence.rounding(most).of(coupled)) * (1 + SAFETY) - SAFETY
+        )
 
     def delta(self, m: Array) -> Array:
         """Of the support."""
@@ -326,8 +328,8 @@ class _Inverse(NamedTuple):
         falls = np.maximum(sizes[:, :, None] * lost[:, None, :] - weighted @ self.matrix, 0.0)
         off = self.error + self.lost * np.linalg.norm(self.v, axis=1, keepdims=True)
         least = (falls @ change[:, :, None])[:, :, 0] + sizes * off
-        felt = (weighted @ self.v[:, :, None])[:, :, 0]
-        return np.asarray(1.0 - felt - least * (1 + SAFETY) - SAFETY * (1 + felt))
+        coupled = (weighted @ self.v[:, :, None])[:, :, 0]
+        return np.asarray(1.0 - coupled - least * (1 + SAFETY) - SAFETY * (1 + coupled))
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:

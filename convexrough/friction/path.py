@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.general_step import Stepper, followed
@@ -28,7 +27,7 @@ from convexrough.friction.state import States, states_of, used_by, words
 from convexrough.influence import Kind
 from convexrough.numbers.balls import TINY, UP, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
-from convexrough.progress import Announce
+from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
@@ -40,7 +39,7 @@ Point = tuple[Fraction, Fraction]  # (P, T = Q / f)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Path(Table, Drawn):
+class Path(Table, Plottable):
     """A sequence of m points (P, Q), with straight segments between. Errors are proved bounds.
 
     loads, forces  : (m,) P and Q [force]
@@ -166,7 +165,6 @@ def load_path(
     start: Contact | None = None,
     influence: Kind | None = None,
     steps: int | None = None,
-    announce: Announce | None = None,
 ) -> LoadPath:
     """Any path of the total load P and the shear force Q, |Q| <= f P, straight between its points.
 
@@ -175,7 +173,6 @@ def load_path(
     influence : how to couple the asperities; None for the cheapest that is exact
     steps     : take the general step, which assumes no order, so many times per segment; None for
         the memory curve, and as many as are needed where order fails. Nothing is proved of them.
-    announce  : told in a line how far long work has come
 
     Raises InputError for an empty path, loads that are negative, shear beyond f P (where, and by
     how much) or left at a load of 0; SolverError where a normal problem is not solved.
@@ -185,13 +182,12 @@ def load_path(
     >>> (path.displacements > 0).tolist(), path.presses
     ([False, True, True], 4)
     """
-    return walk(scene, loads, forces, start, influence, steps, announce)
+    return walk(scene, loads, forces, start, influence, steps)
 
 
-def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = None) -> History:
+def history(contact: Contact, *, forces: ArrayLike) -> History:
     """Any sequence of shear forces (m,) [force], |Q| <= f P, from the freshly pressed contact.
 
-    announce : told in a line how far long work has come
 
     >>> past = cr.history(contact, forces=contact.load * np.array([0.4, 0.0]))
     >>> print([f"{moved:.3g}" for moved in past.displacements])  # the way back is not the way there
@@ -202,7 +198,7 @@ def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = 
     Q = checks.bearable("forces", checks.array("forces", forces), f * contact.load)
     if contact.load == 0.0 or len(Q) == 0:
         return History(contact, **_nothing(contact, Q))
-    load = contact.keep(FrictionLevels).load
+    load = contact.cached(FrictionLevels).load
     points = [point_at(load, q, contact.scene) for q in Q.tolist()]
     start = MemoryCurve.pressed(load)
     fields = _followed(contact, start, points, None, Stepper)
@@ -216,7 +212,6 @@ def walk(
     start: Contact | None = None,
     influence: Kind | None = None,
     steps: int | None = None,
-    announce: Announce | None = None,
     stepper: type[Stepper] = Stepper,
 ) -> LoadPath:
     """`load_path`, with a choice of how a general step is solved."""
@@ -225,21 +220,19 @@ def walk(
         raise InputError("steps", found=steps, expected="a whole number, at least 1")
     curve = MemoryCurve()
     if start is not None:
-        curve = MemoryCurve.pressed(_same_scene(scene, start).keep(FrictionLevels).load)
+        curve = MemoryCurve.pressed(_same_scene(scene, start).cached(FrictionLevels).load)
         influence = influence or start.influence
-    contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence, announce)
+    contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence)
     Q = frozen(np.array(forces, dtype=np.float64))
     if contact.load == 0.0:
         return LoadPath(contact, **_nothing(contact, Q))
     return LoadPath(contact, forces=Q, **_followed(contact, curve, points, steps, stepper))
 
 
-def pressed_for(
-    scene: Scene, loads: Sequence[Fraction], influence: Kind | None, announce: Announce | None
-) -> Contact:
+def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None) -> Contact:
     """The scene at the highest of these loads."""
     if highest := float(max(loads)):
-        return press(scene, load=highest, influence=influence, announce=announce)
+        return press(scene, load=highest, influence=influence)
     apart = 1e-9 * float(scene.asperities.tip_radii.max())
     return press(scene, approach=-float(scene.offsets.max()) - apart)
 
@@ -298,7 +291,7 @@ def _followed(
     stepper: type[Stepper],
 ) -> dict[str, Any]:
     """All fields of a path but its contact and its forces."""
-    levels = contact.keep(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     curves, costs = follow(start, points)
     pieces = [piece for each in costs for piece in each]
     needed = levels_needed(curves, pieces)

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import followed
@@ -20,7 +19,8 @@ from convexrough.friction.levels import AT_THE_END, FrictionLevels, rounded
 from convexrough.friction.order import Order
 from convexrough.friction.state import states_of, stick_radii, words
 from convexrough.normal.boxes import Scope
-from convexrough.progress import Announce
+from convexrough.plottable import Plottable
+from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
@@ -73,7 +73,7 @@ class ShearCertificate(Table):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ShearState(Table, Drawn):
+class ShearState(Table, Plottable):
     """A friction state. Arrays are (n,), in the order of the scene's asperities.
 
     force         : Q [force];  displacement : X of the deep points, both bodies [length]
@@ -159,13 +159,11 @@ def shear(
     *,
     force: float | None = None,
     displacement: float | None = None,
-    announce: Announce | None = None,
 ) -> ShearState:
     """Shear a pressed contact, first loading, at constant normal load.
 
     force [force] Q or displacement [length] X of the deep points : exactly one. A force within 16
         roundoffs of f P is read as f P: gross sliding
-    announce : told in a line how far long work has come
 
     Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding) or X its
     displacement there, and SolverError where a normal problem is not solved.
@@ -183,9 +181,8 @@ def shear(
         force = one_force("force", force, friction * contact.load)
     if contact.load == 0.0:
         return _nothing_loaded(contact, displacement or 0.0)
-    levels = contact.keep(FrictionLevels)
-    if announce is not None:
-        announce("pressing at the load P - Q / f")
+    levels = contact.cached(FrictionLevels)
+    LOGGER.info("pressing at the load P - Q / f")
     if force is not None:
         height = height_of(levels, force)
     else:
@@ -243,7 +240,7 @@ def _state(
         found, status = general.states, general.status[0]
         squared = contact.scene.relative_radii * general.fronts[0]
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
-        total, doubt = float(height) * checks.friction(contact.scene.friction), 0.0
+        total, force_uncertainty = float(height) * checks.friction(contact.scene.friction), 0.0
         moved = float(found.displacements[0])
     else:
         curve = start.go(levels.load, height)[0]
@@ -251,14 +248,14 @@ def _state(
         level = levels.at(levels.load - abs(height))
         radii, radius_errors = stick_radii(levels, level)
         size, off = rounded((levels.top.load - level.load) * levels.force_unit)
-        total, doubt = float(np.copysign(size, displacement or 0.0)), float(off)
+        total, force_uncertainty = float(np.copysign(size, displacement or 0.0)), float(off)
         moved = float(found.displacements[0]) if displacement is None else displacement
     error = float(found.displacement_errors[0]) if displacement is None else 0.0
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
     most = np.abs(found.drifts[0]) + found.drift_errors[0]  # where it may or may not touch
     slip_errors = np.where(loaded, found.drift_errors[0], 0.0) + np.where(unsure, most, 0.0)
     if order == "fails":
-        found, error, doubt = found.unproved(), np.inf, np.inf
+        found, error, force_uncertainty = found.unproved(), np.inf, np.inf
         slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
     certificate = ShearCertificate(
         scope=contact.certificate.scope if levels.proved and order != "fails" else "none",
@@ -267,7 +264,7 @@ def _state(
         force_errors=found.force_errors[0],
         slip_errors=frozen(slip_errors),
         stick_radius_errors=frozen(radius_errors),
-        force_error=doubt if force is None else 0.0,
+        force_error=force_uncertainty if force is None else 0.0,
         displacement_error=error,
     )
     return ShearState(

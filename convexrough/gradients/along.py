@@ -136,9 +136,9 @@ class Along:
             spent = spent + Part(self.known.at(level), *each).value
         for level, (_, D, _) in self.sums.displacements.items():
             energy, before = weights.get(level, (ZERO, ZERO))
-            rise = self.known.travel_unit * Ball.exact(D)
-            weights[level] = energy, before + rise
-            far = far + rise * self.known.at(level).approach
+            advance = self.known.travel_unit * Ball.exact(D)
+            weights[level] = energy, before + advance
+            far = far + advance * self.known.at(level).approach
         parts = [Part(self.known.at(level), *each, moves=moves) for level, each in weights.items()]
         return parts, spent, far
 

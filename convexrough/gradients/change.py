@@ -17,7 +17,7 @@ from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState
-from convexrough.gradients.gradient import held, levels
+from convexrough.gradients.gradient import control_held, levels
 from convexrough.gradients.pulled import ZERO, product
 from convexrough.gradients.scene import Geometry, curvatures
 from convexrough.gradients.states import Frictional
@@ -123,7 +123,7 @@ def _pressed(
     if direction.load is not None and direction.approach is not None:
         found, expected = "both", "at most one of the two, as only one is held"
         raise InputError("load, approach", found=found, expected=expected)
-    by_load = held(contact, None) == "load"
+    by_load = control_held(contact, None) == "load"
     if direction.load is not None or direction.approach is not None:
         by_load = direction.approach is None
     units = top.problem.units
@@ -184,7 +184,7 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
     gaps, opened = -low.indentation, -below.indentation
     slips = balls.where(sliding, far * (opened + ratio * gaps), 0.0 * gaps)
     carried, moved = top.loads - low.loads, above.loads - below.loads
-    rise, risen = top.approach - low.approach, above.approach - below.approach
+    approach_change, risen = top.approach - low.approach, above.approach - below.approach
     to_scene = top.problem.to_scene
     return ShearChange(
         contact=contact,
@@ -192,7 +192,7 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
         pressed=first,
         forces=frozen(to_scene((travel * (moved + by_friction * carried)).value)),
         slips=frozen(to_scene(slips.value)),
-        displacement=float((far * (risen + ratio * rise)).value),
+        displacement=float((far * (risen + ratio * approach_change)).value),
     )
 
 
@@ -256,8 +256,8 @@ class _Bent:
 
     def _felt(self, level: Level) -> Ball:
         """(n,) dA P."""
-        felt = level.approach + level.problem.exact.offsets - level.indentation
-        change, points = felt * -self.modulus, self.here.points
+        coupled = level.approach + level.problem.exact.offsets - level.indentation
+        change, points = coupled * -self.modulus, self.here.points
         if points.value.any():
             every, loads = np.arange(len(level.problem)), level.loads
             change = change + (points * self.geometry.slopes(loads, every)).sum()

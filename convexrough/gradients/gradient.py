@@ -16,13 +16,13 @@ import numpy as np
 from convexrough import checks
 from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.gradients.pulled import ZERO, Moves, Part, Pulled, value_of
 from convexrough.gradients.scene import Derivatives
 from convexrough.normal.level import Level, Levels
 from convexrough.normal.problem import NormalProblem
 from convexrough.numbers.balls import Ball
+from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.base import named
 from convexrough.sphere.smooth import smooth_reference
@@ -90,7 +90,7 @@ class Number(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Gradient(Table, Drawn):
+class Gradient(Table, Plottable):
     """Derivatives of one number with respect to a scene and the prescribed quantities.
 
     Units are those of the number over those of the parameter. Arrays are (n,), in the scene's
@@ -277,14 +277,14 @@ def _number(ball: Ball) -> tuple[float, float]:
 
 def _balance_defect(number: Number, found: Derivatives) -> float:
     """E* J_E* + sum over levels of J_L L = the part of J that scales with forces; else a defect."""
-    bent, felt = found.local.sum() * -2.0 / 3.0, -found.coupled
-    terms = [bent, felt, -number.scaled, *(each.load * each.total for each in number.pulled)]
+    bent, by_coupling = found.local.sum() * -2.0 / 3.0, -found.coupled
+    terms = [bent, by_coupling, -number.scaled, *(each.load * each.total for each in number.pulled)]
     defect = float(sum(terms, start=ZERO).value)
     size = max(float(np.abs(term.value)) for term in terms)
     return abs(defect) / size if size > 0 else 0.0
 
 
-def held(contact: Contact, holding: Holding | None) -> Holding:
+def control_held(contact: Contact, holding: Holding | None) -> Holding:
     """What is held, checked; default what was prescribed."""
     checks.instance("contact", contact, Contact)
     if holding is None:
@@ -299,4 +299,4 @@ def levels(contact: Contact) -> Levels:
     if contact.load == 0.0:
         expected = "a contact that carries some load: without, nothing has a derivative"
         raise InputError("contact", found="no load", expected=expected)
-    return contact.keep(levels_of)
+    return contact.cached(levels_of)

@@ -14,7 +14,7 @@ from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import History, LoadPath
 from convexrough.friction.shear import limited
 from convexrough.gradients.along import NONE, Along, Walk
-from convexrough.gradients.gradient import Gradient, Holding, Number, held
+from convexrough.gradients.gradient import Gradient, Holding, Number, control_held
 from convexrough.gradients.pulled import Part
 from convexrough.gradients.states import Frictional
 from convexrough.numbers.balls import Ball
@@ -27,7 +27,7 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
     T = (max - min) / (2 f); else what the second time around costs.
     """
     contact, sheared = cycle.contact, Frictional.of(cycle)
-    holding = held(contact, holding)
+    holding = control_held(contact, holding)
     if (cycle.loads != float(sheared.known.load)).any():
         m = len(cycle.loads)
         first = [(k % m, Fraction(0), Fraction(0)) for k in range(m + 1)]
@@ -63,7 +63,7 @@ def history_gradient(
     holding: Holding | None = None,
 ) -> Gradient:
     """As `History.gradient`."""
-    sheared, holding = Frictional.of(history), held(history.contact, holding)
+    sheared, holding = Frictional.of(history), control_held(history.contact, holding)
     m = len(history.forces)
     if losses is None and displacements is None:
         expected = "at least one: weights on what is to be differentiated"

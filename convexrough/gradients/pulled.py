@@ -73,7 +73,7 @@ class Part:
 class Pulled(NamedTuple):
     """offsets'dd + local'd log k + left'dA P + load dL, of one part. Arrays are (n,).
 
-    loads, felt : P and A P;  total : L
+    loads, coupled : P and A P;  total : L
     steep       : weight on D0 at no load, where it changes infinitely fast with L
     """
 
@@ -82,7 +82,7 @@ class Pulled(NamedTuple):
     left: Ball
     load: Ball
     loads: Ball
-    felt: Ball
+    coupled: Ball
     total: Ball
     steep: Ball = ZERO
 
@@ -90,28 +90,28 @@ class Pulled(NamedTuple):
     def of(cls, part: Part) -> Pulled:
         """All derivatives that one level has a part in."""
         level, v, w = part.level, part.indentations, part.loads
-        rise = part.approach if v is None else part.approach + v.sum()
+        weight = part.approach if v is None else part.approach + v.sum()
         P, zero = level.loads, Ball.exact(np.zeros(len(level.problem)))
-        felt = level.approach + level.problem.exact.offsets - level.indentation
+        coupled = level.approach + level.problem.exact.offsets - level.indentation
         own = part.energy * P
         by_load = part.energy * level.approach
         if level.trial is None:
-            moved, jump = _first_touch(level, rise, w)
+            moved, jump = _first_touch(level, weight, w)
             lifted = moved if v is None else moved + v
-            return cls(lifted, zero, zero, by_load + jump, zero, zero, level.load, rise)
-        moved = zero  # lambda - rise q
+            return cls(lifted, zero, zero, by_load + jump, zero, zero, level.load, weight)
+        moved = zero  # lambda - weight q
         if w is not None or v is not None:
             right = zero if w is None else w
             if v is not None:
                 right = right - product(level, v)
             moved = level.response(right, ZERO).loads
             by_load = by_load + right.dot(level.tangent.loads)
-        if rise.size > 0.0:
-            moved = moved - rise * level.tangent.loads
-            by_load = by_load + rise * level.tangent.approach
+        if weight.size > 0.0:
+            moved = moved - weight * level.tangent.loads
+            by_load = by_load + weight * level.tangent.approach
         lifted = moved if v is None else moved + v
         local = (own * 3.0 / 5.0 - moved) * level.indentation.positive_part()
-        return cls(lifted - own, local, own * 0.5 - lifted, by_load, P, felt, level.load)
+        return cls(lifted - own, local, own * 0.5 - lifted, by_load, P, coupled, level.load)
 
     def times(self, factor: Ball) -> Pulled:
         """Of the number times another."""
@@ -124,7 +124,7 @@ class Pulled(NamedTuple):
         )
 
 
-def _first_touch(level: Level, rise: Ball, w: Ball | None) -> tuple[Ball, Ball]:
+def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball]:
     """At no load D0 = -d of the highest asperity, which is the first to carry any."""
     offsets = level.problem.exact.offsets
     first = offsets.upper >= offsets.lower.max()
@@ -133,17 +133,19 @@ def _first_touch(level: Level, rise: Ball, w: Ball | None) -> tuple[Ball, Ball]:
         expected += "of them does depends on the direction of a change"
         raise InputError("force", found="gross sliding", expected=expected)
     zero = Ball.exact(np.zeros(len(offsets)))
-    moved = where(first, zero - rise, zero)
+    moved = where(first, zero - weight, zero)
     return moved, ZERO if w is None else w[int(np.argmax(first))]
 
 
 def product(level: Level, weights: Ball) -> Ball:
     """A times balls: of their midpoints, and at most the largest entry times their radii."""
     problem = level.problem
-    felt = problem.product(weights.mid)
+    coupled = problem.product(weights.mid)
     if weights.radius.any():
-        felt = Ball.around(felt.mid, felt.radius + weights.radius.sum() * problem.largest_entry)
-    return felt
+        coupled = Ball.around(
+            coupled.mid, coupled.radius + weights.radius.sum() * problem.largest_entry
+        )
+    return coupled
 
 
 def value_of(parts: Iterable[Part]) -> Ball:

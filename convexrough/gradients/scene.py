@@ -86,7 +86,7 @@ class Geometry:
         """
         if len(which) <= PAIRWISE:
             return self._pair_by_pair(loads, which)
-        influence = self.problem.influence.among(which)
+        influence = self.problem.influence.restricted(which)
         found = influence.slopes(loads.value)
         if influence.name != "dense":
             return Ball.around(found, np.inf)
@@ -151,7 +151,7 @@ class Derivatives:
     @cached_property
     def coupled(self) -> Ball:
         """sum of left'A P."""
-        return sum((each.left.dot(each.felt) for each in self.pulled), start=ZERO)
+        return sum((each.left.dot(each.coupled) for each in self.pulled), start=ZERO)
 
     @cached_property
     def positions(self) -> Ball:

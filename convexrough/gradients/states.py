@@ -17,7 +17,7 @@ from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
 from convexrough.friction.shear import ShearState, limited
-from convexrough.gradients.gradient import Gradient, Holding, Number, held, levels
+from convexrough.gradients.gradient import Gradient, Holding, Number, control_held, levels
 from convexrough.gradients.pulled import ZERO, Moves, Part, product
 from convexrough.normal.level import Level, Levels
 from convexrough.normal.proved import Obstacle, proved
@@ -56,7 +56,7 @@ class Frictional:
     @classmethod
     def pressed(cls, contact: Contact) -> Frictional:
         levels(contact)
-        return cls(contact, contact.keep(FrictionLevels))
+        return cls(contact, contact.cached(FrictionLevels))
 
     @property
     def f(self) -> Ball:
@@ -107,7 +107,7 @@ def contact_gradient(
     holding: Holding | None = None,
 ) -> Gradient:
     """As `Contact.gradient`."""
-    holding = held(contact, holding)
+    holding = control_held(contact, holding)
     top = levels(contact).top
     P, D = _number("load", load), _number("approach", approach)
     on_loads = _weights("loads", loads, contact) + P
@@ -140,24 +140,24 @@ def state_gradient(
 ) -> Gradient:
     """As `ShearState.gradient`."""
     contact, sheared = state.contact, Frictional.of(state)
-    holding = held(contact, holding)
+    holding = control_held(contact, holding)
     X = _number("displacement", displacement)
     on_forces, on_slips = _weights("forces", forces, contact), _weights("slips", slips, contact)
     _something(displacement=displacement, forces=forces, slips=slips)
     sign = -1.0 if state.force < 0 else 1.0
     top, low = sheared.known.top, sheared.below("force", state.force, holding)
     which, f, travel = top.problem.candidates, sheared.f, sheared.known.travel_unit
-    rise = travel * (sign * X)
+    weight = travel * (sign * X)
     # Q_i = f (P_i(P) - P_i(L));  X = c_t f (D0(P) - D0(L));  slips are c_t f times gaps at L
     carried = sheared.known.force_unit * Ball.exact(sign * on_forces[which])
     slid = _where_open(low, -sign * on_slips[which]) * travel
     slid = balls.where(~top.open, slid, 0.0 * slid)
     moved = sheared.moves(top.load - low.load, force=sign)
     parts = [
-        Part(top, approach=rise, loads=carried, moves=sheared.top_moves),
-        Part(low, approach=-rise, loads=-carried, indentations=slid, moves=moved),
+        Part(top, approach=weight, loads=carried, moves=sheared.top_moves),
+        Part(low, approach=-weight, loads=-carried, indentations=slid, moves=moved),
     ]
-    far = rise * (top.approach - low.approach) + slid.dot(low.indentation)
+    far = weight * (top.approach - low.approach) + slid.dot(low.indentation)
     near = carried.dot(top.loads - low.loads)
     explicit = {"friction": (far + near) / f, "poisson_ratio": far * sheared.by_ratio}
     return Gradient.of(Number.of(contact, top, parts, explicit), holding)
@@ -175,7 +175,7 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
     >>> print(f"{gradient.value / contact.load:.3f}", f"{gradient.friction / contact.load:.3f}")
     0.176 0.352
     """
-    holding, sheared = held(contact, holding), Frictional.pressed(contact)
+    holding, sheared = control_held(contact, holding), Frictional.pressed(contact)
     top, f, unit = sheared.known.top, sheared.f, sheared.unit
     which = indices("asperity", [asperity], len(contact.scene))[0]
     if contact.loads[which] == 0.0:
@@ -208,8 +208,8 @@ def _just_touching(known: Levels, place: int) -> tuple[Level, Ball]:
 
     def at(load: Ball) -> tuple[Level, Ball]:
         level = known.at(load)
-        felt = product(level, level.tangent.loads)[place]
-        return level, level.tangent.approach - felt
+        coupled = product(level, level.tangent.loads)[place]
+        return level, level.tangent.approach - coupled
 
     def depth(load: float) -> float:
         return float(known.at(Ball.exact(load)).indentation.value[place])

@@ -41,8 +41,8 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
     if kind == "dense" or (kind is None and n <= FEW_ASPERITIES):
         if scene.geometry == "summit" and len(scene) <= FEW_ASPERITIES:
             layout = scene.asperities.layout
-            inverse, sums = _among(layout.keep(_inverse), which), layout.keep(_sums)
-            return DenseInfluence.of(points, scale, scale * inverse, sums.among(which))
+            inverse, sums = _restricted(layout.cached(_inverse), which), layout.cached(_sums)
+            return DenseInfluence.of(points, scale, scale * inverse, sums.restricted(which))
         return DenseInfluence.assemble(points, scale, error, tails)
     if kind != "scattered" and scene.lattice is not None:
         layout, lattice = scene.asperities.layout, scene.lattice
@@ -66,5 +66,5 @@ def _sums(layout: Layout) -> MatrixSums:
     return MatrixSums(Pair.exact(layout.points))
 
 
-def _among(matrix: Array, which: Indices) -> Array:
+def _restricted(matrix: Array, which: Indices) -> Array:
     return matrix if len(which) == len(matrix) else matrix.take(which, axis=0).take(which, axis=1)

@@ -80,9 +80,9 @@ class Influence(Coupling, Protocol):
 
     name   : "dense", "lattice" or "scattered"
     points : (n, 2) [length];  scale : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
-    at_hand : the matrix is stored, so that to use it, or a part of it, costs nothing; else products
+    stored : the matrix is stored, so that to use it, or a part of it, costs nothing; else products
         of float32 loads are cheaper than those of float64 loads
-    sharp : `sums` cost few products, so that Newton's last step starts from them
+    cheap_sums : `sums` cost few products, so that Newton's last step starts from them
     """
 
     @property
@@ -92,13 +92,13 @@ class Influence(Coupling, Protocol):
     @property
     def scale(self) -> float: ...
     @property
-    def at_hand(self) -> bool: ...
+    def stored(self) -> bool: ...
     @property
-    def sharp(self) -> bool: ...
+    def cheap_sums(self) -> bool: ...
 
     @property
     def matrix(self) -> Array:
-        """(n, n) A itself; computed when asked for, if it fits in memory, unless it is at hand."""
+        """(n, n) A itself; computed when asked for, if it fits in memory, unless it is stored."""
         ...
 
     def submatrix(self, which: Indices) -> Array:
@@ -112,7 +112,7 @@ class Influence(Coupling, Protocol):
 
     def __len__(self) -> int: ...
 
-    def among(self, which: Indices) -> Influence:
+    def restricted(self, which: Indices) -> Influence:
         """The coupling among some of the asperities."""
         ...
 

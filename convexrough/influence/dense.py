@@ -84,8 +84,8 @@ class DenseInfluence:
     sums: MatrixSums
 
     name: ClassVar[Kind] = "dense"
-    at_hand: ClassVar[bool] = True
-    sharp: ClassVar[bool] = False
+    stored: ClassVar[bool] = True
+    cheap_sums: ClassVar[bool] = False
 
     @classmethod
     def assemble(
@@ -140,12 +140,12 @@ class DenseInfluence:
     def submatrix(self, which: Indices) -> Array:
         return self.matrix.take(which, axis=0).take(which, axis=1)
 
-    def among(self, which: Indices) -> DenseInfluence:
+    def restricted(self, which: Indices) -> DenseInfluence:
         return replace(
             self,
             points=self.points[which],
             matrix=self.submatrix(which),
-            sums=self.sums.among(which),
+            sums=self.sums.restricted(which),
         )
 
     def onto(self, points: Array) -> DenseCoupling:

@@ -59,7 +59,7 @@ class LatticeCoupling:
 
     sources : (n,) places in the box, row by row;  targets : (m,)
     spacing : [length] the shortest distance of two sites
-    blur    : [spacing] bound on how far the difference of two points is from that of their sites
+    site_error : [spacing] bound on how far the difference of two points is from that of their sites
     """
 
     box: Box
@@ -67,7 +67,7 @@ class LatticeCoupling:
     targets: Indices
     scale: float
     spacing: float
-    blur: float
+    site_error: float
 
     def apply(self, loads: Array) -> Array:
         dtype = np.float32 if loads.dtype == np.float32 else np.float64
@@ -76,7 +76,7 @@ class LatticeCoupling:
         return product
 
     def rounding(self, loads: Array) -> Rounding:
-        # Points off their sites change 1/r by blur / r^2 at most; the sum of that over a row
+        # Points off their sites change 1/r by site_error / r^2 at most; the sum of that over a row
         # bounds the effect on the 2-norm and on the largest.
         kernel, off = self._kernel, self._displaced
         size, largest = float(np.linalg.norm(loads)), float(np.abs(loads).max(initial=0.0))
@@ -103,12 +103,12 @@ class LatticeCoupling:
     @property
     def _least(self) -> float:
         """[spacing] the least that the shortest distance of two points can be."""
-        return 1.0 - min(self.blur, 0.5)
+        return 1.0 - min(self.site_error, 0.5)
 
     @property
     def _displaced(self) -> float:
         """[1 / spacing] norm of what points off their sites change 1/r by, by its row sums."""
-        return self.blur / self._least * self._kernel.norm**2
+        return self.site_error / self._least * self._kernel.norm**2
 
     @cached_property
     def _kernel(self) -> Kernel:
@@ -155,8 +155,8 @@ class LatticeInfluence(LatticeCoupling):
     point_error: float
 
     name: ClassVar[Kind] = "lattice"
-    at_hand: ClassVar[bool] = False
-    sharp: ClassVar[bool] = True
+    stored: ClassVar[bool] = False
+    cheap_sums: ClassVar[bool] = True
 
     @classmethod
     def assemble(cls, points: Array, lattice: Lattice, scale: float) -> LatticeInfluence:
@@ -181,9 +181,19 @@ class LatticeInfluence(LatticeCoupling):
         assert layout.sites is not None
         box, index = _boxed(lattice, layout.sites[members])
         spacing = lattice.spacing
-        blur = 2.0 * float(np.sqrt(2.0)) * lattice.blur / spacing
+        site_error = 2.0 * float(np.sqrt(2.0)) * lattice.site_error / spacing
         return cls(
-            box, index, index, scale, spacing, blur, array, members, layout, lattice, point_error
+            box,
+            index,
+            index,
+            scale,
+            spacing,
+            site_error,
+            array,
+            members,
+            layout,
+            lattice,
+            point_error,
         )
 
     def __len__(self) -> int:
@@ -211,7 +221,7 @@ class LatticeInfluence(LatticeCoupling):
         assert self.layout.sites is not None
         return self.layout.sites[self.members]
 
-    def among(self, which: Indices) -> LatticeInfluence:
+    def restricted(self, which: Indices) -> LatticeInfluence:
         given = self.layout, self.lattice, self.scale, self.point_error
         return self.of(self.array, self.members[which], *given)
 
@@ -221,7 +231,7 @@ class LatticeInfluence(LatticeCoupling):
             return DenseCoupling(self.points, points, self.scale, self.point_error)
         box, index = _boxed(self.lattice, np.concatenate((self.places, places)))
         n = len(self)
-        return LatticeCoupling(box, index[:n], index[n:], self.scale, self.spacing, self.blur)
+        return LatticeCoupling(box, index[:n], index[n:], self.scale, self.spacing, self.site_error)
 
     @property
     def _filled(self) -> bool:
@@ -235,7 +245,7 @@ class LatticeInfluence(LatticeCoupling):
     @property
     def _pulls(self) -> list[Kernel]:
         """d / |d|^3 in both directions, in units of the spacing."""
-        return self._kept("pulls", lambda: pulls(self.box, cubed))
+        return self._cached("pulls", lambda: pulls(self.box, cubed))
 
     def separations(self) -> Array:
         if not self._filled:
@@ -259,13 +269,13 @@ class LatticeInfluence(LatticeCoupling):
     def _pairs(self) -> Iterator[tuple[float, int, int]]:
         """`neighbours`, and no more than the distance of points that far apart."""
         for on_sites, i, j in neighbours(self.box):
-            yield self.spacing * (on_sites - self.blur) * (1.0 - 8 * ROUNDOFF), i, j
+            yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
 
     def semidefinite_with(self, radius: float) -> bool:
         """By the minimum of the lattice's symbol, and the distances of points from their sites."""
         if radius * LEAST_NEGATIVE > self.spacing:
             return False
-        least = self.lattice.keep(_least_symbol) - self._displaced
+        least = self.lattice.cached(_least_symbol) - self._displaced
         return -least * radius * (1.0 + SAFETY) <= self.spacing
 
     def sums(self, loads: Pair, slices: int = SLICES) -> Ball:
@@ -274,10 +284,10 @@ class LatticeInfluence(LatticeCoupling):
         slices : of loads and of the kernel, of 10 to 18 bits each
         """
         off_sites = self._off_sites(np.asarray(loads.high))
-        sliced = self._kept(slices, lambda: self._slice(slices))
+        sliced = self._cached(slices, lambda: self._slice(slices))
         return sliced.sums(loads, self._padded[0], *off_sites)
 
-    def _kept(self, name: object, make: Callable[[], Made]) -> Made:
+    def _cached(self, name: object, make: Callable[[], Made]) -> Made:
         """Spectra for other products, too, unless they are so large that memory matters more."""
         found: Made = self._spectra[name] if name in self._spectra else make()
         if len(self) <= MOST_KEPT:
@@ -303,7 +313,7 @@ class LatticeInfluence(LatticeCoupling):
             1 / |d + eps_i - eps_j|  =  1 / |d| - (eps_i - eps_j) d / |d|^3,  but for
             eta^2 / (|d| - eta)^3:  docs/theory/operators-lattice.md, "Points off their sites".
         """
-        x, y, unknown = self.layout.keep(off_sites)
+        x, y, unknown = self.layout.cached(off_sites)
         shrunk = float(self.lattice.shrink)
         x, y = (shrunk / self.spacing * each[self.members] for each in (x, y))
         most = float(np.hypot(x, y).max(initial=0.0)) * (1 + 1e-9)

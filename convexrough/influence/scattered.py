@@ -59,8 +59,8 @@ class ScatteredInfluence:
     tolerance: float = TOLERANCE
 
     name: ClassVar[Kind] = "scattered"
-    at_hand: ClassVar[bool] = False
-    sharp: ClassVar[bool] = False
+    stored: ClassVar[bool] = False
+    cheap_sums: ClassVar[bool] = False
 
     def __len__(self) -> int:
         return len(self.points)
@@ -100,7 +100,7 @@ class ScatteredInfluence:
     def entry_error(self) -> float:
         return entry_error(self.point_error, float(self.separations().min(initial=np.inf)))
 
-    def among(self, which: Indices) -> ScatteredInfluence:
+    def restricted(self, which: Indices) -> ScatteredInfluence:
         tails = None if self.tails is None else self.tails[which]
         return replace(self, points=self.points[which], tails=tails)
 

@@ -79,11 +79,11 @@ class SoftTable:
         """L; the low parts are up to a hundredth of it."""
         node = np.rint(squares.high / self.step).astype(np.intp)
         away = ((squares.high - node * self.step) + squares.low) / self.step
-        rise = self.terms[-1][node]
+        value = self.terms[-1][node]
         for terms in self.terms[-2::-1]:
-            rise *= away
-            rise += terms[node]
-        return Pair(self.values.high[node], self.values.low[node] + rise * away)
+            value *= away
+            value += terms[node]
+        return Pair(self.values.high[node], self.values.low[node] + value * away)
 
 
 @dataclass(frozen=True, eq=False)

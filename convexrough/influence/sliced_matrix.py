@@ -92,7 +92,7 @@ class SlicedMatrix:
         blocks = [(slice(s, s + BLOCK), b) for s, b in zip(starts, bits, strict=True)]
         return cls(slices, blocks, losses.reshape(-1, m) * UP)
 
-    def among(self, which: Indices) -> SlicedMatrix:
+    def restricted(self, which: Indices) -> SlicedMatrix:
         """For some of the points, in this order: shorter sums lose no more."""
         first, second, rest = (part.take(which, 0).take(which, 1) for part in self.slices)
         stops = np.searchsorted(which, [columns.stop for columns, _ in self.blocks]).tolist()
@@ -134,7 +134,7 @@ class MatrixSums:
         self.whole: MatrixSums | None = None
         self.which: Indices | None = None
 
-    def among(self, which: Indices) -> MatrixSums:
+    def restricted(self, which: Indices) -> MatrixSums:
         """Among some of the points."""
         part = MatrixSums(self.points.at(which), self.point_error)
         if len(which) and (which[1:] > which[:-1]).all():
@@ -160,16 +160,16 @@ class MatrixSums:
     def _matrices(self) -> Iterable[SlicedMatrix]:
         n = len(self.points.high)
         if n <= KEPT:
-            return (self._kept,)
+            return (self._matrix,)
         rows = threads.chunks(n, KEPT**2 // n)
         return (SlicedMatrix.of(*self._scaled(some)) for some in rows)
 
     @cached_property
-    def _kept(self) -> SlicedMatrix:
+    def _matrix(self) -> SlicedMatrix:
         if self._of_whole:
             assert self.whole is not None
             assert self.which is not None
-            return self.whole._kept.among(self.which)
+            return self.whole._matrix.restricted(self.which)
         return SlicedMatrix.of(*self._scaled(slice(0, None)))
 
     @cached_property
@@ -177,7 +177,7 @@ class MatrixSums:
         """Whether to take it out of a larger matrix: of one that is there, or small."""
         if self.whole is None or (n := len(self.whole.points.high)) > KEPT:
             return False
-        return "_kept" in vars(self.whole) or n <= max(SMALL, 2 * len(self.points.high))
+        return "_matrix" in vars(self.whole) or n <= max(SMALL, 2 * len(self.points.high))
 
     @cached_property
     def _scale(self) -> int:

@@ -71,7 +71,7 @@ def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
     """
     known = problem.scalar
     exact = Ball.exact(np.ascontiguousarray(shares.T))
-    stiffness = 1.0 / (known.held / known.ceiling_balls * 1.5)
+    stiffness = 1.0 / (known.load_balls / known.threshold_balls * 1.5)
     moved = exact * stiffness + problem.couple(shares).T
     off = np.hypot(*(moved - moved.value.mean(axis=1)[:, None]).size)
     off += problem.product_error * (known.influence.matrix @ np.hypot(*shares.T))

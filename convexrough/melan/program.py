@@ -164,8 +164,10 @@ def _upper(shares: Shares, slips: Array, mean: Array, elastic: Array, errors: Ar
     """What slips that close prove; infinite where they do no work."""
     sizes = np.hypot(slips[..., 0], slips[..., 1])
     done = slips * elastic
-    doubt = float((sizes * errors).sum()) + 4 * done.size * ROUNDOFF * float(np.abs(done).sum())
-    work = float(done.sum()) - doubt
+    uncertainty = float((sizes * errors).sum()) + 4 * done.size * ROUNDOFF * float(
+        np.abs(done).sum()
+    )
+    work = float(done.sum()) - uncertainty
     together = slips.sum(axis=0)[0]
     given = together * mean
     cost = float((sizes * (shares.loads + shares.load_errors)).sum()) * (1 + SAFETY)

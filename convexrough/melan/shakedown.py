@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
 from convexrough.frames import Variables
 from convexrough.friction.levels import FrictionLevels
@@ -25,7 +24,7 @@ from convexrough.friction.order import Order
 from convexrough.influence import Kind
 from convexrough.melan import program
 from convexrough.melan.elastic_shares import scalar_shares
-from convexrough.progress import Announce
+from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
@@ -35,7 +34,7 @@ Theory = Literal["exact", "elastic", "vector"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Shakedown(Table, Drawn):
+class Shakedown(Table, Plottable):
     """The factor up to which sliding shakes down, from below by a state and above by slips.
 
     kind    : "exact": partial slip, any path; sliding of whole asperities ceases. "elastic" and
@@ -110,14 +109,13 @@ def shakedown(
     force_amplitudes: ArrayLike,
     kind: Theory = "exact",
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> Shakedown:
     """The largest factor of a closed path around (loads, forces) that shakes down.
 
     loads, forces : P0 and Q0 [force]; Q0 is (2,) for "vector"
     load_amplitudes, force_amplitudes : (m,) p and q of the points of the path [force], a number
         for all; q is (m, 2) for "vector". Only "exact" allows p that is not 0
-    influence, announce : as in `load_path`
+    influence : as in `load_path`
 
     Raises InputError for bad values, |Q0| >= f P0, or a path on which nothing moves.
 
@@ -146,7 +144,7 @@ def shakedown(
         given = "one point" if len(q) else "none"
         raise InputError("force_amplitudes", found=given, expected=expected)
     if kind == "exact":
-        contact = press(scene, load=P0, influence=influence, announce=announce)
+        contact = press(scene, load=P0, influence=influence)
         found = _exact(contact, float(t0), p, t)
     elif np.any(p):
         expected = 'none: only "exact" holds where the normal load varies'
@@ -179,7 +177,7 @@ class _Found(NamedTuple):
 
 
 def _exact(contact: Contact, t0: float, p: Array, t: Array) -> _Found:
-    levels, scene = contact.keep(FrictionLevels), contact.scene
+    levels, scene = contact.cached(FrictionLevels), contact.scene
     f, P0 = checks.friction(scene.friction), float(levels.load)
     plus, minus = float((-(p + t)).max()), float((-(p - t)).max())
     fall = (plus + minus) / 2  # of L*, per factor
@@ -217,7 +215,7 @@ def _elastic(contact: Contact, t0: float, t: Array) -> _Found:
     f = checks.friction(contact.scene.friction)
     problem, shares = Loaded.of(contact), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())
-    q, P, doubt, off = shares.values, shares.loads, shares.load_errors, shares.errors
+    q, P, load_errors, off = shares.values, shares.loads, shares.load_errors, shares.errors
 
     def limits(loads: Array, sizes: Array) -> Array:
         """Of each asperity: it slides to and fro where the range of its share is 2 P_i."""
@@ -230,8 +228,8 @@ def _elastic(contact: Contact, t0: float, t: Array) -> _Found:
         (contact.load + t0) / -low if low < 0 else np.inf,
     )
     factor = min(float(each.min()), sliding)
-    lower = min(float(limits(np.maximum(P - doubt, 0.0), np.abs(q) + off).min()), sliding)
-    upper = min(float(limits(P + doubt, np.abs(q) - off).min()), sliding)
+    lower = min(float(limits(np.maximum(P - load_errors, 0.0), np.abs(q) + off).min()), sliding)
+    upper = min(float(limits(P + load_errors, np.abs(q) - off).min()), sliding)
     # A share that might be negative would be loaded while the others are unloaded.
     proved = bool((q >= off).all())
     critical = np.arange(len(P)) == int(np.argmin(each)) if factor < sliding else np.ones(len(P))

@@ -5,7 +5,7 @@ one: `box_of_touching`, docs/theory/crowded.md. The letters of those pages, and 
 
     B, h, mu              loads, stiffness, 1 - convexity_number
     theta, s_i            convexity_number, problem.shells (1 / (pi E* s_i))
-    O                     held
+    O                     fixed open
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Box(NamedTuple):
     stiffness: Array  # h there
     convexity_number: float  # 1 - mu
     faces: Array  # upper faces that the solution must be shown to stay below; else infinite
-    held: NDArray[np.bool_]  # taken to be open, which has to be shown of the solution
+    fixed_open: NDArray[np.bool_]  # taken to be open, which has to be shown of the solution
 
     @property
     def closed(self) -> Box:
@@ -65,8 +65,8 @@ class Box(NamedTuple):
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
     """Global from the a priori bound by shells, then by Cholesky; else local."""
-    ceiling = lowest_ceiling(problem, loads, displacement)
-    corner = np.maximum(problem.bounds(ceiling), loads)  # the box must hold both states
+    approach_bound = lowest_approach_bound(problem, loads, displacement)
+    corner = np.maximum(problem.bounds(approach_bound), loads)  # the box must hold both states
     h = problem.stiffness(corner)
     nowhere, none = np.full(len(problem), np.inf), np.zeros(len(problem), dtype=bool)
     if (theta := problem.convexity_at(h)) < 1:
@@ -89,24 +89,24 @@ def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator
         yield Box("local", problem, local, problem.stiffness(local), theta, beyond, none)
 
 
-def lowest_ceiling(problem: NormalProblem, loads: Array, displacement: Array) -> float:
+def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Array) -> float:
     """The least known upper bound on D0 at any solution; `displacement` is A times the loads."""
     if problem.load is None:
-        return problem.ceiling
-    return min(problem.ceiling, problem.overhang(loads, displacement))
+        return problem.approach_bound
+    return min(problem.approach_bound, problem.overhang(loads, displacement))
 
 
 def box_of_touching(
     problem: NormalProblem, loads: Array, touching: NDArray[np.bool_], room: Array
 ) -> Box | None:
-    """Local, all others held open: by shells fitted to those that touch, or by `crowded_margin`.
+    """Local, all others fixed open: by shells fitted to those that touch, or by `crowded_margin`.
 
     docs/theory/crowded.md
 
     room : (n,) by which loads must be able to grow in the box
     """
     which = np.flatnonzero(touching)
-    influence = problem.influence.among(which)
+    influence = problem.influence.restricted(which)
     least = LEEWAY * loads + LEAST_LEEWAY * float(loads.max(initial=0.0))
     box = np.where(touching, loads + np.maximum(least, room), 0.0)
     h = problem.stiffness(box)
@@ -121,7 +121,7 @@ def box_of_touching(
 
 def crowded_margin(influence: Influence, stiffness: Array) -> float:
     """The largest mu by Cholesky where a matrix is cheap, else by shells that overlap."""
-    if not influence.at_hand and len(influence) > FACTORISED:
+    if not influence.stored and len(influence) > FACTORISED:
         return overlapping_margin(influence, influence.scale / stiffness, CROWDED_MARGINS)
     scaled, error = _scaled(influence, stiffness), influence.entry_error + 8 * ROUNDOFF
     return largest(CROWDED_MARGINS, lambda each: proved_margin(scaled, (each,), error) > 0)
@@ -139,7 +139,7 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
     which = np.flatnonzero(loads)
     if len(which) < 2:
         return which
-    influence = problem.influence.among(which)
+    influence = problem.influence.restricted(which)
     near = Nearest.of(influence.points, influence.scale / problem.stiffness(loads)[which])
     for poor in (near.closest >= 1.0 - CROWDED_MARGINS[0], near.meeting):
         if poor.any():
@@ -160,7 +160,7 @@ def convex_margin(influence: Influence, stiffness: Array, margins: Sequence[floa
 
     Only where there is a matrix: a factorisation costs as the cube of its size.
     """
-    if not influence.at_hand:
+    if not influence.stored:
         return 0.0
     error = influence.entry_error + 8 * ROUNDOFF
     return proved_margin(_scaled(influence, stiffness), margins, error)

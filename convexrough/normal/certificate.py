@@ -19,11 +19,11 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
 from convexrough.influence.coupling import Coupling
-from convexrough.normal.boxes import Scope, lowest_ceiling
+from convexrough.normal.boxes import Scope, lowest_approach_bound
+from convexrough.normal.other_solutions import NO_OTHERS, OtherSolutions
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import Obstacle, Proved, proved
 from convexrough.normal.refine import Trial, completed, refined, refines, trial
-from convexrough.normal.rivals import NO_RIVALS, Rivals
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 from convexrough.record import Along, Table
@@ -55,12 +55,12 @@ class Certificate(Table):
         a dual point or the slope of the convex energy; 0 up to rounding at a solution,
         infinite where nothing is proved. Under load control it is that of the scaled loads
 
-    held : number of asperities fixed open for the proof, and proved to be open; 0 unless contacts
-        are crowded. The solution is then the only one near it with these open
-    rival_crowding : any other solution has a larger crowding, the largest (a_i + a_j) / r_ij over
-        all asperities that could touch, open ones with a = 0; infinite where there is no other, 0
-        where nothing is known
-    rival_covers : in any other solution a disc covers the summit of its nearest neighbour
+    fixed_open : number of asperities fixed open for the proof, and then proved to be open; 0 unless
+        contacts are crowded. The solution is then the only one near it with these open
+    other_solutions_crowding : any other solution has a larger crowding, the largest
+        (a_i + a_j) / r_ij over all asperities that could touch, open ones with a = 0; infinite
+        where there is no other, 0 where nothing is known
+    other_solutions_cover : in any other solution a disc covers the summit of its nearest neighbour
     in_the_way : (m,) asperities that prevent a proof; empty where there is one
     obstacle : the reason, as a sentence
 
@@ -81,9 +81,9 @@ class Certificate(Table):
     approach: float
     approach_error: float
     duality_gap: float
-    held: int = 0
-    rival_crowding: float = 0.0
-    rival_covers: bool = False
+    fixed_open: int = 0
+    other_solutions_crowding: float = 0.0
+    other_solutions_cover: bool = False
     in_the_way: Indices = field(default_factory=lambda: frozen(np.zeros(0, dtype=np.intp)))
     obstacle: str = ""
 
@@ -99,15 +99,19 @@ class Certificate(Table):
         if self.scope == "none":
             why = f"; {self.obstacle}" if self.obstacle else ""
             return f"nothing is proved, {len(self.in_the_way):,} asperities in the way{why}"
-        rivals = []
-        if self.rival_covers:
-            rivals.append("a disc that covers its nearest neighbour's summit")
-        if self.rival_crowding > 0:
-            rivals.append(f"crowding above {math.floor(self.rival_crowding * 100) / 100:.2f}")
-        if rivals:
-            return f"any other solution has {' and '.join(rivals)}"
-        held = f" with the same {self.held:,} asperities held open" if self.held else ""
-        return f"the only solution near these loads{held}"
+        others = []
+        if self.other_solutions_cover:
+            others.append("a disc that covers its nearest neighbour's summit")
+        if self.other_solutions_crowding > 0:
+            others.append(
+                f"crowding above {math.floor(self.other_solutions_crowding * 100) / 100:.2f}"
+            )
+        if others:
+            return f"any other solution has {' and '.join(others)}"
+        fixed_open = (
+            f" with the same {self.fixed_open:,} asperities fixed open" if self.fixed_open else ""
+        )
+        return f"the only solution near these loads{fixed_open}"
 
     @property
     def holds(self) -> bool:
@@ -199,20 +203,20 @@ def certificate_of(
     errors = problem.to_scene(errors)
     errors[screened.which] = screened.rounding + shift
     if screened.coupling is not None:
-        felt = screened.coupling.apply(moved)
-        errors[screened.which] += felt + screened.coupling.rounding(moved).of(felt)
+        coupled = screened.coupling.apply(moved)
+        errors[screened.which] += coupled + screened.coupling.rounding(moved).of(coupled)
     errors *= 1 + SAFETY
     words = 2 * (indentation < -errors)
     words[problem.candidates[found.touching]] = 1
     words[problem.candidates[found.open]] = 2
-    rivals = NO_RIVALS
+    others = NO_OTHERS
     if found.box.scope != "global":
-        ceiling = lowest_ceiling(problem, found.loads.value, start.product.value)
-        rivals = Rivals.of(problem, found.loads.upper, ceiling)
+        approach_bound = lowest_approach_bound(problem, found.loads.value, start.product.value)
+        others = OtherSolutions.of(problem, found.loads.upper, approach_bound)
     energy = _energy_error(problem, start, found, moved)
     energy += _screened_energy(problem, loads, indentation, errors)
     return Certificate(
-        scope="local" if rivals.possible else "global",
+        scope="local" if others.possible else "global",
         convexity_number=found.box.convexity_number,
         status=frozen(WORDS[words]),
         load_errors=frozen(load_errors),
@@ -221,9 +225,9 @@ def certificate_of(
         approach=float(start.approach.value) * length,
         approach_error=0.0 if problem.load is None else shift * (1 + SAFETY) * length,
         duality_gap=energy * (force * length),
-        held=int(found.box.held.sum()),
-        rival_crowding=rivals.crowding,
-        rival_covers=rivals.cover,
+        fixed_open=int(found.box.fixed_open.sum()),
+        other_solutions_crowding=others.crowding,
+        other_solutions_cover=others.cover,
     )
 
 
@@ -232,7 +236,7 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
     most = np.maximum(found.box.loads, start.loads.high * (1 + SAFETY))
     if not found.box.problem.convexity_number(most) < 1 and (most > found.box.loads).any():
         return np.inf
-    excess = np.where(found.box.held, 0.0, start.excess)
+    excess = np.where(found.box.fixed_open, 0.0, start.excess)
     total = float(excess @ moved) + float(start.missing.size * found.approach.size)
     return total * (1 + SAFETY + len(moved) * ROUNDOFF)
 

@@ -243,22 +243,22 @@ class Level:
         def excess(others: float) -> tuple[Array, float, float]:
             """e, where j carries what is missing of the total, and others carry at most so much."""
             missing = short + others
-            felt = (missing + others) * problem.largest_entry
-            e = left.size + felt
+            missing_effect = (missing + others) * problem.largest_entry
+            e = left.size + missing_effect
             e[j] += missing * float(springs.stiffness.upper[j])
-            return e, missing, felt
+            return e, missing, missing_effect
 
         carried = np.zeros(len(h))
         if doubtful.any():
             e, _, _ = excess(0.0)
             within = distance(np.where(np.isinf(h), 0.0, e), h, springs.margin)
             carried[doubtful] = (within / np.sqrt(h[doubtful])) * (1 + SAFETY)
-        e, missing, felt = excess(float(carried.sum()) * (1 + SAFETY))
+        e, missing, missing_effect = excess(float(carried.sum()) * (1 + SAFETY))
         known = np.where(touching, h, np.inf)
         within = distance(np.where(touching, e, 0.0), known, springs.margin)
         errors = np.where(touching, within / np.sqrt(known) * (1 + SAFETY), carried)
         errors[j] += missing
-        moved = within / np.sqrt(float(known.min())) * problem.row_norm + felt
+        moved = within / np.sqrt(float(known.min())) * problem.row_norm + missing_effect
         each = (left.size + springs.stiffness.upper * errors)[touching]
         off = (float(each.min()) + moved) * (1 + SAFETY)
         return Response(Ball.around(x, errors), Ball.around(beta.mid, beta.radius + off))
@@ -266,8 +266,8 @@ class Level:
     @cached_property
     def rates(self) -> Array:
         """(n,) dn/dL = S - A q, in float64."""
-        q, rise = self.tangent
-        rates: Array = float(rise.value) - self.problem.influence.apply(q.value)
+        q, rate = self.tangent
+        rates: Array = float(rate.value) - self.problem.influence.apply(q.value)
         return rates
 
 
@@ -308,8 +308,8 @@ class Levels:
     def prepare(self, loads: Ball) -> list[Level | None]:
         """Levels of positive loads (k,), found together; None of those that are better alone."""
         found, problem = self.top.solution, self.problem
-        able = self._together and problem.influence.at_hand and len(problem) <= MOST
-        if not able or found is None or found.box.held.any():
+        able = self._together and problem.influence.stored and len(problem) <= MOST
+        if not able or found is None or found.box.fixed_open.any():
             return [None] * len(loads)
         rows, levels = max(1, stack.NUMBERS // len(problem)), list[Level | None]()
         for start in range(0, len(loads), rows):
@@ -378,9 +378,9 @@ def energies(levels: Sequence[Level]) -> Ball:
         loads = Ball.stacked([level.loads for level in loaded])
         off = loads.error + np.abs(loads.mid.low)
         above = (excess(gap, trial.high > 0) * off).sum(axis=-1) * (1 + SAFETY)
-        doubt = np.array([float(level.load.radius) for level in loaded])
-        rise = np.array([float(level.approach.size) for level in loaded])
-        error = found.radius + above + (missing.size + doubt) * rise * (1 + SAFETY)
+        uncertainty = np.array([float(level.load.radius) for level in loaded])
+        rate = np.array([float(level.approach.size) for level in loaded])
+        error = found.radius + above + (missing.size + uncertainty) * rate * (1 + SAFETY)
         known = Ball.around(found.mid, error)
         high[which], low[which], radius[which] = *known.mid, known.radius
     return Ball(Pair(high, low), radius)

@@ -94,8 +94,8 @@ class Nearest(NamedTuple):
     def wide_radii(self, lengths: Array, width: float) -> Array:
         """(n,) radii of shells, for `closest` below 1."""
         radii: Array = np.maximum(width, WIDENED / np.sqrt(1.0 - self.closest)) * lengths
-        beside: Array = (radii[self.which] - LESS * self.distances).max(axis=1, initial=0.0)
-        return np.asarray(np.maximum(radii, beside))
+        covering: Array = (radii[self.which] - LESS * self.distances).max(axis=1, initial=0.0)
+        return np.asarray(np.maximum(radii, covering))
 
 
 def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:

@@ -79,7 +79,7 @@ class NormalProblem:
     shells        : (n,) 1 / (pi E* s_i): added to the diagonal of A they make it semidefinite
     approach      : D0, or None under load control
     load          : total load, or None under approach control
-    ceiling       : upper bound on D0 at any solution
+    approach_bound : upper bound on D0 at any solution
     """
 
     scene: Scene
@@ -92,7 +92,7 @@ class NormalProblem:
     shells: Array
     approach: float | None
     load: float | None
-    ceiling: float
+    approach_bound: float
     exact_load: Ball | None = None
     exact_approach: Ball | None = None
 
@@ -119,11 +119,11 @@ class NormalProblem:
         return Data(k, Ball.around(offsets, 2.0**-98 * sizes), _constants(*constants)[2])
 
     def at_load(self, load: Ball) -> NormalProblem:
-        """The same asperities under a prescribed total load, up to that of the ceiling."""
+        """The same asperities under a prescribed total load, up to that at `approach_bound`."""
         return self._like(replace(self, approach=None, load=float(load.value), exact_load=load))
 
     def at_approach(self, approach: Ball) -> NormalProblem:
-        """The same asperities at a prescribed approach, up to the ceiling."""
+        """The same asperities at a prescribed approach, up to `approach_bound`."""
         prescribed = float(approach.value)
         return self._like(replace(self, approach=prescribed, load=None, exact_approach=approach))
 
@@ -165,7 +165,7 @@ class NormalProblem:
         """A P of other loads nearby: sharp where that is cheap, else from the change alone."""
         change = others - loads
         small = NEARBY * float(loads.high.max())
-        if self.influence.at_hand and float(np.abs(change.high).max()) > small:
+        if self.influence.stored and float(np.abs(change.high).max()) > small:
             return self.product(others)
         moved, off = self.influence.apply(change.high), self.influence.rounding(change.high)
         most = self.row_norm * float(np.linalg.norm(change.high))  # of A |change|, by Cauchy
@@ -205,14 +205,16 @@ class NormalProblem:
         modulus = scene.material.contact_modulus
         coefficients = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
         if approach is not None:
-            ceiling = approach = checks.finite("approach", approach)
+            approach_bound = approach = checks.finite("approach", approach)
         else:
             assert load is not None  # exactly_one
             load = checks.positive("load", load)
-            ceiling = highest_approach(scene, load, influence) if highest is None else highest
+            approach_bound = (
+                highest_approach(scene, load, influence) if highest is None else highest
+            )
 
         # An asperity with D_i <= 0 cannot touch: A >= 0 and P >= 0 only raise the surface.
-        prescribed = ceiling + offsets + errors + 6 * ROUNDOFF * abs(ceiling)
+        prescribed = approach_bound + offsets + errors + 6 * ROUNDOFF * abs(approach_bound)
         candidates = scene.asperities.layout.sorted(prescribed > 0)
         top = float(prescribed.max(initial=0.0)) or 1.0
         units = Units.of(top, _middle(coefficients))
@@ -230,10 +232,10 @@ class NormalProblem:
             shells=shells(coupling),
             approach=None if approach is None else approach / units.length,
             load=None if load is None else load / units.force,
-            ceiling=ceiling / units.length,
+            approach_bound=approach_bound / units.length,
         )
 
-    def among(self, which: Indices) -> NormalProblem:
+    def restricted(self, which: Indices) -> NormalProblem:
         """The problem of some of the candidates: all others carry nothing."""
         return replace(
             self,
@@ -241,7 +243,7 @@ class NormalProblem:
             coefficients=taken(self.coefficients, which),
             offsets=self.offsets[which],
             offset_errors=self.offset_errors[which],
-            influence=self.influence.among(which),
+            influence=self.influence.restricted(which),
             shells=taken(self.shells, which),
         )
 
@@ -290,10 +292,10 @@ class NormalProblem:
         gap = self.gap(loads, displacement, approach)
         return float(np.where(loads > 0, np.abs(gap), np.maximum(-gap, 0.0)).max(initial=0.0))
 
-    def bounds(self, ceiling: float) -> Array:
-        """(n,) U_i = (max(D_i, 0) / k_i)^(3/2): no solution with D0 <= ceiling carries more."""
-        rounding = self.offset_errors + 6 * ROUNDOFF * abs(ceiling)
-        alone: Array = hertz.load(ceiling + self.offsets + rounding, self.coefficients)
+    def bounds(self, approach_bound: float) -> Array:
+        """(n,) U_i = (max(D_i, 0) / k_i)^(3/2), the largest loads of solutions with D0 <= bound."""
+        rounding = self.offset_errors + 6 * ROUNDOFF * abs(approach_bound)
+        alone: Array = hertz.load(approach_bound + self.offsets + rounding, self.coefficients)
         return alone * (1 + SAFETY)
 
     def stiffness(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
@@ -306,10 +308,10 @@ class NormalProblem:
         """A start: the heights, riding on the surface that a smooth sphere would make."""
         scene, load = self.scene, self.load
         if load is None:
-            load = alone = float(self.bounds(self.ceiling).sum())
+            load = alone = float(self.bounds(self.approach_bound).sum())
             if scene.curved:
                 smooth = hertz.local_coefficient(scene.material.contact_modulus, scene.mean_radius)
-                load = min(float(hertz.load(self.ceiling, smooth * self.units.local)), alone)
+                load = min(float(hertz.load(self.approach_bound, smooth * self.units.local)), alone)
                 load = load or alone
         distances = scene.asperities.distances[self.candidates]
         sunk = smooth_displacement(scene, distances, load * self.units.force) / self.units.length

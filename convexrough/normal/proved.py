@@ -37,7 +37,7 @@ NONE = np.zeros(0, dtype=np.intp)
 
 CROWDED = "their discs overlap so far that the energy is not known to be convex"
 POORLY_KNOWN = "their loads are not known well enough to stay in a box where the energy is convex"
-NOT_OPEN = "they are held open, but their gaps are not proved"
+NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
 
 class Obstacle(NamedTuple):
@@ -102,19 +102,21 @@ def proved(
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
         found = _in_box(problem, box, state)
-        if isinstance(found, Proved) and not (box.held.any() and (box.held & ~found.open).any()):
+        if isinstance(found, Proved) and not (
+            box.fixed_open.any() and (box.fixed_open & ~found.open).any()
+        ):
             return found
     touching, room, obstacle = state.inside, np.zeros(len(loads)), Obstacle("", NONE)
     for _ in range(ATTEMPTS):
-        held = box_of_touching(problem, loads, touching, room)
-        if held is None:
+        fixed = box_of_touching(problem, loads, touching, room)
+        if fixed is None:
             break
-        found = _in_box(problem, held, state)
+        found = _in_box(problem, fixed, state)
         if not isinstance(found, Proved):
-            obstacle = Obstacle(POORLY_KNOWN, np.flatnonzero(loads + found >= held.faces))
+            obstacle = Obstacle(POORLY_KNOWN, np.flatnonzero(loads + found >= fixed.faces))
             room = np.maximum(room, ROOM * found)
             continue
-        doubtful = held.held & ~found.open
+        doubtful = fixed.fixed_open & ~found.open
         if not doubtful.any():
             return found
         obstacle = Obstacle(NOT_OPEN, np.flatnonzero(doubtful))
@@ -126,8 +128,8 @@ def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
     """The solution, or a bound on the error of the loads where it may leave the box."""
     loads = state.loads.high
     missing = float(state.missing.size)
-    felt, own = _of_missing(problem, state, missing)
-    residual = np.where(box.held, 0.0, state.excess + felt)
+    missing_effect, own = _of_missing(problem, state, missing)
+    residual = np.where(box.fixed_open, 0.0, state.excess + missing_effect)
     if missing:
         residual[own[0]] += own[1]
 
@@ -147,7 +149,7 @@ def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
     within, errors = errors_on(h, margin)
     # A (P - P*) by Cauchy's inequality
     softest = float(h.min(initial=np.inf))
-    moved = (within / np.sqrt(softest) * problem.row_norm + felt) * (1 + SAFETY)
+    moved = (within / np.sqrt(softest) * problem.row_norm + missing_effect) * (1 + SAFETY)
     shift = _approach_error(problem, state, errors, moved)
     approach = Ball.around(state.approach.mid, shift)
     known = state.indentation

@@ -100,7 +100,7 @@ def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> 
 
 def refines(problem: NormalProblem) -> bool:
     """Whether thirty digits cost no more than a press does."""
-    return not problem.influence.at_hand or len(problem) <= FEW
+    return not problem.influence.stored or len(problem) <= FEW
 
 
 def refined(problem: NormalProblem, start: Trial) -> Trial:

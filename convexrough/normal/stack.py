@@ -400,10 +400,10 @@ def proved(stack: Stack, state: Trials, boxes: Boxes) -> Solved:
     loads, missing = state.loads.high, state.missing.size
     rows, j = np.arange(len(loads)), np.argmax(loads, axis=1)
     largest = loads[rows, j][:, None]
-    felt = np.where(missing > 0, missing * stack.largest_entry, 0.0)
+    missing_effect = np.where(missing > 0, missing * stack.largest_entry, 0.0)
     steepest = 4.0 / 3.0 * state.local[rows, j][:, None] / largest * (1 + SAFETY)
     lost = np.where(missing < largest / 2.0, missing * steepest, np.inf)
-    residuals = excess(state.gap, state.inside) + felt
+    residuals = excess(state.gap, state.inside) + missing_effect
     residuals[rows, j] += np.where(missing > 0, lost, 0.0)[:, 0]
 
     def errors_on(stiffness: Array, margin: Array) -> tuple[Array, Array]:
@@ -423,7 +423,7 @@ def proved(stack: Stack, state: Trials, boxes: Boxes) -> Solved:
     number = (boxes.shells / h).max(axis=1, keepdims=True) * (1 + SAFETY)
     within, errors = errors_on(h, 1.0 - np.minimum(boxes.number, number))
     softest = h.min(axis=1, keepdims=True)
-    moved = (within / np.sqrt(softest) * stack.row_norm + felt) * (1 + SAFETY)
+    moved = (within / np.sqrt(softest) * stack.row_norm + missing_effect) * (1 + SAFETY)
     shift = _approach_errors(stack, state, errors, moved)
     known = state.indentation
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
@@ -503,7 +503,7 @@ def _shifted(stack: Stack, indentation: Array) -> Array:
 
 
 @quietly
-def ceilings(stack: Stack, state: Trials) -> Array:
+def approach_bounds(stack: Stack, state: Trials) -> Array:
     """(m, 1) no D0 is higher at any solution: prescribed, or as `load_control.approach_bound`."""
     if stack.depth is not None:
         return stack.depth.upper
@@ -528,7 +528,7 @@ def ceilings(stack: Stack, state: Trials) -> Array:
 @quietly
 def widest(stack: Stack, state: Trials) -> Boxes:
     """Boxes that hold every solution and these loads, by shells: as `boxes.tried` begins."""
-    depth = np.maximum(ceilings(stack, state) + stack.offsets.upper, 0.0)
+    depth = np.maximum(approach_bounds(stack, state) + stack.offsets.upper, 0.0)
     alone = (depth / stack.coefficients.lower) ** 1.5 * (1 + SAFETY)
     corner = np.maximum(alone, state.loads.high)
     h = stack.stiffness(corner)

@@ -282,7 +282,9 @@ def _root(power: Callable[[Pair], Pair], plain: Callable[[Array], Array]) -> Ele
         slope = found.high / safe.high
         if safe is not x:
             found = Pair(*(np.where(above, part, 0.0) for part in found))
-        return found, (rise(x, dx, dx * slope, plain) + TINY * slope + 2.0 * _lost(found)) * UP
+        return found, (
+            power_error(x, dx, dx * slope, plain) + TINY * slope + 2.0 * _lost(found)
+        ) * UP
 
     return root
 
@@ -295,7 +297,7 @@ def positive(x: Pair) -> tuple[Pair, NDArray[np.bool_]]:
     return Pair(np.where(above, x.high, 1.0), np.where(above, x.low, 0.0)), above
 
 
-def rise(x: Pair, dx: Array, steep: Array, power: Callable[[Array], Array]) -> Array:
+def power_error(x: Pair, dx: Array, steep: Array, power: Callable[[Array], Array]) -> Array:
     """Bounds on |f(x) - f(m)| of a concave power of positive parts: `steep` is dx f(m) / m."""
     wide = dx > x.high
     if not wide.any():

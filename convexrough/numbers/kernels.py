@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.numbers.balls import TINY, UP, Ball, elementwise, positive, rise
+from convexrough.numbers.balls import TINY, UP, Ball, elementwise, positive, power_error
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, two_product, two_sum
 
 
@@ -31,7 +31,7 @@ def _residual(
     sizes = np.abs(local) + (np.abs(v.high) + np.abs(D.high))
     radius = dk * power.high
     if dP.any():
-        off = rise(P, dP, dP * slope, lambda x: np.cbrt(x) ** 2)
+        off = power_error(P, dP, dP * slope, lambda x: np.cbrt(x) ** 2)
         radius = radius + (np.abs(k.high) + dk) * off
     lost = PAIR_ROUNDOFF * sizes + TINY * (1.0 + np.abs(k.high) * slope)
     return mid, (radius * UP + (dv + dD) + lost) * UP

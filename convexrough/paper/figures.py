@@ -91,11 +91,11 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     draw_state(chart, found.half, scale)
     left, right = chart.get_xlim()
     chart.set(xlim=(1.08 * left, 1.08 * right), ylim=(1.08 * left, 1.08 * right))  # for letters
-    beside = contact.scene.contact_points + np.array([0.015 * scale.typical, 0.0])
+    shifted = contact.scene.contact_points + np.array([0.015 * scale.typical, 0.0])
     halo = [withStroke(linewidth=1.5, foreground="white")]
     for name, ring in named.items():
         for i in ring:
-            x, y = scale.length.of(beside[i] + np.array([contact.contact_radii[i], 0.0]))
+            x, y = scale.length.of(shifted[i] + np.array([contact.contact_radii[i], 0.0]))
             chart.text(x, y, name, va="center", fontsize=7, path_effects=halo, clip_on=True)
     slides = [name for name, ring in named.items() if (found.half.status[ring] == "sliding").any()]
     title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides) or 'none'}")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
+from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure as MatplotlibFigure
 
 from convexrough.errors import InputError
@@ -52,8 +53,13 @@ def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200
     """
     check_saving((form,), dpi)
     dates: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    with rc_context(REAL_TEXT):
-        figure.savefig(path, format=form, dpi=dpi, metadata=dates.get(form))
+    canvas: Any = get_registered_canvas_class(form)(figure)
+    before, figure.dpi = figure.dpi, dpi
+    try:
+        with rc_context(REAL_TEXT):  # `savefig` draws everything twice
+            getattr(canvas, f"print_{form}")(path, metadata=dates.get(form))
+    finally:
+        figure.dpi = before
 
 
 def check_saving(formats: tuple[str, ...], dpi: int) -> None:

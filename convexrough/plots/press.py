@@ -24,11 +24,11 @@ from convexrough.plots.style import (
     UNSURE,
     abscissae,
     bar,
-    doubt,
     draw_density,
     label,
     legend_above,
     no_contact_figure,
+    not_proved,
     say_nothing,
     title,
     towards_rim,
@@ -155,7 +155,7 @@ def _draw_points(axes: Axes, x: Array, y: Array, top: float, word: str) -> bool:
 def census(contact: Contact) -> str:
     """How many touch, and how sure that is."""
     words = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
-    return words + doubt(contact.certificate.scope, contact.status)
+    return words + not_proved(contact.certificate.scope, contact.status)
 
 
 def _loads_figure(scale: Scale) -> Figure:

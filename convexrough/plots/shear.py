@@ -29,9 +29,9 @@ from convexrough.plots.style import (
     SINGLE,
     SMOOTH,
     TICK,
-    doubt,
     legend_outside,
     no_contact_figure,
+    not_proved,
     round_ticks,
 )
 from convexrough.scene.rings import evenly_chosen
@@ -60,7 +60,7 @@ def shear_figures(
     columns = len(shown) if len(shown) <= 4 else 3 if len(shown) in (5, 6, 9) else 4
     rows = -(-len(shown) // columns)
     width = SINGLE if columns == 1 else DOUBLE
-    doubted = any(doubt(state.certificate.scope, state.status) for state in shown)
+    doubted = any(not_proved(state.certificate.scope, state.status) for state in shown)
     above = 0.17 * (1 + (columns == 4) + doubted)
     height = rows * ((width - 0.5) / columns + above) + (0.95 if columns == 1 else 0.75)
     figure = Figure(figsize=(width, height), layout="constrained")
@@ -121,5 +121,5 @@ def state_title(state: State, scale: Scale, *, narrow: bool) -> str:
     force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)
     share = f"{force / scale.limit:.4g}".replace("-", "\u2212")
     words = f"{slide:,} of {int(touching.sum()):,} slide"
-    unsure = doubt(state.certificate.scope, state.status)
+    unsure = not_proved(state.certificate.scope, state.status)
     return f"$Q/(fP)$ = {share}:{chr(10) if narrow else ' '}{words}" + unsure.replace(" ", "\n", 1)

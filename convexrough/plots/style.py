@@ -98,7 +98,7 @@ def say_nothing(axes: Axes, why: str = "no contact") -> None:
     axes.text(0.5, 0.5, why, transform=axes.transAxes, fontsize=LABEL, ha="center", va="center")
 
 
-def doubt(scope: str, status: Any) -> str:
+def not_proved(scope: str, status: Any) -> str:
     """What is not proved of a state, in brackets; nothing if all is."""
     if scope == "none":
         return " (not proved)"

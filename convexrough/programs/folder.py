@@ -7,13 +7,13 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+from convexrough.atomic import replacing
 from convexrough.errors import ConvexroughError, InputError
 from convexrough.normal.problem import NormalProblem
 from convexrough.programs.program import FORMS, WRITERS, stated
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton
 from convexrough.version import __version__
-from convexrough.whole import replacing
 
 #: Endings of the files, and what reads them.
 FORMATS = {

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
+from convexrough.atomic import replacing
 from convexrough.errors import InputError
 from convexrough.normal.problem import NormalProblem
 from convexrough.programs.formats import cbf, clarabel_json, cone_npz, mps, qpsolvers_npz
@@ -23,7 +24,6 @@ from convexrough.solvers.bristles import LARGEST_S, BristleProgram
 from convexrough.solvers.cone_boxes import Boxes
 from convexrough.solvers.conic import LiftedProgram
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
-from convexrough.whole import replacing
 
 Form: TypeAlias = Literal["cones", "dual", "bristles"]
 FORMS: tuple[Form, ...] = get_args(Form)
@@ -150,7 +150,7 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
     if form not in FORMS:
         expected = f"a form of program; {checks.nearest(str(form), FORMS)}"
         raise InputError("form", found=repr(form), expected=expected)
-    level = problem.ceiling if problem.load is not None else 0.0
+    level = problem.approach_bound if problem.load is not None else 0.0
     make = partial(
         Program,
         form=form,
@@ -160,7 +160,7 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
         constant=level * (problem.load or 0.0),
     )
     if form == "bristles":
-        rows = BristleProgram.accept(problem, bristles, form)
+        rows = BristleProgram.assemble(problem, bristles, form)
         if len(beyond := np.flatnonzero(rows.cut & (own >= rows.box))):
             ratios = problem.shells[beyond] / problem.stiffness(own[beyond], beyond)
             raise TooDenseError(form, problem.candidates[beyond], ratios, LARGEST_S)
@@ -173,7 +173,7 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
             off=_bristle_error(rows, own),
         )
     boxes = _boxes(problem, own)
-    cones = LiftedProgram.accept(problem, boxes).apply()
+    cones = LiftedProgram.assemble(problem, boxes).apply()
     kind = f"second-order cones, {5 if boxes.five else 4} an asperity"
     least = _objective(cones, boxes, own)
     dual = form == "dual"

@@ -35,7 +35,7 @@ FITTED = 0.9
 #: Radii of shells that may overlap over the least that would do without overlap.
 WIDTHS = (2.0, 4.0, 8.0)
 
-#: How far beyond their radii boxes of those that touch end, all others being held open: relatively,
+#: How far beyond their radii boxes of those that touch end, all others fixed open: relatively,
 #: for radii to thirty digits, to all digits, and for rough ones.
 LEEWAY = (1e-12, 1e-6, 1e-2)
 
@@ -46,7 +46,7 @@ Reason = tuple[Array, float, Array | None]
 class Argument(NamedTuple):
     """On the box 0 <= a <= box the Hessian is at least 1 - convexity_number of its local part.
 
-    box     : (n,) [length] 0 of those that are held open
+    box     : (n,) [length] 0 of those that are fixed open
     shells  : (n,) [length] radii of spheres that overlap little, or None: by Cholesky
     ceiling : above all (A P)_i [length], for a bound on the approach; None where it is prescribed
     """

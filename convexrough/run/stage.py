@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
+from convexrough.plottable import Plottable
 from convexrough.record import Table as Tabular
 from convexrough.record import singular
 from convexrough.run.values import Table
@@ -98,7 +98,7 @@ def numbers_of(found: Any, names: Sequence[str]) -> Summary:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Tabular, Drawn):
+class Result(Tabular, Plottable):
     """What a stage found: the summary, tables, figures and words are all read off `rows`.
 
     found : results of the package, one for each row, or one with arrays along steps

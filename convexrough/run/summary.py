@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from convexrough.atomic import to_json as to_json
 from convexrough.run.stage import Result, Summary
 from convexrough.run.stages.normal import Pressed, cautions
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
-from convexrough.whole import to_json as to_json
 
 #: Of the keys of summary.json and the columns of tables.
 SCHEMA = 2

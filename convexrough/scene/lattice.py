@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
+from convexrough.cached import Cached
 from convexrough.checks import SMALLEST
-from convexrough.kept import Keeper
 
 Sites = NDArray[Any]  # of whole numbers
 
 #: Points may differ from a lattice by this many roundoffs of the largest coordinate: a few more
 #: than computing them in float64 loses.
-BLUR = 32 * 2.0**-53
+SITE_ERROR = 32 * 2.0**-53
 
 #: ... and of the shortest distance between sites by this part: the bounds on products count it.
 CLOSEST = 1e-7
@@ -30,17 +30,17 @@ SPARSEST = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice(Keeper):
+class Lattice(Cached):
     """The points origin + i b1 + j b2, i and j whole numbers.
 
     basis   : (2, 2) [length] rows b1 and b2, reduced to rounding
-    blur    : [length] bound on the distance of each coordinate of the points from its site
+    site_error : [length] bound on the distance of each coordinate of the points from its site
     shrink  : by which it is smaller than one whose basis float64 holds exactly, `unshrunk`
     """
 
     origin: Array
     basis: Array
-    blur: float
+    site_error: float
     shrink: Fraction = Fraction(1)
     unshrunk: Array | None = None
 
@@ -48,8 +48,8 @@ class Lattice(Keeper):
         """Of points nearer to 0 by a factor, also where they are rounded a few times."""
         assert self.unshrunk is None
         times = float(factor)
-        blur = 2.0 * times * self.blur
-        return Lattice(times * self.origin, times * self.basis, blur, factor, self.basis)
+        site_error = 2.0 * times * self.site_error
+        return Lattice(times * self.origin, times * self.basis, site_error, factor, self.basis)
 
     @property
     def exactly(self) -> list[list[Fraction]]:
@@ -87,7 +87,7 @@ class Lattice(Keeper):
         off = float(np.abs(points - anchor - away @ fitted).max()) + 12 * 2.0**-53 * reach
         origin = anchor + fitted[0] - middle @ fitted[1:]
         found = cls(origin, fitted[1:], off + 4 * 2.0**-53 * reach)
-        if not off <= min(BLUR * reach, CLOSEST * found.spacing) or _crowded(sites):
+        if not off <= min(SITE_ERROR * reach, CLOSEST * found.spacing) or _crowded(sites):
             return None
         return found
 
@@ -96,7 +96,7 @@ class Lattice(Keeper):
         sites = _nearest_sites(points - self.origin, self.basis)
         off = np.abs(points - self.origin - sites @ self.basis).max(initial=0.0)
         reach = np.abs(points).max(initial=0.0)
-        return sites if off + 4 * 2.0**-53 * reach <= self.blur else None
+        return sites if off + 4 * 2.0**-53 * reach <= self.site_error else None
 
 
 def _nearest_sites(points: Array, basis: Array) -> Sites:
@@ -120,10 +120,10 @@ def _shortest(points: Array) -> Array | None:
         return None
     a = points[near[0]]
     across = np.abs(points[near] @ np.array([-a[1], a[0]]))
-    beside = np.flatnonzero(across > 1e-3 * np.sqrt(squares[near] * squares[near[0]]))
-    if len(beside) == 0:
+    oblique = np.flatnonzero(across > 1e-3 * np.sqrt(squares[near] * squares[near[0]]))
+    if len(oblique) == 0:
         return None
-    b = points[near[beside[0]]]
+    b = points[near[oblique[0]]]
     while True:
         b = b - np.rint((a @ b) / (a @ a)) * a
         if b @ b >= (a @ a) * (1 - 1e-9):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.kept import Keeper
+from convexrough.cached import Cached
 from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import refuse_coincident
 from convexrough.scene.patterns import Pattern
@@ -20,11 +20,11 @@ MANY = 5000
 
 #: Coordinates of points made on a lattice may differ from sites by this part of the largest: three
 #: roundoffs in making them, and what `Lattice.sites` loses and allows for when it looks.
-MADE_BLUR = 16 * 2.0**-53
+MADE_SITE_ERROR = 16 * 2.0**-53
 
 
 @dataclass(frozen=True, eq=False)
-class Layout(Keeper):
+class Layout(Cached):
     """Distinct points (n, 2) [length] in the plane; asperities of one layout share all of this.
 
     made : the lattice that they were made on, and i and j (n, 2) of each; None to look for one
@@ -44,8 +44,10 @@ class Layout(Keeper):
         points = spacing * np.stack(pattern.coordinates(*sites.T), axis=1)
         if len(points) < 3:
             return cls(frozen(points))
-        blur = MADE_BLUR * float(np.abs(points).max())
-        layout = cls(frozen(points), (Lattice(np.zeros(2), spacing * pattern.basis, blur), sites))
+        site_error = MADE_SITE_ERROR * float(np.abs(points).max())
+        layout = cls(
+            frozen(points), (Lattice(np.zeros(2), spacing * pattern.basis, site_error), sites)
+        )
         layout.__dict__["order"] = order
         return layout
 

@@ -52,15 +52,15 @@ def refuse_coincident(points: Array) -> None:
     if len(points) < 2:
         return
     distances = nearest_distances(points)
-    blur = 16 * np.finfo(float).eps * np.abs(points).max()  # well beyond the points' rounding
-    if (worst := float(distances.min())) <= blur or worst < SMALLEST:
+    rounding = 16 * np.finfo(float).eps * np.abs(points).max()  # well beyond the points' rounding
+    if (worst := float(distances.min())) <= rounding or worst < SMALLEST:
         first = int(np.argmin(distances))
         others = np.hypot(*(points[first + 1 :] - points[first]).T)
         second = first + 1 + int(np.argmin(others))
         raise InputError(
             "positions",
             found=f"asperities {first} and {second} (from 0) at a distance of {worst:g}",
-            expected="distinct positions" if worst <= blur else f"a distance of {SIZED}",
+            expected="distinct positions" if worst <= rounding else f"a distance of {SIZED}",
         )
 
 

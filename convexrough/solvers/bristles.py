@@ -42,7 +42,6 @@ from convexrough.arrays import Array
 from convexrough.convex.definite import is_definite
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.progress import Announce
 from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.newton import newton_step
 from convexrough.solvers.programs import Answer, QuadraticProgram, RawAnswer, Reduction, run_osqp
@@ -96,10 +95,9 @@ class BristleQP:
         self,
         problem: NormalProblem,
         start: Array | None = None,
-        announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates (own units). OSQP starts where it likes: `start` is not used."""
-        program = BristleProgram.accept(problem, self.bristles, self.name)
+        program = BristleProgram.assemble(problem, self.bristles, self.name)
         loads, approach, iterations = program.through(self._run)
         if self.newton_step:
             last = newton_step(problem, loads)
@@ -129,7 +127,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, Answer]):
     hessian: Array
 
     @classmethod
-    def accept(cls, problem: NormalProblem, m: int, solver: str) -> BristleProgram:
+    def assemble(cls, problem: NormalProblem, m: int, solver: str) -> BristleProgram:
         n = len(problem)
         checks.fits_in_memory("asperities of the bristle program", n, 60 * n + 1000 * m)
         return cls(problem, m, solver, *_convex_box(problem, solver))
@@ -182,13 +180,15 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, Answer]):
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
     """The box of loads, where the convex range cuts it, and A + diag(h): positive definite."""
-    ceiling = problem.ceiling
+    approach_bound = problem.approach_bound
     if problem.load is not None:
         trial = hertz.load(problem.smooth_indentation(), problem.coefficients)
-        ceiling = min(ceiling, problem.overhang(trial, problem.influence.apply(trial)))
+        approach_bound = min(
+            approach_bound, problem.overhang(trial, problem.influence.apply(trial))
+        )
     with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
         faces = (2.0 / 3.0 * problem.coefficients * LARGEST_S / problem.shells) ** 3
-    box = problem.bounds(ceiling)
+    box = problem.bounds(approach_bound)
     box = np.maximum(box, np.minimum(faces, SMALLEST_BOX * box.max()))
     if (hessian := _positive_definite(problem, box)) is not None:
         return box, np.zeros(len(box), dtype=bool), hessian

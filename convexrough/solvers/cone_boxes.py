@@ -20,7 +20,6 @@ from convexrough.arrays import Array, Indices
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.progress import Announce
 from convexrough.solvers.newton import newton_step
 from convexrough.solvers.programs import Answer
 from convexrough.solvers.solution import Solution
@@ -90,7 +89,7 @@ class Boxes:
     @classmethod
     def choose(cls, problem: NormalProblem, *, five: bool = False) -> Boxes:
         """A little wider than the a priori bounds, and S_i not above what the form can do."""
-        bounds = problem.bounds(problem.ceiling)
+        bounds = problem.bounds(problem.approach_bound)
         members = np.flatnonzero(bounds > NEGLIGIBLE * bounds.max())
         bounds, k = bounds[members], problem.coefficients[members]
         limit = FIVE_CONES_LIMIT if five else FOUR_CONES_LIMIT
@@ -154,7 +153,6 @@ class ConeSolver(ABC):
         self,
         problem: NormalProblem,
         start: Array | None = None,
-        announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates: with four cones, with five where a cut box stops an asperity.
 

@@ -44,7 +44,7 @@ class Conic(ConeSolver):
 
     def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
         """Clarabel's answer to the program in these boxes, not yet checked."""
-        lifted = LiftedProgram.accept(problem, boxes)
+        lifted = LiftedProgram.assemble(problem, boxes)
         raw = run_clarabel(
             lifted.apply(),
             self.name,
@@ -74,7 +74,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, Answer]):
     boxes: Boxes
 
     @classmethod
-    def accept(cls, problem: NormalProblem, boxes: Boxes) -> LiftedProgram:
+    def assemble(cls, problem: NormalProblem, boxes: Boxes) -> LiftedProgram:
         n = len(boxes.members)
         checks.fits_in_memory("asperities of the cone program", n, 100, power=2)
         return cls(problem, boxes)
@@ -95,7 +95,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, Answer]):
         np.fill_diagonal(M, problem.shells[members])
         upper = np.triu_indices(n)
         quadratic = sparse.csc_matrix((M[upper], (p[upper[0]], p[upper[1]])), shape=(width, width))
-        level = problem.ceiling if problem.approach is None else problem.approach
+        level = problem.approach_bound if problem.approach is None else problem.approach
         linear = np.zeros(width)
         linear[p] = -(level + problem.offsets[members])
         linear[y5] = k_box * (3 / 5 - S / 3)
@@ -113,8 +113,8 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, Answer]):
         return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
 
     def invert(self, raw: RawAnswer) -> Answer:
-        """The program counts the approach from the ceiling: V'(L) = -multiplier."""
+        """The program counts the approach from `approach_bound`: V'(L) = -multiplier."""
         approach = self.problem.approach
         if approach is None:
-            approach = self.problem.ceiling - float(raw.multipliers[0])
+            approach = self.problem.approach_bound - float(raw.multipliers[0])
         return Answer(raw.x[: len(self.boxes.members)], approach, raw.iterations)

@@ -80,11 +80,11 @@ class ConicCVXPY(ConeSolver):
 
     def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
         """What the solver makes of the program in these boxes, not yet judged."""
-        return LiftedModel.accept(self, problem, boxes).answer()
+        return LiftedModel.assemble(self, problem, boxes).answer()
 
     def model(self, problem: NormalProblem, *, five: bool = False) -> LiftedModel:
         """The program itself, with four cones or five: to read, to change, to solve again."""
-        return LiftedModel.accept(self, problem, Boxes.choose(problem, five=five))
+        return LiftedModel.assemble(self, problem, Boxes.choose(problem, five=five))
 
     def run(self, program: Any) -> Any:
         """A cvxpy.Problem, solved."""
@@ -137,7 +137,7 @@ class LiftedModel(Reduction[Any, Any, Answer]):
     """A compiled program: CVXPY objects, in the problem's own units.
 
     program  : cvxpy.Problem
-    D0       : cvxpy.Parameter; the approach, or the ceiling of it under load control
+    D0       : cvxpy.Parameter; the approach, or its upper bound under load control
     p        : cvxpy.Variable, loads of `boxes.members`
     link     : p == B y3; its multiplier is D - M p, minus the gap where p = 0
     total    : sum p == load, or None; its multiplier is D0 less the approach
@@ -159,7 +159,7 @@ class LiftedModel(Reduction[Any, Any, Answer]):
         return f"LiftedModel: {asperities}, {sides}; `program` is the cvxpy.Problem"
 
     @classmethod
-    def accept(cls, settings: ConicCVXPY, normal: NormalProblem, boxes: Boxes) -> LiftedModel:
+    def assemble(cls, settings: ConicCVXPY, normal: NormalProblem, boxes: Boxes) -> LiftedModel:
         """Equation 1 of docs/theory/exact-cones.md; with five cones, 1 and 2."""
         cp = load_library("cvxpy", settings.name)
         i, n = boxes.members, len(boxes.members)
@@ -168,7 +168,7 @@ class LiftedModel(Reduction[Any, Any, Answer]):
         M = normal.influence.matrix[np.ix_(i, i)] + np.diag(normal.shells[i])
         d = normal.offsets[i]
         D0 = cp.Parameter(name="D0")
-        D0.value = normal.ceiling if normal.approach is None else normal.approach
+        D0.value = normal.approach_bound if normal.approach is None else normal.approach
 
         p, *lift = (cp.Variable(n, name=name) for name in ("p", *_LIFT))
         _, _, y3, _, y5, z = lift
@@ -198,8 +198,8 @@ class LiftedModel(Reduction[Any, Any, Answer]):
         """
         normal = self.normal
         if approach is not None:
-            if normal.approach is None or not approach <= normal.ceiling:
-                expected = f"approach control, and not above {normal.ceiling:g}"
+            if normal.approach is None or not approach <= normal.approach_bound:
+                expected = f"approach control, and not above {normal.approach_bound:g}"
                 raise InputError("approach", found=approach, expected=expected)
             self.D0.value = approach
             normal = replace(normal, approach=approach)

@@ -60,7 +60,7 @@ def _mean_field(problem: NormalProblem) -> Array:
     K *= problem.influence.scale
 
     offsets, coefficients = problem.offsets[::every], problem.coefficients[::every]
-    approach = problem.ceiling
+    approach = problem.approach_bound
     w = np.zeros(count)
     if problem.scene.curved:
         w = hertz.surface_displacement(middle, *_smooth_contact(problem)) / problem.units.length
@@ -121,7 +121,7 @@ def _smooth_contact(problem: NormalProblem) -> tuple[float, float]:
     scene = problem.scene
     radius, modulus = scene.mean_radius, scene.material.contact_modulus
     if problem.load is None:
-        approach = max(problem.ceiling, 0.0) * problem.units.length
+        approach = max(problem.approach_bound, 0.0) * problem.units.length
         return float(np.sqrt(radius * approach)), radius
     load = problem.load * problem.units.force
     return float(hertz.contact_radius(load, modulus, radius)), radius

@@ -23,7 +23,7 @@ from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import refined_loads
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.solvers.pressing import Pressed, Pressing, negligible, on_constraint
 from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
@@ -61,11 +61,10 @@ class Newton:
         self,
         problem: NormalProblem,
         start: Array | None = None,
-        announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates, from any start that is not negative (own units)."""
         indentation = _start(problem, start)
-        highest = float(np.maximum(problem.ceiling + problem.offsets, 0.0).max())
+        highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
         if len(problem) > ALL_ITERATED and start is None:
             indentation = on_constraint(problem, indentation)
@@ -74,7 +73,7 @@ class Newton:
         while True:
             begin = indentation[near]
             del indentation  # half of the memory of a large scene is vectors
-            state, steps = self._iterate(problem, near, begin, announce)
+            state, steps = self._iterate(problem, near, begin)
             iterations += steps
             if len(near) == len(problem):
                 return self._ended(problem, state.forces, state, iterations)
@@ -101,30 +100,28 @@ class Newton:
         return replace(answer, refine=not self.tolerance > 0)
 
     def _refines(self, problem: NormalProblem) -> bool:
-        return problem.influence.sharp and not self.tolerance > 0
+        return problem.influence.cheap_sums and not self.tolerance > 0
 
     def _iterate(
         self,
         problem: NormalProblem,
         near: Indices,
         indentation: Array,
-        announce: Announce | None,
     ) -> tuple[Pressed, int]:
         """The solution of some of the candidates: all others carry nothing."""
-        part = problem if len(near) == len(problem) else problem.among(near)
+        part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
 
-        def tell(step: int, state: Pressed) -> None:
-            if announce is not None:
-                residual, touching = state.residual / state.scale, np.count_nonzero(state.forces)
-                announce(f"step {step}, residual {residual:.1e}, {touching:,} touching")
+        def report(step: int, state: Pressed) -> None:
+            residual, touching = state.residual / state.scale, np.count_nonzero(state.forces)
+            LOGGER.info(f"step {step}, residual {residual:.1e}, {touching:,} touching")
 
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
             state = law.evaluate(indentation)
             if self._refines(problem):  # what is left then is linear
                 stopping = replace(stopping, linear=negligible(indentation))
-            return newton.solve(law, state, stopping, tell=tell)
+            return newton.solve(law, state, stopping, report=report)
         except SolverError as error:
             if error.iterate is not None:
                 error.iterate = among_zeros(error.iterate, near, len(problem))

@@ -130,4 +130,4 @@ def on_constraint(problem: NormalProblem, indentation: Array) -> Array:
     """Cut to the a priori box (approach control), or shifted to the prescribed total load."""
     if problem.load is not None:
         return shifted_to_load(indentation, problem.coefficients, problem.load)
-    return np.minimum(indentation, problem.ceiling + problem.offsets)
+    return np.minimum(indentation, problem.approach_bound + problem.offsets)

@@ -28,7 +28,7 @@ Found = TypeVar("Found")
 class Reduction(ABC, Generic[Data, Raw, Found]):
     """One problem as a program; its fields are what the way back needs.
 
-    A class method `accept(problem, ...)` makes it, or raises: an error that names the asperities
+    A class method `assemble(problem, ...)` makes it, or raises: an error that names the asperities
     for which the program is not exact, or InputError where it does not fit in memory.
     """
 

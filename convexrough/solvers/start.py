@@ -37,7 +37,7 @@ def _on_hertz_pressure(problem: NormalProblem) -> Array:
     inside = np.maximum(1.0 - squares / (WIDER * _smooth_radius(problem) ** 2), 0.0)
     s = np.sqrt(inside)
     displacement = problem.influence.apply(s)
-    prescribed = problem.ceiling + problem.offsets
+    prescribed = problem.approach_bound + problem.offsets
     total, work = float(s.sum()), float(s @ prescribed)
     if not (total > 0 and work > 0):  # nothing where the smooth sphere would touch
         return problem.smooth_indentation()
@@ -56,6 +56,6 @@ def _smooth_radius(problem: NormalProblem) -> float:
     if radius == math.inf:
         return radius
     if problem.load is None:
-        return float(np.sqrt(radius * max(problem.ceiling, 0.0) * units.length)) or 1.0
+        return float(np.sqrt(radius * max(problem.approach_bound, 0.0) * units.length)) or 1.0
     modulus = problem.scene.material.contact_modulus
     return float(hertz.contact_radius(problem.load * units.force, modulus, radius))

@@ -1,7 +1,7 @@
 """The tangential law of one sphere at constant normal load (Cattaneo and Mindlin).
 
-With t = Q / (f P) and the largest deflection ceiling = k P^(2/3), everything is a function of t
-alone, times c_t f ceiling (displacements) or c_t f^2 P ceiling (energies); c_t is `ratio`. Each
+With t = Q / (f P) and the largest deflection threshold = k P^(2/3), everything is a function of t
+alone, times c_t f threshold (displacements) or c_t f^2 P threshold (energies); c_t is `ratio`. Each
 function is accurate relative to its own value, also where that is of third order in t: they are the
 positive polynomials of `annulus`.
 Source: Johnson, Contact Mechanics (1985), chapter 7.
@@ -39,6 +39,6 @@ def loss(t: Number) -> Number:
     """e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], of third order in t.
 
     A cycle between +-Q costs (9 (2 - nu) f^2 P^2 / (5 G a)) e(Q / (f P)), which is
-    (24/5) c_t f^2 P ceiling e: equation (16) of the source, for both bodies.
+    (24/5) c_t f^2 P threshold e: equation (16) of the source, for both bodies.
     """
     return annulus.loss(annulus.width_under(t))

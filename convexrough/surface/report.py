@@ -235,7 +235,7 @@ def _describe_crowded(contact: Contact) -> list[str]:
     return lines
 
 
-def doubts_of_surface(scanned: Scanned) -> Iterator[str]:
+def warnings_about(scanned: Scanned) -> Iterator[str]:
     """What a user should know, in words with numbers."""
     surface, summits, contact = scanned.surface, scanned.summits, scanned.contact
     yield from surface.warnings

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
+from convexrough.plottable import Plottable
 from convexrough.record import Along, Record, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.surface.detrend import Removed
@@ -76,7 +76,7 @@ class Statistics(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Summits(Table, Asperities, Drawn):
+class Summits(Table, Asperities, Plottable):
     """Asperities that are the summits of a map, the tallest first.
 
     positions, tip_radii, heights : of the tops of paraboloids; the tip radius is 1 / sqrt(k1 k2)

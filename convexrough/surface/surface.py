@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError
+from convexrough.plottable import Plottable
 from convexrough.record import Record
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
 from convexrough.surface.hills import Hills, hills
@@ -31,7 +31,7 @@ ROUNDING = 64 * np.finfo(float).eps
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Surface(Record, Drawn):
+class Surface(Record, Plottable):
     """Heights over a grid whose middle is the origin.
 
     heights : (ny, nx) [length] x grows with the column, y with the row; taller is positive

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from convexrough.atomic import to_json, write_text
 from convexrough.errors import ExtraError, FileError
 from convexrough.sweeps.batch import Columns, different
-from convexrough.whole import to_json, write_text
 
 MANIFEST, PARTS = "manifest.json", "parts"
 

@@ -89,8 +89,8 @@ class Grid:
     @property
     def count(self) -> int:
         """How many scenes there are; `len` could not say 10^20."""
-        listed = len(self.together[0][1]) if self.together else 1
-        return listed * math.prod(len(values) for _, values in self.over) * self.each
+        tuples = len(self.together[0][1]) if self.together else 1
+        return tuples * math.prod(len(values) for _, values in self.over) * self.each
 
     def point(self, number: int) -> Point:
         """That of scene `number`, from 0."""

@@ -72,8 +72,8 @@ def _numbers(
     elif isinstance(value, list):
         for i, each in enumerate(value):
             many = isinstance(each, dict) and labels
-            told = row_label([each[label] for label in reversed(labels)]) if many else str(i)
-            yield from _numbers(each, name, f"{row}_{told}" if row else told, labels)
+            own = row_label([each[label] for label in reversed(labels)]) if many else str(i)
+            yield from _numbers(each, name, f"{row}_{own}" if row else own, labels)
     elif isinstance(value, (int, float)):
         yield (name, row), float(value)
 

@@ -1,11 +1,12 @@
 r"""What is proved of a state of vector friction, whoever found it, in the order of the proof.
 
 Forces q and displacements are in own units; stars mark the state of the true loads P, which are
-balls. Every asperity i that is proved to touch obeys, with its ceiling k_i and the rise X,
+balls. Every asperity i that is proved to touch obeys, with its sliding threshold k_i and the rigid
+displacement X,
 
     eta_i = X - (B q)_i,    q_i = q(eta_i),    sum q = T,
 
-where q(eta) is along eta, of length P [1 - (1 - |eta|/k)^(3/2)], or P beyond the ceiling; it is the
+where q(eta) is along eta, of length P [1 - (1 - |eta|/k)^(3/2)], or P beyond k; it is the
 gradient of a convex function of eta. All other asperities together bear at most `stray`.
 
 1. The trial. Any eta is the displacement that exactly the forces q(eta) need on the true loads:
@@ -13,12 +14,14 @@ gradient of a convex function of eta. All other asperities together bear at most
 2. The total. If sum q(eta) misses T by m, some s with |s| <= r makes sum q(eta + s) = T, where
    r lambda(r) >= m and lambda(r) bounds from below the slope of this sum within r (`_shift`). On
    the circle |s| = r the convex function less T.s rises outwards, so its minimum is inside.
-3. The residual of q' = q(eta + s), with the rise X + s, is e_i = |v_i + (B (q' - q))_i| and what
-   `stray` adds. A sliding component is P_i times a unit vector: on its face, with true loads.
+3. The residual of q' = q(eta + s), with the displacement X + s, is
+   e_i = |v_i + (B (q' - q))_i| and what `stray` adds. A sliding
+   component is P_i times a unit vector: on its face, with true loads.
 4. The theorem of `convex.theorem`:  || q* - q' ||_H <= || e ||_{H^-1} / mu,  h_i = 2 k_i / (3 P_i).
-5. The rise. eta*_i = eta_i + w_i + (X* - X) with w_i = -v_i - (B (q* - q))_i, so that |X* - X| is
-   an s as in step 2, for sums that w changes.
-6. Words. i slides where |eta*_i| > k_i for sure, and does not where |eta*_i| < k_i or |q*_i| < P_i.
+5. The displacement. eta*_i = eta_i + w_i + (X* - X) with w_i = -v_i - (B (q* - q))_i.
+   So |X* - X| is an s as in step 2, for sums that w changes.
+6. Statuses. i slides where |eta*_i| > k_i for sure, and does not where |eta*_i| < k_i or where
+   |q*_i| < P_i.
 
 The energy E is convex: E(q) - E(q*) <= sum e_i |q_i - q*_i| + X.(sum q - T) of any forces q.
 docs/theory/vector-friction.md has the slopes of step 2, and what is left close to gross sliding.
@@ -49,7 +52,7 @@ ROUNDED = 8 * ROUNDOFF
 class VectorBounds(NamedTuple):
     """Proved bounds on a state, in own units; infinite where nothing is proved.
 
-    increments, slips : (n,) |q - q*| and |slip - slip*|;  rise : |X - X*|
+    increments, slips : (n,) |q - q*| and |slip - slip*|;  displacement_error : |X - X*|
     sliding, partial : (n,) proved to slide, and not to
     excess : the energy of the forces above the least
     """
@@ -57,7 +60,7 @@ class VectorBounds(NamedTuple):
     proved: bool
     increments: Array
     slips: Array
-    rise: float
+    displacement_error: float
     sliding: NDArray[np.bool_]
     partial: NDArray[np.bool_]
     excess: float = np.inf
@@ -71,7 +74,7 @@ class VectorBounds(NamedTuple):
 
 @quietly
 def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """Bounds on a state of which increments, rise and slips are believed to be nothing.
+    """Bounds on a state of which increments, displacement and slips are believed to be nothing.
 
     total : (2,) T
     """
@@ -79,7 +82,7 @@ def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> 
     if known.scope == "none" or not known.sure.any():
         return VectorBounds.unproved(len(problem))
     found = VectorBounds.unproved(len(problem))
-    if np.isfinite(state.rise).all() and problem.margin > 0:
+    if np.isfinite(state.displacement).all() and problem.margin > 0:
         found = _by_convexity(problem, known, state, total)
     if not (found.sliding | found.partial).all():
         found = _merged(found, _by_exhaustion(problem, known, state, total))
@@ -92,16 +95,16 @@ def _by_convexity(
     """Steps 1 to 6."""
     sure, softness = known.sure, known.softness
     reach = problem.reach
-    limits, ceilings = known.held, known.ceiling_balls
+    limits, thresholds = known.load_balls, known.threshold_balls
 
     # 1. The trial, and by how much it misses the balance and the total.
-    eta = state.rise - problem.couple(state.increments)
-    q = _forces(eta, limits, ceilings)
-    forces, blur = q.value.T, np.hypot(*q.error)
-    imbalance = (Ball.exact(eta) + problem.couple(forces) - state.rise).size
+    eta = state.displacement - problem.couple(state.increments)
+    q = _forces(eta, limits, thresholds)
+    forces, force_errors = q.value.T, np.hypot(*q.error)
+    imbalance = (Ball.exact(eta) + problem.couple(forces) - state.displacement).size
     off = np.hypot(*imbalance.T)
     off += problem.product_error * (known.influence.matrix @ np.hypot(*forces.T))
-    off = (off + reach @ blur + known.stray_effect * (1.0 + problem.bias)) * (1 + SAFETY)
+    off = (off + reach @ force_errors + known.stray_effect * (1.0 + problem.bias)) * (1 + SAFETY)
     missing = float(np.hypot(*(q.sum() - total).size)) + known.stray
 
     # 2. The shift that restores the total.
@@ -116,37 +119,46 @@ def _by_convexity(
     within = distance(residual, 1.0 / softness, problem.margin)
     distances = within * np.sqrt(softness) + moved
 
-    # 5. The rise.
+    # 5. The displacement.
     coupled = within * np.sqrt(reach**2 @ np.where(sure, softness, 0.0)) + reach @ moved
     turned = (off + coupled) * (1 + SAFETY)
     carried = float(np.where(sure, _steepest(known, size - turned) * turned, 0.0).sum())
-    rise = _shift(problem, eta, turned, (missing + carried) * (1 + SAFETY))
+    displacement_error = _shift(problem, eta, turned, (missing + carried) * (1 + SAFETY))
 
     # 6. Words, and bounds for the state as it was given.
-    doubt = (turned + rise) * (1 + SAFETY) + ROUNDED * size
-    distances = np.fmin(distances, _steepest(known, size - doubt) * doubt) * (1 + SAFETY)
-    sliding = sure & (size - doubt > ceilings.upper)
-    bears_more = np.hypot(*forces.T) * (1 + ROUNDED) + blur + distances < limits.lower
-    partial = sure & ((size + doubt < ceilings.lower) | bears_more)
-    increments = distances + blur + np.hypot(*(forces - state.increments).T) * (1 + SAFETY)
+    uncertainty = (turned + displacement_error) * (1 + SAFETY) + ROUNDED * size
+    distances = np.fmin(distances, _steepest(known, size - uncertainty) * uncertainty) * (
+        1 + SAFETY
+    )
+    sliding = sure & (size - uncertainty > thresholds.upper)
+    bears_more = np.hypot(*forces.T) * (1 + ROUNDED) + force_errors + distances < limits.lower
+    partial = sure & ((size + uncertainty < thresholds.lower) | bears_more)
+    increments = distances + force_errors + np.hypot(*(forces - state.increments).T) * (1 + SAFETY)
     increments = np.where(sure, increments, known.most + np.hypot(*state.increments.T))
     # What a vector has beyond a disc changes by no more than the vector and the radius do.
-    slips = along(np.maximum(size - ceilings.value, 0.0), eta, size)
-    slip_errors = np.hypot(*(slips - state.slips).T) + doubt + ceilings.error
+    slips = along(np.maximum(size - thresholds.value, 0.0), eta, size)
+    slip_errors = np.hypot(*(slips - state.slips).T) + uncertainty + thresholds.error
     slip_errors = np.where(partial, np.hypot(*state.slips.T), np.where(sure, slip_errors, np.inf))
-    return VectorBounds(bool(np.isfinite(rise)), increments, slip_errors, rise, sliding, partial)
+    return VectorBounds(
+        bool(np.isfinite(displacement_error)),
+        increments,
+        slip_errors,
+        displacement_error,
+        sliding,
+        partial,
+    )
 
 
-def _forces(eta: Array, limits: Ball, ceilings: Ball) -> Ball:
+def _forces(eta: Array, limits: Ball, thresholds: Ball) -> Ball:
     """(2, n) q(eta):  with z the positive part of 1 - |eta|/k,
 
-    P/k [1 + z / (1 + z^(1/2))] eta  up to the ceiling, and P eta/|eta| beyond: nothing cancels.
+    P/k [1 + z / (1 + z^(1/2))] eta  up to the threshold, and P eta/|eta| beyond: nothing cancels.
     """
     exact = Ball.exact(np.ascontiguousarray(eta.T))
     squares = exact * exact
-    share = (squares[0] + squares[1]).sqrt() / ceilings
+    share = (squares[0] + squares[1]).sqrt() / thresholds
     left, beyond = (1.0 - share).positive_part(), (share - 1.0).positive_part()
-    return exact * (limits / ceilings * (1.0 + left / (1.0 + left.sqrt())) / (1.0 + beyond))
+    return exact * (limits / thresholds * (1.0 + left / (1.0 + left.sqrt())) / (1.0 + beyond))
 
 
 def _slopes(scale: Array, share: Array) -> tuple[Array, Array]:
@@ -161,8 +173,8 @@ def _slopes(scale: Array, share: Array) -> tuple[Array, Array]:
 
 def _steepest(known: Loaded, size: Array) -> Array:
     """(n,) upper bounds on the slopes of q at displacements no shorter than this."""
-    share = np.fmax(size, 0.0) / known.ceiling_balls.upper * (1.0 - ROUNDED)
-    _, across = _slopes(known.held.upper / known.ceiling_balls.lower, share)
+    share = np.fmax(size, 0.0) / known.threshold_balls.upper * (1.0 - ROUNDED)
+    _, across = _slopes(known.load_balls.upper / known.threshold_balls.lower, share)
     return np.asarray(np.where(known.sure, across * (1 + SAFETY), 0.0))
 
 
@@ -176,11 +188,11 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
     known, size = problem.scalar, np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:
         return np.inf
-    scale = known.held.lower / known.ceiling_balls.upper
+    scale = known.load_balls.lower / known.threshold_balls.upper
     direction = along(np.ones(len(size)), eta, size)
 
     def least_slope(reached: Array) -> float:
-        share = (size + reached) / known.ceiling_balls.lower * (1.0 + ROUNDED)
+        share = (size + reached) / known.threshold_balls.lower * (1.0 + ROUNDED)
         radial, across = np.where(known.sure, _slopes(scale, share), 0.0)
         extra = across - radial
         angle = np.minimum(reached / np.maximum(size, 1e-300), 1.0) + ROUNDED
@@ -208,7 +220,7 @@ def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Arr
 
     e_i is the distance of X - (B q)_i from the deflection of q_i, or from the ray of those of q_i.
     """
-    q, X, known = state.increments, state.rise, problem.scalar
+    q, X, known = state.increments, state.displacement, problem.scalar
     if not np.isfinite(X).all() or problem.margin == 0.0:
         return np.inf
     size = problem.sizes(q)
@@ -232,7 +244,7 @@ def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
         found.proved or other.proved,
         np.fmin(found.increments, other.increments),
         np.fmin(found.slips, other.slips),
-        min(found.rise, other.rise),
+        min(found.displacement_error, other.displacement_error),
         found.sliding | other.sliding,
         found.partial | other.partial,
     )
@@ -248,35 +260,41 @@ def _by_exhaustion(
     force that is turned costs friction.
     """
     sure, reach, unproved = known.sure, problem.reach, VectorBounds.unproved(len(problem))
-    P, ceilings = np.where(sure, known.loads, 0.0), known.ceiling_balls
+    P, thresholds = np.where(sure, known.loads, 0.0), known.threshold_balls
     size = float(np.hypot(*total.value))
     if size == 0.0:
         return unproved
     t = total.value / size
     squares = total * total
-    left = known.held.sum() - (squares[0] + squares[1]).sqrt()
+    left = known.load_balls.sum() - (squares[0] + squares[1]).sqrt()
     unused = max(float(left.upper), 0.0) + known.stray
     most = np.where(sure, known.most, 0.0)
     turned = np.minimum(np.sqrt(2.0 * most * unused), 2.0 * most)
     errors = np.where(sure, known.errors, known.most) + turned + 2 * ROUNDED * P
     errors = errors + np.hypot(*(state.increments - P[:, None] * t).T)
 
-    # B q by what is known of q: `coupled` at P t, within `blur`.
+    # B q by what is known of q: `coupled` at P t, within `uncertainty`.
     coupled, across = problem.couple(P[:, None] * t), np.array([-t[1], t[0]])
-    blur = reach @ np.where(sure, known.errors, 0.0) + np.sqrt(2.0 * unused * (reach**2 @ most))
-    blur += (1.0 + problem.bias) * known.stray_effect
-    blur += (problem.product_error + 2 * ROUNDED) * (reach @ P)
-    least = np.where(sure, known.held.lower, np.inf)
-    lacking = unused / least
-    lowest = ceilings.lower * (1.0 - lacking - lacking ** (2 / 3) - ROUNDED) + coupled @ t - blur
-    least_rise = lowest.max(where=sure & (lacking < 1), initial=-np.inf)  # of X.t
-    highest = ceilings.upper + blur  # of | X - coupled | where it sticks
-    pushed = least_rise - coupled @ t > highest * (1 + SAFETY)
+    uncertainty = reach @ np.where(sure, known.errors, 0.0) + np.sqrt(
+        2.0 * unused * (reach**2 @ most)
+    )
+    uncertainty += (1.0 + problem.bias) * known.stray_effect
+    uncertainty += (problem.product_error + 2 * ROUNDED) * (reach @ P)
+    least = np.where(sure, known.load_balls.lower, np.inf)
+    missing = unused / least
+    lowest = (
+        thresholds.lower * (1.0 - missing - missing ** (2 / 3) - ROUNDED)
+        + coupled @ t
+        - uncertainty
+    )
+    least_displacement = lowest.max(where=sure & (missing < 1), initial=-np.inf)  # of X.t
+    highest = thresholds.upper + uncertainty  # of | X - coupled | where it sticks
+    pushed = least_displacement - coupled @ t > highest * (1 + SAFETY)
     # Were it to stick, displacements would be small, and forces turned by what differs across t.
     weights, side = np.where(sure, least, 0.0), coupled @ across
     mean = float(weights @ side) / float(weights.sum())
-    spread = np.sqrt(weights @ (side - mean) ** 2) - np.sqrt(weights @ blur**2)
-    longest = highest + float(np.hypot(*np.ptp(coupled, axis=0))) + float(blur.max())
+    spread = np.sqrt(weights @ (side - mean) ** 2) - np.sqrt(weights @ uncertainty**2)
+    longest = highest + float(np.hypot(*np.ptp(coupled, axis=0))) + float(uncertainty.max())
     sliding = sure & (pushed | (spread * (1 - SAFETY) > np.sqrt(2.0 * unused) * longest))
     complete = known.stray == 0 and bool(sure.all())
     proved = bool(sliding.any()) or complete

@@ -2,7 +2,7 @@
 
 Let m_i >= |q_i| be the size of force that friction must bear at asperity i, m_i / P_i = 1 - t_i^3,
 and M = B + shift the kernel made semidefinite. With S the share of the shift, the local energy of
-m less shift m^2 / 2 is P_i ceiling_i times
+m less shift m^2 / 2 is P_i threshold_i times
 
     (3/5) t^5 - (S/3) t^6 - (1 - 2S/3) t^3 + 2/5 - S/3,
 
@@ -120,7 +120,7 @@ class FrictionConic:
     def solve(self, problem: VectorProblem, total: Array) -> VectorState:
         """The state of a total increment (2,), |T| < sum P (own units)."""
         scale = min(float(np.hypot(*total)) / (ELASTIC * problem.scalar.loads.sum()), 1.0)
-        program = FrictionProgram.accept(problem, total / scale)
+        program = FrictionProgram.assemble(problem, total / scale)
         data, solver = program.apply(), f"friction ({self.name})"
         for step in STEPS:
             raw = run_clarabel(data, solver, self.tolerance, max_step_fraction=step)
@@ -129,8 +129,10 @@ class FrictionConic:
             known = certify_vectors(problem, state, Ball.exact(total / scale))
             gap, residual = known.excess / energy, problem.residual(state)
             if gap <= self.accepted and residual <= SLIPS * self.accepted:
-                q, rise, slips = state.increments, state.rise, state.slips
-                return VectorState(total, scale * q, scale * rise, scale * slips, state.iterations)
+                q, displacement, slips = state.increments, state.displacement, state.slips
+                return VectorState(
+                    total, scale * q, scale * displacement, scale * slips, state.iterations
+                )
         raise SolverError(
             f"clarabel stopped after {raw.iterations} steps with {raw.word}, at an energy proved "
             f"to be within {gap:.3g} of the least, relatively, and a residual of {residual:.3g}; "
@@ -161,14 +163,14 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     energy: float
 
     @classmethod
-    def accept(cls, problem: VectorProblem, total: Array) -> FrictionProgram:
+    def assemble(cls, problem: VectorProblem, total: Array) -> FrictionProgram:
         """Raises SolverError, with the asperities, where S is above the range of the cones."""
         scalar, shares = problem.scalar, problem.shift.shares
         if shares.max() > FIVE_CONES_LIMIT:
             raise _too_dense(problem)
         elastic = np.hypot(*total) * scalar.elastic / scalar.loads
         small = np.clip(elastic, 0.01 * elastic.max(), 1.0)
-        energy = float((scalar.loads * scalar.ceilings * small**2).max())
+        energy = float((scalar.loads * scalar.thresholds * small**2).max())
         lift = FOUR if shares.max() <= FOUR_CONES_LIMIT else FIVE
         return cls(problem, total, lift, small, energy)
 
@@ -193,7 +195,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         M[np.diag_indices(2 * n)] += np.repeat(problem.shift.values, 2)
         upper = sparse.csc_matrix(np.triu(M * (unit / self.energy) * unit[:, None]))
         nothing = sparse.csc_matrix(((len(lift.orders) - 1) * n,) * 2)
-        counted = (P * problem.scalar.ceilings / self.energy)[:, None] * small**lift.orders
+        counted = (P * problem.scalar.thresholds / self.energy)[:, None] * small**lift.orders
         lifted = (counted * (lift.energy[0] + S * lift.energy[1]))[:, 1:]
         linear = np.concatenate((np.zeros(2 * n), lifted.ravel()))
         return sparse.csc_matrix(sparse.block_diag((upper, nothing))), linear
@@ -233,21 +235,21 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         """Forces, rigid displacement and slips from the answer and its multipliers.
 
         An interior point leaves an asperity that slides a little short of P, and one that does not
-        a little slip: of the two, the larger part of its ceiling is kept.
+        a little slip: of the two, the larger part of its threshold is taken.
         """
         problem = self.problem
-        n, P, ceilings = len(problem), problem.scalar.loads, problem.scalar.ceilings
+        n, P, thresholds = len(problem), problem.scalar.loads, problem.scalar.thresholds
         unit = self.small * P
         q = raw.x[: 2 * n].reshape(n, 2) * unit[:, None]
         size = np.hypot(*q.T)
-        rise = -raw.multipliers[:2] * self.energy / self.force
+        displacement = -raw.multipliers[:2] * self.energy / self.force
         limit = raw.multipliers[2:].reshape(n, -1)[:, 0] * self.energy / unit  # of |q_i| <= m_i
-        slip = limit - (ceilings - problem.shift.values * P)  # where |q_i| = P_i
-        left = ceilings - problem.scalar.deflections(np.minimum(size, P))
+        slip = limit - (thresholds - problem.shift.values * P)  # where |q_i| = P_i
+        left = thresholds - problem.scalar.deflections(np.minimum(size, P))
         sliding = slip > left
         q = along(np.where(sliding, P, np.minimum(size, P)), q, size)
         slips = along(np.where(sliding, slip, 0.0), q, np.hypot(*q.T))
-        return VectorState(self.total, q, rise, slips, raw.iterations)
+        return VectorState(self.total, q, displacement, slips, raw.iterations)
 
 
 def _too_dense(problem: VectorProblem) -> SolverError:

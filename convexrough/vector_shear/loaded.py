@@ -1,7 +1,7 @@
 """The loaded asperities of a contact: Mindlin's law of each, and how well their loads are known.
 
 With increments u of the loads P that asperities hold in friction, the displacement that asperity i
-must take up is eta_i = ceiling_i deflection(u_i / P_i), and beyond ceiling_i = k P^(2/3) it slides.
+must take up is eta_i = threshold_i deflection(u_i / P_i); it slides beyond threshold_i = k P^(2/3).
 Forces are in f times the unit of loads, displacements in c_t f times the unit of lengths.
 """
 
@@ -40,10 +40,10 @@ class Loaded:
 
     scope    : of the contact's certificate, "none" where nothing is proved
     touching : their indices in the scene
-    loads, errors : P, and bounds on its errors;  ceilings : k P^(2/3)
+    loads, errors : P, and bounds on its errors;  thresholds : k P^(2/3)
     influence : A among them;  shells : added to the diagonal of A they make it semidefinite
     sure     : proved to touch
-    held, ceiling_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
+    load_balls, threshold_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
     softness : the most of 3 P / (2 k P^(2/3)) where sure, 0 elsewhere
     stray    : most that all asperities that are neither sure nor open carry together
     stray_effect : most that this moves each of the others, were it a normal load
@@ -56,12 +56,12 @@ class Loaded:
     touching: Indices
     loads: Array
     errors: Array
-    ceilings: Array
+    thresholds: Array
     influence: Influence
     shells: Array
     sure: NDArray[np.bool_]
-    held: Ball
-    ceiling_balls: Ball
+    load_balls: Ball
+    threshold_balls: Ball
     softness: Array
     stray: float
     stray_effect: float
@@ -69,11 +69,11 @@ class Loaded:
     @classmethod
     def of(cls, contact: Contact) -> Loaded:
         """Those of a contact, which keeps them; InputError where the scene has no friction."""
-        return contact.keep(cls._assemble)
+        return contact.cached(cls._assemble)
 
     @classmethod
     def _assemble(cls, contact: Contact) -> Loaded:
-        levels, scene = contact.keep(FrictionLevels), contact.scene
+        levels, scene = contact.cached(FrictionLevels), contact.scene
         level, units = levels.top, levels.units
         loaded = np.flatnonzero(level.loads.value > 0)
         touching = levels.candidates[loaded]
@@ -83,8 +83,8 @@ class Loaded:
         )
         P, k = level.loads[loaded], level.problem.exact.coefficients
         k = k if len(k) == 1 else k[loaded]
-        ceilings = k * P.two_thirds()
-        sure = level.touching[loaded] & P.positive & ceilings.positive
+        thresholds = k * P.two_thirds()
+        sure = level.touching[loaded] & P.positive & thresholds.positive
         left = ~level.open
         left[loaded[sure]] = False
         stray = float(np.maximum(level.loads.upper, 0.0)[left].sum()) * (1 + SAFETY)
@@ -97,12 +97,12 @@ class Loaded:
             touching=touching,
             loads=P.value,
             errors=P.error,
-            ceilings=ceilings.value,
+            thresholds=thresholds.value,
             influence=influence,
             shells=shells(influence),
             sure=sure,
-            held=where(sure, P, nothing),
-            ceiling_balls=where(sure, ceilings, nothing + 1.0),
+            load_balls=where(sure, P, nothing),
+            threshold_balls=where(sure, thresholds, nothing + 1.0),
             softness=np.where(sure, (1.5 * P.cbrt() / k).upper, 0.0),
             stray=stray,
             stray_effect=stray * level.problem.largest_entry * (1 + SAFETY) if stray else 0.0,
@@ -131,7 +131,7 @@ class Loaded:
         f = Fraction(float(self.levels.coefficient.value))
         return limited(self.levels.load, Fraction(force) / f)
 
-    def first_loading(self, height: Fraction) -> tuple[Array, Array]:
+    def from_rest(self, height: Fraction) -> tuple[Array, Array]:
         """(n,) u and eta of the scalar law under T [force]."""
         if height < ELASTIC * self.levels.load:
             shares = self.elastic * float(height / Fraction(self.units.force))
@@ -143,25 +143,25 @@ class Loaded:
 
     def increments(self, deflections: Array) -> Array:
         """u(eta), saturated at P."""
-        u: Array = self.loads * annulus.force(annulus.width_at(deflections / self.ceilings))
+        u: Array = self.loads * annulus.force(annulus.width_at(deflections / self.thresholds))
         return u
 
     def deflections(self, increments: Array) -> Array:
         """The local deflection of an asperity that does not slide, of u >= 0."""
         left = (self.loads - increments) / self.loads
         x = annulus.width_between(increments / self.loads, left)
-        eta: Array = self.ceilings * annulus.deflection(x)
+        eta: Array = self.thresholds * annulus.deflection(x)
         return eta
 
     def slopes(self, deflections: Array) -> Array:
         """c = du/deta, 0 where sliding."""
-        c: Array = self.stiffest * (1.0 - annulus.width_at(deflections / self.ceilings))
+        c: Array = self.stiffest * (1.0 - annulus.width_at(deflections / self.thresholds))
         return c
 
     @cached_property
     def stiffest(self) -> Array:
         """(n,) c at eta = 0: 2 E* a."""
-        c: Array = 1.5 * self.loads / self.ceilings
+        c: Array = 1.5 * self.loads / self.thresholds
         return c
 
     @cached_property

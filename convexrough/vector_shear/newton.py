@@ -1,12 +1,12 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
 The unknown is eta_i, the displacement vector that asperity i must take up. With the local law
-inverted, q_i = P_i force(|eta_i| / ceiling_i) along eta_i, the conditions are the normal map
+inverted, q_i = P_i force(|eta_i| / threshold_i) along eta_i, the conditions are the normal map
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T,
 
 which `convex.newton` solves: no set of sliding asperities is guessed, they are those with |eta_i|
-beyond the ceiling. With dq_i/deta_i = W_i W_i' (rank 1 where sliding: the force can still turn) a
+beyond the threshold. With dq_i/deta_i = W_i W_i' (rank 1 where sliding: the force can still turn) a
 step solves the symmetric system
 
     (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y,
@@ -51,7 +51,7 @@ class FrictionNewton:
         law = _Friction(problem, total)
         size = float(np.hypot(*total))
         height = Fraction(size) * Fraction(problem.scalar.units.force)
-        _, deflections = problem.scalar.first_loading(height)
+        _, deflections = problem.scalar.from_rest(height)
         start = law.evaluate(deflections[:, None] * (total / size))
         if start is None:
             raise SolverError(
@@ -62,9 +62,9 @@ class FrictionNewton:
         stopping = newton.Stopping(self.tolerance, 0.0, self.max_iterations)
         state, iterations = newton.solve(law, start, stopping)
         size_of = np.hypot(*state.unknown.T)
-        beyond = np.maximum(size_of - problem.scalar.ceilings, 0.0)
+        beyond = np.maximum(size_of - problem.scalar.thresholds, 0.0)
         slips = along(beyond, state.unknown, size_of)
-        return VectorState(total, state.forces, state.rise, slips, iterations)
+        return VectorState(total, state.forces, state.displacement, slips, iterations)
 
 
 class _Iterate(NamedTuple):
@@ -72,7 +72,7 @@ class _Iterate(NamedTuple):
     forces: Array  # (n, 2) q(eta)
     coupling: Array  # (n, 2) B q
     roots: Array  # (n, 2, 2) W
-    rise: Array  # (2,) the best estimate of X
+    displacement: Array  # (2,) the best estimate of X
     defect: Array  # (n, 2) F
     residual: float  # max |F_i|
     energy: float
@@ -80,7 +80,7 @@ class _Iterate(NamedTuple):
     @property
     def scale(self) -> float:
         """|X|."""
-        return float(np.hypot(*self.rise))
+        return float(np.hypot(*self.displacement))
 
 
 @dataclass(frozen=True)
@@ -106,11 +106,11 @@ class _Friction:
         level = shifted + coupling  # X, at every asperity
         middle = level.mean(axis=0)
         pull = np.einsum("nij,nj->i", slopes, level - middle)
-        rise = middle + np.linalg.lstsq(slopes.sum(axis=0), pull, rcond=None)[0]
-        defect = level - rise
+        displacement = middle + np.linalg.lstsq(slopes.sum(axis=0), pull, rcond=None)[0]
+        defect = level - displacement
         residual = float(np.hypot(*defect.T).max())
         energy = problem.energy(q, coupling)
-        return _Iterate(shifted, q, coupling, roots, rise, defect, residual, energy)
+        return _Iterate(shifted, q, coupling, roots, displacement, defect, residual, energy)
 
     def direction(self, state: _Iterate, left: float) -> Array:
         """Solved directly: it leaves nothing."""
@@ -118,8 +118,8 @@ class _Friction:
 
     def gradient(self, state: _Iterate) -> Array:
         size = np.hypot(*state.unknown.T)
-        bearable = np.minimum(size, self.problem.scalar.ceilings)
-        return along(bearable, state.unknown, size) + state.coupling - state.rise
+        bearable = np.minimum(size, self.problem.scalar.thresholds)
+        return along(bearable, state.unknown, size) + state.coupling - state.displacement
 
     def energy_rounding(self, state: _Iterate) -> float:
         # Near gross sliding X is large, and then so is what rounding of the total does.

@@ -11,12 +11,12 @@ With c_t Mindlin's ratio, A the normal coupling and bias = nu / (2 - nu), that i
 
 The forces minimise a convex energy (times c_t f^2; displacements are times c_t f),
 
-    sum_i P_i ceiling_i potential(|q_i| / P_i) + (1/2) q'Bq   over |q_i| <= P_i, sum q = T = Q / f,
+    sum_i P_i threshold_i potential(|q_i| / P_i) + (1/2) q'Bq   over |q_i| <= P_i, sum q = T = Q/f,
 
 and at the least energy there are a rigid displacement X, the multiplier of the total, and slips,
 the multipliers of |q_i| <= P_i times the direction of q_i, with
 
-    X = own(q_i) + (B q)_i + slip_i,    own(q) = ceiling_i deflection(|q| / P_i) q / |q|.
+    X = own(q_i) + (B q)_i + slip_i,    own(q) = threshold_i deflection(|q| / P_i) q / |q|.
 
 Averaging d d' over all directions leaves B = A: that is Ciavarella and Jaeger's problem. Derived in
 docs/theory/vector-friction.md, "The kernel" and "The program".
@@ -45,12 +45,12 @@ MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 class VectorState(NamedTuple):
     """A friction state of the n loaded asperities; own units.
 
-    total : (2,) T;  increments : (n, 2) q;  rise : (2,) X;  slips : (n, 2)
+    total : (2,) T;  increments : (n, 2) q;  displacement : (2,) X;  slips : (n, 2)
     """
 
     total: Array
     increments: Array
-    rise: Array
+    displacement: Array
     slips: Array
     iterations: int
 
@@ -83,7 +83,7 @@ class VectorProblem:
     @classmethod
     def of(cls, contact: Contact) -> VectorProblem:
         """That of a contact, which keeps it. Raises InputError where it does not fit in memory."""
-        return contact.keep(cls._assemble)
+        return contact.cached(cls._assemble)
 
     @classmethod
     def _assemble(cls, contact: Contact) -> VectorProblem:
@@ -108,12 +108,12 @@ class VectorProblem:
 
     @property
     def stiffness(self) -> Array:
-        """(n,) h_i = (2/3) ceiling_i / P_i = 1 / (2 E* a_i): the local Hessian is at least h_i I.
+        """(n,) h_i = (2/3) threshold_i / P_i = 1 / (2 E* a_i): the local Hessian is at least h_i I.
 
-        Its eigenvalues, along q and across, are ceiling/P times deflection'(t) and deflection(t)/t:
-        docs/theory/vector-friction.md, "Convexity".
+        Its eigenvalues, along q and across, are threshold/P times deflection'(t) and
+        deflection(t)/t: docs/theory/vector-friction.md, "Convexity".
         """
-        h: Array = (2.0 / 3.0) * self.scalar.ceilings / self.scalar.loads
+        h: Array = (2.0 / 3.0) * self.scalar.thresholds / self.scalar.loads
         return h
 
     @property
@@ -141,7 +141,7 @@ class VectorProblem:
     def sizes(self, increments: Array) -> Array:
         """(n,) |q_i|, and exactly P_i where it is that to rounding, or beyond.
 
-        The local law is steep there: one roundoff less than P_i would seem 2e-11 off the ceiling.
+        The local law is steep there: one roundoff less than P_i would seem 2e-11 off the threshold.
         """
         size, P = np.hypot(*increments.T), self.scalar.loads
         full: Array = np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
@@ -154,8 +154,8 @@ class VectorProblem:
 
     def energy(self, increments: Array, coupling: Array) -> float:
         """`coupling` is B q."""
-        P, ceilings = self.scalar.loads, self.scalar.ceilings
-        local = mindlin.potential(np.hypot(*increments.T) / P) @ (P * ceilings)
+        P, thresholds = self.scalar.loads, self.scalar.thresholds
+        local = mindlin.potential(np.hypot(*increments.T) / P) @ (P * thresholds)
         return float(local + 0.5 * (increments * coupling).sum())
 
     def residual(self, state: VectorState) -> float:
@@ -166,16 +166,16 @@ class VectorProblem:
         that is left (all over |X|); the force beyond P_i over P_i; the missing total over |T|. The
         conditions are those of docs/theory/vector-friction.md, "The program".
         """
-        if not np.isfinite(state.rise).all():
+        if not np.isfinite(state.displacement).all():
             return np.inf
         q, slips, P = state.increments, state.slips, self.scalar.loads
         size = self.sizes(q)
         slip_size = np.hypot(*slips.T)
-        imbalance = np.hypot(*(state.rise - self.own(q) - self.couple(q) - slips).T)
+        imbalance = np.hypot(*(state.displacement - self.own(q) - self.couple(q) - slips).T)
         across = np.hypot(*(slips - along(slip_size, q, size)).T)
         unused = slip_size * np.maximum(1.0 - size / P, 0.0)
         missing = float(np.hypot(*(q.sum(axis=0) - state.total)))
-        travel, total = float(np.hypot(*state.rise)), float(np.hypot(*state.total))
+        travel, total = float(np.hypot(*state.displacement)), float(np.hypot(*state.total))
         parts = (
             float(np.max([imbalance, across, unused])) / (travel or 1.0),
             float((np.hypot(*q.T) / P - 1.0).max()),

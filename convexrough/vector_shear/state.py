@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.shear import ShearCertificate
 from convexrough.numbers.balls import Ball
+from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.vector_shear.certificate import ROUNDED, VectorBounds, certify_vectors
@@ -40,7 +40,7 @@ class FrictionSolver(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VectorShearState(Table, Drawn):
+class VectorShearState(Table, Plottable):
     """A vector friction state. Arrays are in the order of the scene's asperities.
 
     force        : (2,) [force];  displacement : (2,) X of the deep points, both bodies [length]
@@ -136,7 +136,7 @@ def shear_vector(
     return VectorShearState(
         contact=contact,
         force=frozen(Q),
-        displacement=frozen(_times(state.rise, travel)),
+        displacement=frozen(_times(state.displacement, travel)),
         forces=in_scene(state.increments, unit),
         slips=in_scene(state.slips, travel),
         stick_radii=in_scene(contact.contact_radii[scalar.touching] * np.cbrt(left), 1.0),
@@ -159,7 +159,7 @@ def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> Vec
             forces = error.iterate * scalar.force_unit
             error.iterate = among_zeros(forces, scalar.touching, len(scalar.scene))
         raise
-    found = (state.increments, state.slips, state.rise)
+    found = (state.increments, state.slips, state.displacement)
     shapes = ((len(problem), 2), (len(problem), 2), (2,))
     for what, values, shape in zip(("forces", "slips", "displacement"), found, shapes, strict=True):
         if np.shape(values) != shape or not np.isfinite(values).all():
@@ -191,17 +191,17 @@ def _gross(problem: VectorProblem, total: Array) -> VectorState:
     """
     along_total = total / np.hypot(*total)
     across_total = np.array([-along_total[1], along_total[0]])
-    P, ceilings = problem.scalar.loads, problem.scalar.ceilings
+    P, thresholds = problem.scalar.loads, problem.scalar.thresholds
     q = P[:, None] * along_total
     coupling = problem.couple(q)
-    least = ceilings + coupling @ along_total  # X at which each starts to slide
+    least = thresholds + coupling @ along_total  # X at which each starts to slide
     side = coupling @ across_total
     alike = float(np.ptp(side)) <= 64 * ROUNDOFF * len(P) * float(least.max())
     size = float(least.max()) if alike else np.inf
     across = float(side.mean()) if alike else 0.0
-    rise = _times(along_total, size) + across * across_total
+    displacement = _times(along_total, size) + across * across_total
     slips = _times(np.broadcast_to(along_total, q.shape), (size - least)[:, None])
-    return VectorState(total, q, rise, slips, 0)
+    return VectorState(total, q, displacement, slips, 0)
 
 
 def _times(vectors: Array, size: Array | float) -> Array:
@@ -215,7 +215,7 @@ def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) 
     """With Ciavarella-Jaeger forces along the total; 0 at rest."""
     if height == 0:
         return 0.0
-    other, _ = problem.scalar.first_loading(height)
+    other, _ = problem.scalar.from_rest(height)
     total = float(np.hypot(*state.total))
     difference = state.increments - other[:, None] * (state.total / total)
     return float(np.linalg.norm(difference / total) / np.linalg.norm(other / total))
@@ -230,7 +230,7 @@ def _certificate(
         size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)
         return scalar.to_scene((errors * (1 + SAFETY) + ROUNDED * size) * unit)
 
-    rise_error = float(bounds.rise + ROUNDED * np.hypot(*state.rise))
+    displacement_error = float(bounds.displacement_error + ROUNDED * np.hypot(*state.displacement))
     open_, n = contact.status == "open", len(contact.scene)
     status = np.full(n, "undecided", dtype="<U12")
     status[open_] = "open"
@@ -251,7 +251,7 @@ def _certificate(
         ),
         stick_radius_errors=frozen(np.where(open_, 0.0, np.inf)),
         force_error=0.0,
-        displacement_error=rise_error * scalar.travel_unit,
+        displacement_error=displacement_error * scalar.travel_unit,
     )
 
 

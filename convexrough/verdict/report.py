@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Indices
-from convexrough.compare import listed
+from convexrough.compare import joined
 from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plausibility import described_modulus
@@ -178,7 +178,7 @@ def junit(found: Verified) -> bytes:
 
 def _named(claim: Claim, scene: Scene, which: Indices) -> str:
     points = scene.asperities.positions
-    return listed(f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g})" for i in which)
+    return joined(f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g})" for i in which)
 
 
 class _Listing:

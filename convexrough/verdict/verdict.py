@@ -21,12 +21,12 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact, solve
-from convexrough.drawn import Drawn
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.coupling import Kind
 from convexrough.normal.certificate import Certificate, certify_on
 from convexrough.normal.claims import Claim
 from convexrough.normal.problem import NormalProblem
+from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
@@ -41,7 +41,7 @@ PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Verdict(Claim, Table, Drawn):
+class Verdict(Claim, Table, Plottable):
     """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
 
     loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"

@@ -199,8 +199,10 @@ rows = (A + Fraction(1, 4), A + Fraction(1, 5), Fraction(1, 4) + Fraction(1, 5))
 theta_3 = max(row / stiffness for row, stiffness in zip(rows, (*h, h3), strict=True))
 square_3 = (e[0] ** 2 / h[0] + e[1] ** 2 / h[1]) / (1 - theta_3) ** 2
 gap = P[0] / 4 + P[1] / 5 - Fraction(1, 5)
-doubt = square_3 * (1 / (16 * h[0]) + 1 / (25 * h[1]))
-print(f"theta {theta_3}, gap {float(gap):.4f}, its error at most {float(doubt) ** 0.5:.1e}: open")
+tolerance = square_3 * (1 / (16 * h[0]) + 1 / (25 * h[1]))
+print(
+    f"theta {theta_3}, gap {float(gap):.4f}, its error at most {float(tolerance) ** 0.5:.1e}: open"
+)
 assert theta_3 < 1
 assert gap > 0
-assert gap**2 > doubt
+assert gap**2 > tolerance

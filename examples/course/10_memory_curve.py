@@ -86,13 +86,13 @@ Curve = list[tuple[Fraction, Fraction]]
 
 def draw(curve: Curve, P: Fraction, T: Fraction) -> Curve:
     """The three rules, for one straight piece from the end of the curve to (P, T)."""
-    (s, h), rise, shear = curve[-1], P - curve[-1][0], T - curve[-1][1]
-    if rise == shear == 0:
+    (s, h), displacement, shear = curve[-1], P - curve[-1][0], T - curve[-1][1]
+    if displacement == shear == 0:
         return curve
-    if rise > 0 and abs(shear) <= rise:
+    if displacement > 0 and abs(shear) <= displacement:
         return [*curve, (P, T)]
     slope = (h - curve[-2][1]) / (s - curve[-2][0])
-    lean = shear - slope * rise if rise < 0 else shear
+    lean = shear - slope * displacement if displacement < 0 else shear
     if lean == 0:  # to the end of the top layer, and what is left of the piece from there
         back = curve[:-1]
         return draw(back, P, T) if back[-1][0] >= P else [*back, (P, T)]
@@ -202,7 +202,7 @@ own = (9 / (16 * R)) ** (1 / 3)  # indentation = own P^(2/3)
 edge = 1.01 * np.sqrt(R * own) * largest ** (1 / 3)
 dx = edge / count
 x = (np.arange(count) + 0.5) * dx
-held, rise = np.zeros(count), 0.0  # forces over f, displacement over c_t f
+held, displacement = np.zeros(count), 0.0  # forces over f, displacement over c_t f
 seen = []
 before = (0.0, 0.0)
 for corner in corners:
@@ -214,8 +214,8 @@ for corner in corners:
             step = (low + high) / 2
             trial = np.clip(held + 2 * dx * step, -bound, bound)
             low, high = (step, high) if trial.sum() < T_now else (low, step)
-        held, rise = trial, rise + step
-    seen.append(ratio * FRICTION * rise)
+        held, displacement = trial, displacement + step
+    seen.append(ratio * FRICTION * displacement)
     before = corner
 p, t = largest * np.array(corners).T
 alone = cr.load_path(one, loads=p, forces=FRICTION * t)

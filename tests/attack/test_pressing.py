@@ -26,13 +26,13 @@ def excess(scene: cr.Scene, loads: Any, exact: multiprecision.Reference) -> floa
                 )
                 k = (arb(9) / 16 / (E * E) * (1 / R + 1 / rho)).root(3)
                 own = arb(3) / 5 * k * P[i].root(3) ** 5 if P[i] > 0 else arb(0)
-                felt = sum(
+                coupled = sum(
                     load / (arb.pi() * E * ((x - u) ** 2 + (y - v) ** 2).sqrt())
                     for j, ((u, v), load) in enumerate(zip(points, P, strict=True))
                     if j != i
                 )
                 D = exact.approach + z - (x * x + y * y) / (2 * R)
-                energy += sign * (own + P[i] * (felt / 2 - D))
+                energy += sign * (own + P[i] * (coupled / 2 - D))
         return float(energy)
 
 

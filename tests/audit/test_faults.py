@@ -13,7 +13,7 @@ import faults
 import pytest
 from scene_files import scene_text
 
-from convexrough.whole import remove_unfinished, replacing
+from convexrough.atomic import remove_unfinished, replacing
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="trials are forked processes")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from friction_scenes import FRICTION, lengths, pressed
 from scenes import NAMED, PAPER_APPROACH, paper, reference
-from word_audit import Tally, require
+from status_audit import Tally, require
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
@@ -25,8 +25,8 @@ class Liar:
     seed: int = 0
     name: str = "liar"
 
-    def solve(self, problem: Any, start: Any = None, announce: Any = None) -> Any:
-        honest = Newton().solve(problem, start, announce)
+    def solve(self, problem: Any, start: Any = None) -> Any:
+        honest = Newton().solve(problem, start)
         rng = np.random.default_rng(self.seed)
         return replace(honest, loads=self.spoil(honest.loads.copy(), rng))
 
@@ -94,8 +94,8 @@ def test_wrong_loads_are_never_called_right(name: str, kind: str, control: Any) 
 @pytest.mark.parametrize("approach", [0.0, 1.0, np.nan, np.inf, -1e300])
 def test_an_approach_that_the_loads_exclude_is_not_reported(approach: float, control: Any) -> None:
     class Far(Liar):
-        def solve(self, problem: Any, start: Any = None, announce: Any = None) -> Any:
-            return replace(Newton().solve(problem, start, announce), approach=approach)
+        def solve(self, problem: Any, start: Any = None) -> Any:
+            return replace(Newton().solve(problem, start), approach=approach)
 
     honest = cr.press(paper(), **control)
     contact = cr.press(paper(), **control, solver=Far(put(0.0)))
@@ -112,7 +112,7 @@ class VectorLiar:
         return self.spoil(FrictionNewton().solve(problem, total), np.random.default_rng(self.seed))
 
 
-@pytest.mark.parametrize("field", ["increments", "slips", "rise"])
+@pytest.mark.parametrize("field", ["increments", "slips", "displacement"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_what_are_no_forces_is_an_error(field: str, value: float) -> None:
     def spoil(state: Any, rng: np.random.Generator) -> Any:
@@ -125,7 +125,7 @@ def test_what_are_no_forces_is_an_error(field: str, value: float) -> None:
         shear_vector(contact, force=0.3 * FRICTION * contact.load, solver=VectorLiar(spoil))
 
 
-@pytest.mark.parametrize("field", ["increments", "slips", "rise", "total"])
+@pytest.mark.parametrize("field", ["increments", "slips", "displacement", "total"])
 @pytest.mark.sample(2)
 def test_wrong_forces_are_never_called_right(field: str) -> None:
     contact = pressed("paper")
@@ -154,8 +154,8 @@ class Meddler:
 
     name: str = "meddler"
 
-    def solve(self, problem: Any, start: Any = None, announce: Any = None) -> Any:
-        answer = Newton().solve(problem, start, announce)
+    def solve(self, problem: Any, start: Any = None) -> Any:
+        answer = Newton().solve(problem, start)
         assert answer.trial is not None
         answer.loads[:] *= 1.01
         return answer

@@ -10,7 +10,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from drawn import words
+from figure_checks import words
 from matplotlib.text import Text
 
 import convexrough as cr
@@ -174,7 +174,7 @@ def test_a_task_that_fails_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
 def command(command: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The command line, which finds a run that was made before."""
     made = tiny()
-    monkeypatch.setattr(suite, "run", lambda quick, announce: made)
+    monkeypatch.setattr(suite, "run", lambda quick: made)
     return command
 
 

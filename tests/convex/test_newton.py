@@ -49,7 +49,7 @@ class Told:
 @pytest.mark.parametrize("tolerance", [0.0, 1e-9])
 @pytest.mark.parametrize("scale", [-1.0, 0.0, 1.0])
 def test_no_residual_is_an_answer_whatever_the_scale(scale: float, tolerance: float) -> None:
-    """The rise of a hopelessly crowded contact may come out negative."""
+    """The multiplier of a hopelessly crowded contact may come out negative."""
     law = Told(0.0, scale)
     _, steps = newton.solve(law, law.state, newton.Stopping(1e-12, tolerance, 5), before=0.0)
     assert steps == 0

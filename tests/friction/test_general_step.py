@@ -87,7 +87,7 @@ def test_losses_of_the_steps_are_good_to_a_thousandth(seed: int) -> None:
     Q = 0.5 * P * np.r_[0.0, rng.uniform(-0.95, 0.95, 4)]
     path = cr.load_path(contact.scene, start=contact, loads=P, forces=Q)
     assert path.order == "proved"
-    levels = contact.keep(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     points = [(Fraction(p), Fraction(q) / Fraction(0.5)) for p, q in zip(P, Q, strict=True)]
     found = followed(levels, MemoryCurve.pressed(levels.load), points).losses
     known = ~np.isnan(found)
@@ -99,7 +99,7 @@ def test_losses_of_the_steps_are_good_to_a_thousandth(seed: int) -> None:
 def test_losses_that_do_not_settle_are_not_given(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(general_step, "MOST", general_step.FEWEST)
     contact = cr.press(seven(), load=1e-6)
-    levels = contact.keep(FrictionLevels)
+    levels = contact.cached(FrictionLevels)
     points = [(levels.load, levels.load / 2), (levels.load / 2, -levels.load / 4)]
     assert np.isnan(followed(levels, MemoryCurve.pressed(levels.load), points).losses[-1])
 
@@ -122,7 +122,7 @@ def test_where_order_fails() -> None:
         P, Q, fine.displacements, fine.asperity_forces, strict=True
     ):
         bristles.go(load, force / 0.5, steps=80)
-        assert TRAVEL * bristles.rise == pytest.approx(X_step, abs=5e-3 * X)
+        assert TRAVEL * bristles.displacement == pytest.approx(X_step, abs=5e-3 * X)
         assert_allclose(0.5 * bristles.carried, Q_step, atol=5e-3 * Q.max())
 
 
@@ -138,7 +138,7 @@ def test_bristles_converge_to_the_memory_curve() -> None:
         bristles = Bristles(scene, largest, count=4 * count)
         for load, height in zip(P, T, strict=True):
             bristles.go(load, height, steps=count)
-        missed.append(TRAVEL * bristles.rise / path.displacements[-1] - 1)
+        missed.append(TRAVEL * bristles.displacement / path.displacements[-1] - 1)
         assert_allclose(
             0.5 * bristles.carried, path.asperity_forces[-1], atol=0.2 / count * 0.5 * P.max()
         )
@@ -160,7 +160,7 @@ class Bristles:
     """Each contact cut into springs side by side; displacements over c_t f, forces over f."""
 
     def __init__(self, scene: cr.Scene, largest: float, count: int) -> None:
-        self.scene, self.load, self.height, self.rise = scene, 0.0, 0.0, 0.0
+        self.scene, self.load, self.height, self.displacement = scene, 0.0, 0.0, 0.0
         n, E = len(scene), scene.material.contact_modulus
         radii = cr.press(scene, load=largest).contact_radii * 1.3
         self.dx = radii / count
@@ -188,7 +188,7 @@ class Bristles:
         own = self.k * np.cbrt(loads_at(self.scene, load)) ** 2
         bound = self.stiffness * np.maximum(own[:, None] - self.shape, 0.0)
         n, old = len(own), self.carried
-        moved, rise = np.full(n, 1e-3 * np.sign(height - old.sum()) * own.max()), 0.0
+        moved, displacement = np.full(n, 1e-3 * np.sign(height - old.sum()) * own.max()), 0.0
         for _ in range(200):
             trial = self.held + self.stiffness * moved[:, None]
             held = np.clip(trial, -bound, bound)
@@ -196,12 +196,12 @@ class Bristles:
             matrix = np.zeros((n + 1, n + 1))
             matrix[:n, :n] = np.eye(n) + self.A * slopes
             matrix[:n, n], matrix[n, :n] = -1.0, slopes
-            defect = moved + self.A @ (held.sum(axis=1) - old) - rise
+            defect = moved + self.A @ (held.sum(axis=1) - old) - displacement
             excess = held.sum() - height
             if max(np.abs(defect).max() / own.max(), abs(excess) / load) < 1e-11:
                 break
             change = np.linalg.solve(matrix, -np.append(defect, excess))
-            moved, rise = moved + change[:n], rise + change[n]
+            moved, displacement = moved + change[:n], displacement + change[n]
         else:
             raise AssertionError("the bristles do not settle")
-        self.held, self.rise = held, self.rise + rise
+        self.held, self.displacement = held, self.displacement + displacement

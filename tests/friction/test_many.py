@@ -106,8 +106,8 @@ def test_random_scenes(drawn: tuple[cr.Scene, float], seed: int) -> None:
     for k, each in enumerate(scenes):
         one = cr.press(each, approach=approach)
         assert_array_equal(contacts.status[k], one.status)
-        doubt = one.certificate.load_errors + contacts.asperity_load_errors[k]
-        assert (np.abs(contacts.asperity_loads[k] - one.loads) <= doubt).all()
+        uncertainty = one.certificate.load_errors + contacts.asperity_load_errors[k]
+        assert (np.abs(contacts.asperity_loads[k] - one.loads) <= uncertainty).all()
 
 
 def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,7 +23,7 @@ NOTHING = Fraction(0)
 
 
 def levels_of(contact: cr.Contact) -> FrictionLevels:
-    return contact.keep(FrictionLevels)
+    return contact.cached(FrictionLevels)
 
 
 def grazing() -> cr.Contact:

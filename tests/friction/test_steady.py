@@ -57,7 +57,7 @@ def test_a_straight_line(name: str, loss: float) -> None:
     assert found.loss == pytest.approx(loss, rel=1e-12, abs=0.0)
     assert found.level / LARGEST[name] == pytest.approx(0.3)
     P, p, q = 0.7, 0.2, 0.4
-    levels = cr.press(SCENES[name], load=LARGEST[name]).keep(FrictionLevels)
+    levels = cr.press(SCENES[name], load=LARGEST[name]).cached(FrictionLevels)
     points = [levels.at(Fraction(x) * levels.load) for x in (P - q, P - p, P + p)]
     unit = levels.units.force * levels.units.length
     V = [float(each.energy.value) * unit / LARGEST[name] for each in points]
@@ -134,8 +134,8 @@ def test_every_later_cycle_is_the_same(drawn: tuple[cr.Scene, float], seed: int)
     forces = np.concatenate((0.9 * past, *[T] * 3, T[:1])) * 0.4 * largest
     path = cr.load_path(scene, loads=loads, forces=forces)
     cost = path.losses[14] - path.losses[10]
-    doubt = path.loss_errors[-1] + path.loss_errors[10] + found.loss_error
-    assert cost == pytest.approx(found.loss, abs=doubt)
+    uncertainty = path.loss_errors[-1] + path.loss_errors[10] + found.loss_error
+    assert cost == pytest.approx(found.loss, abs=uncertainty)
     assert_allclose(path.asperity_forces[10], path.asperity_forces[14], atol=1e-14 * largest)
 
 

@@ -82,7 +82,7 @@ def test_what_is_better_alone_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> 
             assert alone.touching.any()
     crowded = levels_of(cr.press(shaded(), load=2.96))
     assert crowded.top.solution is not None
-    if crowded.top.solution.box.held.any():
+    if crowded.top.solution.box.fixed_open.any():
         assert crowded.prepare(crowded.top.load * Ball.exact(PARTS[-2:])) == [None, None]
     monkeypatch.setattr(stack, "STEPS", 1)  # too few: not proved, or as good as ever
     monkeypatch.setattr(stack, "CORRECTIONS", 1)
@@ -131,7 +131,7 @@ def test_shares_of_a_loss_where_the_load_varies() -> None:
     found = cr.steady(
         scene, loads=[0.9 * largest, 0.5 * largest], forces=np.array([0.2, -0.2]) * largest
     )
-    levels = found.contact.keep(FrictionLevels)
+    levels = found.contact.cached(FrictionLevels)
     start = MemoryCurve.pressed(0)
     points = [
         (Fraction(p), Fraction(q) * 2) for p, q in zip(found.loads, found.forces, strict=True)

@@ -139,17 +139,17 @@ def test_what_cannot_change() -> None:
 
 def test_both_prescriptions_are_held_unless_told_otherwise() -> None:
     by_load, by_approach = pressed("rough", "load"), pressed("rough", "approach")
-    rise = cr.Direction(heights=1e-9)
-    assert by_load.change(rise).approach == pytest.approx(-1e-9, rel=1e-12)
-    assert abs(by_load.change(rise).load) < 1e-12 * by_approach.change(rise).load
-    same = by_load.change(replace(rise, approach=0.0))
-    np.testing.assert_allclose(same.loads, by_approach.change(rise).loads, rtol=1e-10, atol=1e-25)
+    raised = cr.Direction(heights=1e-9)
+    assert by_load.change(raised).approach == pytest.approx(-1e-9, rel=1e-12)
+    assert abs(by_load.change(raised).load) < 1e-12 * by_approach.change(raised).load
+    same = by_load.change(replace(raised, approach=0.0))
+    np.testing.assert_allclose(same.loads, by_approach.change(raised).loads, rtol=1e-10, atol=1e-25)
 
 
 def test_who_is_open_and_stays_open_changes_no_load() -> None:
     contact = pressed("paper", "load")
-    rise = np.where(contact.loads > 0, 0.0, 1e-9)
-    change = contact.change(cr.Direction(heights=rise))
+    raised = np.where(contact.loads > 0, 0.0, 1e-9)
+    change = contact.change(cr.Direction(heights=raised))
     assert not change.loads.any()
     np.testing.assert_allclose(change.gaps[contact.loads == 0], -1e-9)
 

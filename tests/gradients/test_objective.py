@@ -94,8 +94,8 @@ def test_jax() -> None:
     both = jax.vmap(jax.value_and_grad(function))(several)
     np.testing.assert_array_equal(both[0], [objective(each)[0] for each in several])
     np.testing.assert_array_equal(both[1][1], objective(several[1])[1])
-    rise, v = jax.numpy.asarray(x), np.append(np.full(len(x) - 1, 5e-8), 1e-2)
-    composed = lambda t: jax.numpy.log(function(rise + t * v)) ** 2  # noqa: E731
+    raised, v = jax.numpy.asarray(x), np.append(np.full(len(x) - 1, 5e-8), 1e-2)
+    composed = lambda t: jax.numpy.log(function(raised + t * v)) ** 2  # noqa: E731
     found = differences(composed, np.array(0.0), np.array(1.0), 1e-3)
     assert float(jax.grad(composed)(0.0)) == pytest.approx(found, rel=1e-7)
 

@@ -152,8 +152,8 @@ def test_onset(holding: Any) -> None:
             loads[asperity] = 0.0  # its own load counts for nothing there
             there = replace(setup, control=left, by_load=True)
             lower = Oracle(there, exact(loads), arb(start.approach), 7)
-            felt = lower.A @ lower.loads
-            ends.append((Q, lower.approach + lower.offsets[asperity] - felt[asperity]))
+            coupled = lower.A @ lower.loads
+            ends.append((Q, lower.approach + lower.offsets[asperity] - coupled[asperity]))
             if abs(ends[-1][1]) < arb("1e-80"):
                 break
         return ends[-1][0], ends[-1][0]

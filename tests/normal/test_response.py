@@ -18,7 +18,7 @@ from convexrough.numbers.balls import Ball
 
 def level_of(contact: cr.Contact, fraction: float) -> Level:
     """At P - fraction P, as `levels_reference.reference` has it."""
-    levels = contact.keep(levels_of)
+    levels = contact.cached(levels_of)
     force = Fraction(fraction * FRICTION * contact.load)
     return levels.below(Ball.exact(force / Fraction(FRICTION * levels.problem.units.force)))
 
@@ -41,7 +41,7 @@ def test_a_response_solves_its_system(name: str) -> None:
     found = level.response(Ball.exact(right), Ball.exact(total))
     places = np.searchsorted(level.problem.candidates, state.touching)
     with ctx.workdps(DIGITS):
-        stiffness = 2 * state.ceilings / (3 * state.P)
+        stiffness = 2 * state.thresholds / (3 * state.P)
         matrix = (state.inner + np.diag(stiffness)) * (arb(units.force) / arb(units.length))
         n = len(places)
         bordered = np.block([[matrix, np.full((n, 1), arb(-1))], [np.full((1, n), arb(1)), arb(0)]])

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawn import discs, fits
+from figure_checks import discs, fits
 from matplotlib.colors import to_rgba
 from scenes import MATERIAL, PAPER_APPROACH, paper
 

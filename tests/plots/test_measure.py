@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawn import fits, words
+from figure_checks import fits, words
 from matplotlib.figure import Figure
 
 import convexrough as cr

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import discs, fits, words
+from figure_checks import discs, fits, words
 from numpy.testing import assert_allclose
 from scenes import MATERIAL
 

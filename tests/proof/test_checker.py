@@ -174,7 +174,7 @@ def test_what_could_touch_may_be_held_open_where_it_is_proved_to_be() -> None:
 
     alone, both = proof_of(pair(1), 1e-5), proof_of(pair(0, 1), 1e-5)
     radii = [[(0.0).hex()], *alone["pressed"]["radii"]]
-    refused(both, "may touch is held open", argument__box__0=(0.0).hex(), pressed__radii=radii)
+    refused(both, "may touch is fixed open", argument__box__0=(0.0).hex(), pressed__radii=radii)
 
 
 def test_a_local_proof_is_not_a_global_one() -> None:

@@ -9,6 +9,7 @@ import pytest
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
+from convexrough.atomic import replacing, to_json
 from convexrough.run import results
 from convexrough.run.results import MANIFEST, results_folder, write_results
 from convexrough.run.scene_file import read_scene
@@ -16,7 +17,6 @@ from convexrough.run.stages import Normal
 from convexrough.tabular.table import read_table
 from convexrough.tabular.units import UnitNames
 from convexrough.verdict.claims import Manner, read_loads
-from convexrough.whole import replacing, to_json
 
 COLUMNS = ("x", "y", "height", "tip_radius", "load", "contact_radius", "gap", "status",
            "load_error")  # fmt: skip
@@ -223,7 +223,7 @@ def test_no_toml(tmp_path: Path, content: bytes, expected: str) -> None:
 # What `within` is when the file does not say
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("pattern", ["hexagonal", "square"])
 @pytest.mark.parametrize("normal", ["approach = 2e-5", "load = 2e-7", "load = 1e-9"])

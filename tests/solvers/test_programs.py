@@ -37,13 +37,14 @@ def cost(program: Any, x: Any) -> float:
     return float(0.5 * x @ (whole @ x) + program.linear @ x)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize("five", [False, True])
 def test_the_cone_program_holds_the_contact(five: bool, control: str) -> None:
     """True powers of t are feasible, every cone is tight, and the cost is the energy."""
     problem, solution = solved("rough", control)
     boxes = Boxes.choose(problem, five=five)
-    lifted = LiftedProgram.accept(problem, boxes)
+    lifted = LiftedProgram.assemble(problem, boxes)
     program = lifted.apply()
     loads = solution.loads[boxes.members]
     t = np.cbrt(loads / boxes.loads)
@@ -56,11 +57,11 @@ def test_the_cone_program_holds_the_contact(five: bool, control: str) -> None:
     assert program.cones == (5 if five else 4) * len(loads)
     assert_allclose(np.hypot(*cones[:, 1:].T), cones[:, 0], atol=1e-14)
     energy = problem.energy(solution.loads, problem.influence.apply(solution.loads))
-    if control == "load":  # counted from the ceiling
-        energy -= problem.ceiling * solution.loads.sum()
+    if control == "load":  # counted from the bound
+        energy -= problem.approach_bound * solution.loads.sum()
     assert cost(program, x) == pytest.approx(energy, rel=1e-12)
 
-    multipliers = np.full(len(slack), problem.ceiling - solution.approach)
+    multipliers = np.full(len(slack), problem.approach_bound - solution.approach)
     back = lifted.invert(RawAnswer(x, multipliers, 7, "Solved"))
     assert_allclose(back.loads, loads, rtol=0)
     assert back.approach == pytest.approx(solution.approach, rel=1e-15)
@@ -74,7 +75,7 @@ def test_the_bristle_program_bounds_the_energy(control: str) -> None:
     energy = problem.energy(solution.loads, problem.influence.apply(solution.loads))
     excess = []
     for m in (16, 32):
-        row = BristleProgram.accept(problem, m, "bristles")
+        row = BristleProgram.assemble(problem, m, "bristles")
         program = row.apply()
         raw = run_osqp(program, "bristles", 1e-8, 20_000)
         inside = program.constraints @ raw.x
@@ -114,7 +115,7 @@ def test_too_large_for_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=2**30))
     boxes = replace(Boxes.choose(problem), members=np.arange(10**5))
     with pytest.raises(cr.InputError, match=r"asperities of the cone program: found 1e\+05"):
-        LiftedProgram.accept(problem, boxes)
+        LiftedProgram.assemble(problem, boxes)
 
 
 def test_a_refused_friction_program_gives_its_last_forces() -> None:

@@ -43,8 +43,8 @@ def test_one_asperity_is_a_smooth_sphere_under_shear(nu: float, sign: int) -> No
         state = cr.shear(contact, force=force)
         assert state.displacement == pytest.approx(hertz.displacement(force), rel=1e-13)
         # 1 - t is known to rounding only: near gross sliding the stick disc is not known better
-        blur = hertz.contact_radius * 1e-15 ** (1 / 3)
-        assert state.stick_radii[0] == pytest.approx(hertz.stick_radius(force), rel=1e-9, abs=blur)
+        error = hertz.contact_radius * 1e-15 ** (1 / 3)
+        assert state.stick_radii[0] == pytest.approx(hertz.stick_radius(force), rel=1e-9, abs=error)
         assert_allclose(
             fields.traction(state, np.column_stack((0.6 * r, 0.8 * r))),
             hertz.traction(r, force),

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweep_files import Deadly, same, sweeping, tables, told
+from sweep_files import Deadly, reported_to, same, sweeping, tables
 
 import convexrough as cr
 from convexrough.sweeps import plan
@@ -180,7 +180,7 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
             os.kill(killed[0], signal.SIGKILL)
 
     workers = [each.pid for each in cluster.workers.values()]
-    with dask(cluster.scheduler_address) as engine, told(kill):
+    with dask(cluster.scheduler_address) as engine, reported_to(kill):
         table = run(plan, engine, out=tmp_path / "a").table
     assert killed
     with ThreadPoolExecutor(1) as here:

@@ -49,14 +49,14 @@ def test_the_residual_sees_every_fault() -> None:
         1.0, cr.Asperities([[0.0, 0.0]], 0.01), cr.Material(1.0, 0.5), FRICTION, geometry="summit"
     )
     problem = VectorProblem.of(cr.press(scene, approach=1e-4))
-    P, ceiling = problem.scalar.loads[0], problem.scalar.ceilings[0]
+    P, threshold = problem.scalar.loads[0], problem.scalar.thresholds[0]
     along_x = np.array([[1.0, 0.0]])
 
     def residual(share: float, slip: tuple[float, float], off: float = 0.0) -> float:
         """Of a state with displacements that balance, but for `off` across."""
-        q, slips = share * P * along_x, ceiling * np.array([slip])
-        rise = (problem.own(q) + slips)[0] + [0.0, off * ceiling]
-        return problem.residual(VectorState(q[0], q, rise, slips, 1))
+        q, slips = share * P * along_x, threshold * np.array([slip])
+        displacement = (problem.own(q) + slips)[0] + [0.0, off * threshold]
+        return problem.residual(VectorState(q[0], q, displacement, slips, 1))
 
     assert residual(1.0, (0.5, 0.0)) < 1e-14
     assert residual(0.7, (0.0, 0.0)) < 1e-14
@@ -89,7 +89,7 @@ def test_the_duality_gap_bounds_what_forces_cost_too_much(
     # Forces in proportion to the loads are borne too, and have the right total.
     other = best._replace(increments=fraction * np.outer(problem.scalar.loads, [1.0, 0.0]))
     for scale in (0.5, 1.0, 2.0):
-        moved = other._replace(rise=scale * best.rise)
+        moved = other._replace(displacement=scale * best.displacement)
         excess = problem.energy(other.increments, problem.couple(other.increments)) - least
         assert duality_gap(problem, moved) >= excess * (1 - 1e-9) - 1e-11 * least
 
@@ -117,7 +117,7 @@ def test_the_duality_gap_counts_its_rounding(
         excess = sum(
             Fraction(x) * (sum(map(Fraction, column)) - Fraction(part))
             for x, column, part in zip(
-                best.rise.tolist(), q.T.tolist(), total.tolist(), strict=True
+                best.displacement.tolist(), q.T.tolist(), total.tolist(), strict=True
             )
         )
         assert duality_gap(problem, state) >= excess
@@ -127,7 +127,7 @@ def test_no_duality_gap_without_a_proof_of_convexity() -> None:
     contact = pressed("paper", nu=0.3)
     problem = VectorProblem.of(contact)
     best = FrictionNewton().solve(problem, np.array([0.3 * problem.scalar.loads.sum(), 0.0]))
-    assert 0 < duality_gap(problem, best) < 1e-13 * float(best.rise @ best.total)
+    assert 0 < duality_gap(problem, best) < 1e-13 * float(best.displacement @ best.total)
     unproved = replace(problem)
     unproved.__dict__["margin"] = 0.0
     assert duality_gap(unproved, best) == np.inf

@@ -214,8 +214,8 @@ def test_random_scenes(
             trial -= excess / len(P)
             trial /= np.maximum(lengths(trial) / P, 1.0)[:, None]
             excess = trial.sum(axis=0) - q.sum(axis=0)
-        rise = np.hypot(*state.displacement) / problem.scalar.units.length / FRICTION
-        slack = np.hypot(*excess) * rise / mindlin.ratio(nu) + 1e-12 * least
+        displacement = np.hypot(*state.displacement) / problem.scalar.units.length / FRICTION
+        slack = np.hypot(*excess) * displacement / mindlin.ratio(nu) + 1e-12 * least
         assert problem.energy(trial, problem.couple(trial)) >= least - slack
 
 

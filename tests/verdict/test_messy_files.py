@@ -456,8 +456,8 @@ def test_explain_reads_and_judges_nothing(tmp_path: Path, command: Any, case: Ca
     ):
         assert said in outcome.out  # fmt: skip
     assert "certificate" not in outcome.out
-    told = command("verify", "scene.toml", name, "--explain", "--column", "load=P", "--json")
-    assert json.loads(told.out)["read"] == outcome.out.removesuffix("\n").split("\n")
+    shown = command("verify", "scene.toml", name, "--explain", "--column", "load=P", "--json")
+    assert json.loads(shown.out)["read"] == outcome.out.removesuffix("\n").split("\n")
 
 
 def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:

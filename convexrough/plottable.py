@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-class Drawn:
+class Plottable:
     """A result that can be plotted."""
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:

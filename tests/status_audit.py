@@ -1,6 +1,6 @@
 """The word audit: every word and bound of random and hostile scenes against ball arithmetic.
 
-    PYTHONPATH=tests python tests/word_audit.py 3000        prints the tables of docs/tests.md
+    PYTHONPATH=tests python tests/status_audit.py 3000        prints the tables of docs/tests.md
 
 Each scene is drawn from a seed of its own, pressed through one operator under one control, sheared,
 cycled and sheared with vectors, and all that is said of it is compared with proved 60-digit states:
@@ -174,7 +174,7 @@ class Slid(NamedTuple):
 
     forces: list[Any]
     slips: list[Any]
-    rise: Any
+    displacement: Any
     loss: Any  # of the cycle of this amplitude
 
 
@@ -199,8 +199,8 @@ def _slid(contact: cr.Contact, full: Any, force: Any) -> Slid | None:
         travel * gap if load > 0 else arb(0)
         for gap, load in zip(reduced.gaps, full.loads, strict=True)
     ]
-    rise = travel * (full.approach - reduced.approach)
-    return Slid(forces, slips, rise, _loss(contact.scene, full.loads, reduced.loads, slips))
+    displacement = travel * (full.approach - reduced.approach)
+    return Slid(forces, slips, displacement, _loss(contact.scene, full.loads, reduced.loads, slips))
 
 
 def _loss(scene: cr.Scene, loads: Any, left: Any, slips: Any) -> Any:
@@ -213,8 +213,8 @@ def _loss(scene: cr.Scene, loads: Any, left: Any, slips: Any) -> Any:
             t, s = 1 - p / P, (p / P).root(3) if p > 0 else arb(0)
             e = 1 - s**5 - 5 * t / 6 * (1 + s**2)
             R = 1 / (1 / arb(scene.sphere_radius) + 1 / arb(float(tip)))
-            ceiling = (9 * P**2 / (16 * E**2 * R)).root(3)
-            loss += 24 * ct * f**2 * P * ceiling * e / 5 + 4 * f * P * slip
+            threshold = (9 * P**2 / (16 * E**2 * R)).root(3)
+            loss += 24 * ct * f**2 * P * threshold * e / 5 + 4 * f * P * slip
     return loss
 
 
@@ -249,8 +249,8 @@ def _audit_shear(
     _audit_vectors(kind if fraction < 1 else "limit", operator, contact, full, force, tally)
     if exact:
         tally.compare(operator, "slip", proof.slip_errors, state.slips, exact.slips)
-        rise, error = [state.displacement], [proof.displacement_error]
-        tally.compare(operator, "rise", error, rise, [exact.rise])
+        displacement, error = [state.displacement], [proof.displacement_error]
+        tally.compare(operator, "displacement", error, displacement, [exact.displacement])
         tally.compare(operator, "loss", [cycle.loss_error], [cycle.loss], [exact.loss])
         if force < FRICTION * contact.load:
             _audit_history(operator, contact, full, force, exact, tally)
@@ -267,11 +267,18 @@ def _audit_history(
         except Dragged:
             return
         assert inner is not None  # below the force that is
-        rises = [there.rise, there.rise - 2 * inner.rise, there.rise, -there.rise]
+        rises = [
+            there.displacement,
+            there.displacement - 2 * inner.displacement,
+            there.displacement,
+            -there.displacement,
+        ]
         once, back = there.loss / 4, inner.loss / 2
         losses = [once, once + back, once + 2 * back, once + 2 * back + there.loss / 2]
         forces = [a - 2 * b for a, b in zip(there.forces, inner.forces, strict=True)]
-    tally.compare(operator, "past rise", past.displacement_errors, past.displacements, rises)
+    tally.compare(
+        operator, "past displacement", past.displacement_errors, past.displacements, rises
+    )
     tally.compare(operator, "past loss", past.loss_errors, past.losses, losses)
     one, other = (cr.shear(contact, force=Q).certificate for Q in (force, 0.625 * force))
     errors = one.force_errors + 2 * other.force_errors + 1e-14 * abs(force)
@@ -307,7 +314,11 @@ def _audit_vectors(
     nu = arb(tilted.scene.material.poisson_ratio)
     with ctx.workdps(DIGITS + 30):
         travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
-        forces, slips, rise = FRICTION * true.forces, travel * true.slips, travel * true.rise
+        forces, slips, displacement = (
+            FRICTION * true.forces,
+            travel * true.slips,
+            travel * true.displacement,
+        )
     proof = state.certificate
     errors = proof.force_errors[touching]
     tally.compare(operator, "tensor force", errors, state.forces[touching], forces)
@@ -315,7 +326,7 @@ def _audit_vectors(
         errors = proof.slip_errors[touching]
         tally.compare(operator, "tensor slip", errors, state.slips[touching], slips)
         errors = [proof.displacement_error]
-        tally.compare(operator, "tensor rise", errors, [state.displacement], [rise])
+        tally.compare(operator, "tensor displacement", errors, [state.displacement], [displacement])
 
 
 def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import word_audit
-from word_audit import Wrong, audit, report
+import status_audit
+from status_audit import Wrong, audit, report
 
 import convexrough as cr
 
@@ -18,7 +18,7 @@ def test_every_word_and_bound(pytestconfig: pytest.Config) -> None:
         return
     judged = tally.scenes - tally.refused - tally.unsolved
     assert judged > 0.75 * tally.scenes
-    assert {kind for kind, _, _ in tally.words} == {*word_audit.KINDS, "limit"}
+    assert {kind for kind, _, _ in tally.words} == {*status_audit.KINDS, "limit"}
     usual = [
         seen
         for (kind, _, stage), seen in tally.words.items()

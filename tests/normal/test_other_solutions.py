@@ -1,16 +1,16 @@
-"""On a lattice: where rivals are excluded by its symbol."""
+"""On a lattice: where other solutions are excluded by its symbol."""
 
 import numpy as np
 from scenes import MATERIAL
 
 import convexrough as cr
 from convexrough.bench.scenes import scene as bench
+from convexrough.normal.other_solutions import OtherSolutions
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.rivals import Rivals
 from convexrough.solvers import Newton
 
 
-def test_lattices_have_fewer_rivals() -> None:
+def test_lattices_exclude_more_other_solutions() -> None:
     """Where shells of the secants meet, the lattice may still say that there is one solution."""
     rng, by_lattice = np.random.default_rng(3), 0
     for size in np.linspace(3.0, 8.0, 11):
@@ -18,13 +18,13 @@ def test_lattices_have_fewer_rivals() -> None:
         problem = NormalProblem.assemble(
             cr.Scene(1.0, array, MATERIAL, geometry="summit"), approach=1e-4, influence="lattice"
         )
-        loads, most = Newton().solve(problem).loads, problem.bounds(problem.ceiling)
-        rivals, A = Rivals.of(problem, loads, problem.ceiling), problem.influence
+        loads, most = Newton().solve(problem).loads, problem.bounds(problem.approach_bound)
+        others, A = OtherSolutions.of(problem, loads, problem.approach_bound), problem.influence
         secant = problem.coefficients * (np.cbrt(most) ** 2 - np.cbrt(loads) ** 2) / (most - loads)
         if A.crowding(A.scale / secant) <= 1:
-            assert not rivals.possible
+            assert not others.possible
             continue
-        if rivals.possible:
+        if others.possible:
             continue
         by_lattice += 1
         for Q in (most, *(most * rng.random((20, len(most))))):

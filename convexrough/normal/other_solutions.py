@@ -15,12 +15,12 @@ from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import SAFETY
 
-#: Contact radius over the distance to the nearest neighbour up to which a rival covers a summit:
-#: the root of m(x, 1) = pi / 4, rounded down.
+#: Contact radius over the distance to the nearest neighbour up to which another solution covers a
+#: summit: the root of m(x, 1) = pi / 4, rounded down.
 ROOMY = 0.52
 
 
-class Rivals(NamedTuple):
+class OtherSolutions(NamedTuple):
     """Other solutions than the one found."""
 
     possible: bool
@@ -28,20 +28,20 @@ class Rivals(NamedTuple):
     cover: bool  # each has a disc that covers its nearest neighbour's summit
 
     @classmethod
-    def of(cls, problem: NormalProblem, near: Array, ceiling: float) -> Rivals:
-        """Of a solution with loads (n,) of at most `near`, approaches of at most `ceiling`."""
+    def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
+        """For loads (n,) of at most `near` and approaches of at most `approach_bound`."""
         A = problem.influence
-        blur = 1.0 + SAFETY + 2.0 * A.entry_error
-        a, most = (_radii(problem, loads) for loads in (near, problem.bounds(ceiling)))
+        perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
+        a, most = (_radii(problem, loads) for loads in (near, problem.bounds(approach_bound)))
         t = 2.0 / np.pi * _mean(a, most)
-        if A.crowding(t) * blur <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
-            return NO_RIVALS
-        crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * blur
+        if A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
+            return NO_OTHERS
+        crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * perturbed
         cover = bool((a <= ROOMY * A.separations()).all())
         return cls(True, max(crowding, 0.0), cover)
 
 
-NO_RIVALS, UNKNOWN = Rivals(False, np.inf, True), Rivals(True, 0.0, False)
+NO_OTHERS, UNKNOWN = OtherSolutions(False, np.inf, True), OtherSolutions(True, 0.0, False)
 
 
 def _radii(problem: NormalProblem, loads: Array) -> Array:

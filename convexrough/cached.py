@@ -8,13 +8,13 @@ from typing import Any, Self, TypeVar
 Made = TypeVar("Made")
 
 
-class Keeper:
+class Cached:
     """Base class that caches objects derived from it; each is made once and freed with it."""
 
-    def keep(self, make: Callable[[Self], Made]) -> Made:
+    def cached(self, make: Callable[[Self], Made]) -> Made:
         """make(self), cached. The result must not refer to self, or memory is freed late."""
-        kept: dict[Any, Any] = self.__dict__.setdefault("_kept", {})
-        if make not in kept:
-            kept[make] = make(self)
-        made: Made = kept[make]
+        cache: dict[Any, Any] = self.__dict__.setdefault("_cache", {})
+        if make not in cache:
+            cache[make] = make(self)
+        made: Made = cache[make]
         return made
