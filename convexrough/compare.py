@@ -28,7 +28,7 @@ from convexrough.influence import Kind
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.record import LINE, Record, Table, in_words
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
@@ -121,7 +121,6 @@ def compare(
     load: float | None = None,
     solvers: Sequence[solvers.Solver] | None = None,
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> Comparison:
     """Press on the scene with every solver.
 
@@ -129,7 +128,6 @@ def compare(
     solvers  : settings objects; the default is `every_solver()`. Newton's method is the reference
         and always the first
     influence : compliance operator, as for `press`
-    announce : called with the name of each solver before it starts
 
     Raises InputError where the reference refuses the input. Errors of the other solvers are in
     their entries.
@@ -138,8 +136,7 @@ def compare(
     others = every_solver() if solvers is None else solvers
     entries: list[Entry] = []
     for solver in (reference, *(each for each in others if each != reference)):
-        if announce is not None:
-            announce(solver.name)
+        LOGGER.info(solver.name)
         known = entries[0].contact if entries else None
         pressed = partial(press, scene, approach=approach, load=load, influence=influence)
         entries.append(_enter(solver, pressed, known))

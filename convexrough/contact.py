@@ -28,7 +28,7 @@ from convexrough.normal.refine import refined_loads, refines
 from convexrough.normal.units import Units
 from convexrough.numbers.balls import Ball
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.record import LINE, Along, Table
 from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
@@ -110,11 +110,10 @@ class Contact(Cached, Table, Plottable):
         yield from super()._rows()
         yield from (("warning", each[:LINE]) for each in self.warnings)
 
-    def proof(self, *, sheared: Sequence[Sheared] = (), announce: Announce | None = None) -> Proof:
+    def proof(self, *, sheared: Sequence[Sheared] = ()) -> Proof:
         """A proof file for `convexrough check` and other checkers; `.save(path)` writes it.
 
         sheared : shear states of this contact to prove as well, with the losses of their cycles
-        announce : called with one line of progress during long work
 
         Raises InputError for scenes too large for exact arithmetic, and ProofError where nothing is
         proved.
@@ -134,7 +133,6 @@ class Contact(Cached, Table, Plottable):
             approach=None if by_load else self.approach,
             load=self.prescribed_load,
             sheared=held,
-            announce=announce,
         )
 
     def gradient(
@@ -195,7 +193,6 @@ def press(
     solver: Solver | str | None = None,
     start: ArrayLike | None = None,
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> Contact:
     """Press the sphere on the asperities by an approach [length] or with a load [force].
 
@@ -203,7 +200,6 @@ def press(
     start  : (n,) [force] initial loads; in the convex range the solution does not depend on them
     influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
         on a lattice), "scattered" (transforms on a mesh); None for the cheapest
-    announce : called with one line of progress during long work
 
     Raises InputError for bad values and SolverError where the solver stops without a solution. A
     solution without a certificate is returned: check `contact.certificate.scope`.
@@ -216,17 +212,16 @@ def press(
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
-    return _contact(problem, solver, start, announce, began)
+    return _contact(problem, solver, start, began)
 
 
 def solve(
     problem: NormalProblem,
     solver: Solver | str | None = None,
     start: ArrayLike | None = None,
-    announce: Announce | None = None,
 ) -> Contact:
     """`press` for an assembled problem; the other arguments are as for `press`."""
-    return _contact(problem, solvers.named(solver), start, announce, time.perf_counter())
+    return _contact(problem, solvers.named(solver), start, time.perf_counter())
 
 
 def levels_of(contact: Contact) -> Levels:
@@ -262,7 +257,6 @@ def _contact(
     problem: NormalProblem,
     solver: Solver,
     start: ArrayLike | None,
-    announce: Announce | None,
     began: float,
 ) -> Contact:
     scene = problem.scene
@@ -275,9 +269,8 @@ def _contact(
         if len(problem) == 0:  # too small an approach for anything to touch
             solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
         else:
-            solution = _solved(solver, problem, first, announce)
-        if announce is not None:
-            announce("certifying")
+            solution = _solved(solver, problem, first)
+        LOGGER.info("certifying")
         if solution.refine and len(problem) and refines(problem):
             state = solution.trial
             if state is None or not np.array_equal(state.loads.high, solution.loads):
@@ -311,12 +304,10 @@ def _contact(
     return contact
 
 
-def _solved(
-    solver: Solver, problem: NormalProblem, start: Array | None, announce: Announce | None
-) -> Solution:
+def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solution:
     """The solver's solution, checked; an error gets its last loads in scene units and order."""
     try:
-        solution = solver.solve(problem, start, announce)
+        solution = solver.solve(problem, start)
     except SolverError as error:
         if error.iterate is not None:
             error.iterate = problem.to_scene(error.iterate * problem.units.force)

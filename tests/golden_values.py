@@ -78,25 +78,25 @@ def _pressed(name: str, **control: float) -> cr.Contact:
 def found(name: str, given: dict[str, Any]) -> tuple[Values, Values, Values]:
     """Values and proved bounds by what they are, and how often each word is said."""
     contact, by_load = (_pressed(name, **{key: given[key]}) for key in ("approach", "load"))
-    told, judged = given["asperities"], contact.certificate
+    some, judged = given["asperities"], contact.certificate
     values: Values = {"load": contact.load, "approach": by_load.approach}
     # The total is that of float64 numbers, rounded once.
     bounds: Values = {
         "load": float(judged.load_errors.sum() + np.spacing(contact.load)),
         "approach": by_load.certificate.approach_error,
     }
-    values["loads"], bounds["loads"] = contact.loads[told], judged.load_errors[told]
+    values["loads"], bounds["loads"] = contact.loads[some], judged.load_errors[some]
     words: Values = {"pressed": Counter(contact.status), "scope": judged.scope}
     for Q in given["forces"]:
         state, cycle = cr.shear(contact, force=Q), cr.cycle(contact, maximum=Q)
-        errors = state.certificate.force_errors[told]
-        left = contact.loads[told] - state.forces[told] / FRICTION
+        errors = state.certificate.force_errors[some]
+        left = contact.loads[some] - state.forces[some] / FRICTION
         stuck = np.where(left > 0, left, np.inf)
-        share = (judged.load_errors[told] + errors / FRICTION) / stuck / 3
+        share = (judged.load_errors[some] + errors / FRICTION) / stuck / 3
         each = {
-            "forces": (state.forces[told], errors),
+            "forces": (state.forces[some], errors),
             "displacement": (state.displacement, state.certificate.displacement_error),
-            "stick radii": (state.stick_radii[told], state.stick_radii[told] * (share + 1e-15)),
+            "stick radii": (state.stick_radii[some], state.stick_radii[some] * (share + 1e-15)),
         }
         if cycle.order == "proved":  # else no loss is proved
             each["loss"] = (cycle.loss, cycle.loss_error)
@@ -110,20 +110,20 @@ def found(name: str, given: dict[str, Any]) -> tuple[Values, Values, Values]:
 def true(name: str, given: dict[str, Any]) -> Values:
     """The same values, as strings of 30 digits."""
     contact, by_load = (_pressed(name, **{key: given[key]}) for key in ("approach", "load"))
-    told = given["asperities"]
+    some = given["asperities"]
     with ctx.workdps(DIGITS):
         level, other = (
             Level(Setup.of(each, holding), each)
             for each, holding in ((contact, "approach"), (by_load, "load"))
         )
         values: Values = {"load": level.load, "approach": other.approach}
-        values["loads"] = level.loads[told]
+        values["loads"] = level.loads[some]
         for Q in given["forces"]:
             state: Friction = friction_state(contact, Q, "approach")
-            values[f"forces at {Q!r}"] = state.forces[told]
+            values[f"forces at {Q!r}"] = state.forces[some]
             values[f"displacement at {Q!r}"] = state.displacement
             values[f"loss at {Q!r}"] = state.energy
-            values[f"stick radii at {Q!r}"] = state.stick_radii[told]
+            values[f"stick radii at {Q!r}"] = state.stick_radii[some]
         return {
             key: [_text(each) for each in value] if isinstance(value, np.ndarray) else _text(value)
             for key, value in values.items()

@@ -14,10 +14,10 @@ the gap) where they do not. Damped Newton finds the point; one interval Newton s
 arithmetic, proves it. The oracle shares no code with the package that it judges.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, log2
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from flint import arb, arb_mat, ctx
@@ -119,6 +119,13 @@ def solve(
         return Reference(tuple(loads), tuple(gaps), depth, total)
 
 
+class Map(Protocol):
+    """A map of balls with its derivative, whose zero is asked for."""
+
+    def residual(self, x: Balls) -> Balls: ...
+    def jacobian(self, x: Balls) -> Balls: ...
+
+
 @dataclass(frozen=True)
 class NormalMap:
     """The map F of the module's docstring; its argument x = (delta_1, .., delta_m, D0) [length].
@@ -172,7 +179,7 @@ class NormalMap:
         return matrix
 
 
-def newton(problem: NormalMap, x: Balls, *, tolerance: arb) -> Balls:
+def newton(problem: Map, x: Balls, *, tolerance: arb) -> Balls:
     """The point x with sum |F(x)| <= tolerance [length], by Newton steps that shrink this sum."""
     residual = _mid(problem.residual(x))
     for _ in range(NEWTON_STEPS):
@@ -191,7 +198,7 @@ def newton(problem: NormalMap, x: Balls, *, tolerance: arb) -> Balls:
     raise NotProved("Newton did not arrive")
 
 
-def prove(problem: NormalMap, x: Balls, *, radius: arb) -> Balls:
+def prove(problem: Map, x: Balls, *, radius: arb) -> Balls:
     """Balls that hold a zero of F, the only one in the box X = x +/- radius [length].
 
     Interval Newton: if x - J^-1 F(x) lies inside X for every matrix J with entries in dF/dx(X),
@@ -202,6 +209,38 @@ def prove(problem: NormalMap, x: Balls, *, radius: arb) -> Balls:
     if not all(whole.contains_interior(part) for whole, part in zip(box, inside, strict=True)):
         raise NotProved("the interval Newton step leaves its box")
     return inside
+
+
+def gaps(scene: Any, loads: Sequence[arb], approach: arb, rows: Iterable[int]) -> list[arb]:
+    """k_i P_i^(2/3) + (A P)_i - D_i of some asperities of a scene, whatever the loads are."""
+    return [local + sunk - shape - approach for _, local, sunk, shape in _terms(scene, loads, rows)]
+
+
+def energy(scene: Any, loads: Sequence[arb], approach: arb) -> arb:
+    """Phi(P) = sum P_i (3/5 k_i P_i^(2/3) + (A P)_i / 2 - D_i)."""
+    terms = _terms(scene, loads, range(len(loads)))
+    parts = [P * (3 * local / 5 + sunk / 2 - shape - approach) for P, local, sunk, shape in terms]
+    return sum(parts, ZERO)
+
+
+def _terms(
+    scene: Any, loads: Sequence[arb], rows: Iterable[int]
+) -> Iterator[tuple[arb, arb, arb, arb]]:
+    """P_i, k_i P_i^(2/3), (A P)_i and d_i of some asperities."""
+    modulus, bend = arb(float(scene.material.contact_modulus)), 1 / arb(float(scene.sphere_radius))
+    tips, heights = _exact(scene.asperities.tip_radii), _exact(scene.asperities.heights)
+    positions, bends = _exact(scene.asperities.positions), np.array([bend, bend])
+    points, descents = _contact_points(positions, tips, bends, scene.geometry)
+    touching = [j for j, load in enumerate(loads) if load > 0]
+    for i in rows:
+        law = (9 * (bend + 1 / tips[i]) / (16 * modulus**2)).root(3)
+        sunk = ZERO
+        for j in touching:
+            if j != i:
+                x, y = points[i] - points[j]
+                sunk += loads[j] / (arb.pi() * modulus * (x * x + y * y).sqrt())
+        local = law * loads[i].root(3) ** 2 if loads[i] > 0 else ZERO
+        yield loads[i], local, sunk, heights[i] - descents[i]
 
 
 def errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:

@@ -86,7 +86,7 @@ def _equal(one: Any, other: Any) -> bool:
 
 
 @contextmanager
-def told(call: Callable[[str], None]) -> Iterator[None]:
+def reported_to(call: Callable[[str], None]) -> Iterator[None]:
     """Call with all that is said while work goes on, as it is said."""
 
     class Handler(logging.Handler):

@@ -65,9 +65,9 @@ def work_figure(bench: Bench) -> Figure:
     figure.supxlabel("largest error of a load / largest load", fontsize=LABEL)
     figure.supylabel("seconds", fontsize=LABEL)
     shown = [name for name in (*LOOKS, "frontier") if name in handles]
-    told = ["newton (default)" if name == "newton" else name for name in shown]
+    labels = ["newton (default)" if name == "newton" else name for name in shown]
     lines = [handles[name] for name in shown]
-    figure.legend(lines, told, loc="outside upper center", ncols=3, fontsize=TICK, frameon=False)
+    figure.legend(lines, labels, loc="outside upper center", ncols=3, fontsize=TICK, frameon=False)
     return figure
 
 

@@ -14,7 +14,7 @@ from convexrough.frames import Variables
 from convexrough.gallery.cases import case, names
 from convexrough.plots.notebook import Figure
 from convexrough.plots.style import SINGLE, TICK, label
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.record import Table
 from convexrough.solvers import Newton, Solver
 
@@ -93,22 +93,19 @@ def profile_of(
     *,
     cases: Sequence[str] = (),
     within: float = 1e-3,
-    announce: Announce | None = None,
 ) -> Profile:
     """Time solvers on the hard cases, once each, and judge what they answer.
 
     solvers : settings objects; the default is every one of `compare`. Newton's method is the first
     cases   : names of cases or families; all, if none is given
     within  : how far loads may be from the answer, over the largest, to be right
-    announce : told the name of each case before it starts
     """
     others = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
     wanted = names(*cases)
     seconds = np.full((len(others), len(wanted)), np.inf)
     outcomes = [[""] * len(wanted) for _ in others]
     for column, name in enumerate(wanted):
-        if announce is not None:
-            announce(name)
+        LOGGER.info(name)
         hard = case(name)
         entries = compare(hard.scene, **hard.control, solvers=others).entries
         for row, entry in enumerate(entries):

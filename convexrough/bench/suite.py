@@ -15,7 +15,7 @@ from convexrough.contact import press
 from convexrough.errors import InputError, SolverError
 from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 
 Sizes = tuple[tuple[Family, int], ...]
@@ -83,37 +83,33 @@ def attempts(quick: bool) -> list[Attempt]:
     return found
 
 
-def run(*, quick: bool, announce: Announce | None = None) -> Bench:
-    """Measure all of it.
-
-    announce : told in a line what is going on
-    """
+def run(*, quick: bool) -> Bench:
+    """Measure all of it."""
     patience = 0.1 if quick else 1.0
     began, machine, rows = time.perf_counter(), describe_machine(), list[Row]()
-    say = announce or (lambda line: None)
     for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # have them import what they need
         with suppress(InputError, SolverError):  # it will come again, and be told
             press(scene("lattice", 1.0), approach=APPROACH, solver=solver)
     for family, size in WORK[:3] if quick else WORK:
-        rows += _panel(family, size, quick, patience, say)
+        rows += _panel(family, size, quick, patience)
     for task, sizes in {"press": PRESSES, "from nothing": PRESSES, **FOLLOWING}.items():
         for family, size in sizes:
             if size <= QUICK or not quick:
-                say(f"{task}: {family}, about {size:,}")
+                LOGGER.info(f"{task}: {family}, about {size:,}")
                 rows.append(measure_task(task, family, size, patience))
     for size, scenes, workers in SWEEPS[:1] if quick else SWEEPS:
-        say(f"sweep: scenes of about {size:,}")
+        LOGGER.info(f"sweep: scenes of about {size:,}")
         rows.append(measure_sweep(size, scenes // PART if quick else scenes, workers))
     return Bench(machine, quick, tuple(rows), time.perf_counter() - began)
 
 
-def _panel(family: Family, size: int, quick: bool, patience: float, say: Announce) -> list[Row]:
+def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]:
     """Every attempt at one scene.
 
     What seems to beat the default solver is timed again, and so is that: in turns. Both keep their
     least times, so that a moment in which the machine was busy decides nothing.
     """
-    say(f"{family}, about {size:,}: reference")
+    LOGGER.info(f"{family}, about {size:,}: reference")
     each = scene(family, REFINEMENTS[size])
     problem = NormalProblem.assemble(each, approach=APPROACH)
     right = None
@@ -126,7 +122,7 @@ def _panel(family: Family, size: int, quick: bool, patience: float, say: Announc
     ]
     rows = []
     for attempt in tried:
-        say(f"{family}, about {size:,}: {attempt.solver}, {attempt.setting}")
+        LOGGER.info(f"{family}, about {size:,}: {attempt.solver}, {attempt.setting}")
         rows.append(measure_attempt(family, each, attempt, right, patience))
     for _ in range(ROUNDS):
         better = better_than_default(rows)

@@ -29,8 +29,8 @@ def bench(
     if page is not None:
         pages.split_page(page)  # a page without markers is refused before anything is computed
     folder = out or Path("bench-results")
-    with results_folder(folder, force=force) as new, progress("measuring") as show:
-        found = suite.run(quick=quick, announce=show)
+    with results_folder(folder, force=force) as new, progress("measuring"):
+        found = suite.run(quick=quick)
         files = pages.write_bench(new, found, figures=not no_figures, page=page)
     echo(found.summary(), [*pages.describe(found), *written(folder, files)], as_json)
     return DONE

@@ -33,7 +33,6 @@ def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named
-    from convexrough.progress import tell
     from convexrough.run import comparison as report
     from convexrough.run.scene_file import read_scene
 
@@ -46,7 +45,6 @@ def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
             load=file.load,
             influence=file.influence,
             solvers=chosen,
-            announce=tell,
         )
     summary = report.comparison_summary(comparison)
     echo(summary, report.describe_comparison(summary, file.units), as_json)

@@ -37,7 +37,6 @@ def gallery(
     from convexrough.atomic import write_text
     from convexrough.compare import solver_named
     from convexrough.gallery.export import exported
-    from convexrough.progress import tell
     from convexrough.run.results import results_folder
     from convexrough.tabular.columns import aligned
 
@@ -47,7 +46,7 @@ def gallery(
         from convexrough.bench.profile import profile_of
 
         with progress("timing"):
-            table = profile_of(chosen or None, cases=wanted, announce=tell).rows()
+            table = profile_of(chosen or None, cases=wanted).rows()
         found = [dict(zip(table[0], row, strict=True)) for row in table[1:]]
         echo({"profile": found}, aligned(table, left=1), as_json)
         return DONE

@@ -186,7 +186,6 @@ def _read(path: Path, *, pixel: str | None, detrend: str, **options: Any) -> Sur
 
 def _scan(surface: Surface, prune: float, fit: int, how: dict[str, Any]) -> Scanned:
     """All of it; in the unit of the scene, if that names one."""
-    from convexrough.progress import tell
     from convexrough.surface import provability
     from convexrough.surface.provability import LEVELS
     from convexrough.surface.report import Scanned
@@ -207,7 +206,7 @@ def _scan(surface: Surface, prune: float, fit: int, how: dict[str, Any]) -> Scan
     if file is None and how["radius"] is None:
         return Scanned(surface, maxima, chosen)
     press = _pressing(file, **how)
-    curve = provability(maxima, press, levels=[*LEVELS, prune], announce=tell)
+    curve = provability(maxima, press, levels=[*LEVELS, prune])
     try:
         contact = press(chosen)
     except SolverError:

@@ -189,7 +189,6 @@ def _written(
 
 def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
     """The proof of the claimed loads."""
-    from convexrough.progress import tell
     from convexrough.proof import prove
 
     verdict = found.verdict
@@ -199,4 +198,4 @@ def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
     ]
     control: Any = {"approach": file.approach, "load": file.load}
     with blamed_on(scene):
-        return prove(file.scene, claimed, **control, announce=tell)
+        return prove(file.scene, claimed, **control)

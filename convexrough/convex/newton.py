@@ -120,20 +120,20 @@ def solve(
     stopping: Stopping,
     *,
     before: float = np.inf,
-    tell: Callable[[int, Point], object] | None = None,
+    report: Callable[[int, Point], object] | None = None,
 ) -> tuple[Point, int]:
     """The state that is as good as it gets, and how many steps it took.
 
     before : 2-norm of the defect that the start can be said to come from, for the first step
-    tell   : called before each step with its number, from 1, and the state
+    report : called before each step with its number, from 1, and the state
 
     It ends where  residual <= tolerance * scale;  or, once  residual <= accurate * scale,  where
     the defect is small beside rounding, which a certificate has to allow for anyway, or where a
     step does not halve the residual (the better of the two states is the answer). Else SolverError.
     """
     for step in range(1, stopping.most + 1):
-        if tell is not None:
-            tell(step, state)
+        if report is not None:
+            report(step, state)
         accurate = state.residual <= stopping.accurate * state.scale
         size, noise = math.sqrt(np.vdot(state.defect, state.defect)), law.noise(state)
         done = state.residual <= max(stopping.tolerance * state.scale, 0.0)

@@ -43,7 +43,7 @@ from convexrough.friction.state import displacements_of, states_of, stick_radii,
 from convexrough.influence import Kind
 from convexrough.numbers.balls import Ball
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 from convexrough.sphere import mindlin
@@ -220,17 +220,15 @@ class Cycle(Table, Plottable):
     def loop(
         self,
         points: int = 200,
-        announce: Announce | None = None,
         asperities: ArrayLike | None = None,
     ) -> Loop:
         """The loop through about `points` points, as many down as up, denser at the ends.
 
-        announce   : told in a line how far long work has come
         asperities : indices of those whose own loops to keep, default all
 
         Raises InputError where the load varies.
         """
-        return loops([self], points, announce, asperities)[0]
+        return loops([self], points, asperities)[0]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -274,12 +272,10 @@ def cycle(
     maximum: float | None = None,
     minimum: float | None = None,
     displacement: float | None = None,
-    announce: Announce | None = None,
 ) -> Cycle:
     """The steady cycle between two shear forces [force]; `minimum` defaults to -maximum.
 
     displacement : amplitude of X [length] of a symmetric cycle, instead of its forces
-    announce     : told in a line how far long work has come
 
     Raises InputError where the scene has no friction, the minimum exceeds the maximum, or either
     exceeds f P in size, or the displacement that of gross sliding.
@@ -291,7 +287,7 @@ def cycle(
     upper = None if maximum is None else [maximum]
     lower = None if minimum is None else [minimum]
     moved = None if displacement is None else [displacement]
-    return cycles(contact, upper, lower, displacement=moved, announce=announce)[0]
+    return cycles(contact, upper, lower, displacement=moved)[0]
 
 
 def cycles(
@@ -300,7 +296,6 @@ def cycles(
     minimum: ArrayLike | None = None,
     *,
     displacement: ArrayLike | None = None,
-    announce: Announce | None = None,
 ) -> list[Cycle]:
     """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives.
 
@@ -336,8 +331,7 @@ def cycles(
     forces = list(zip(upper.tolist(), lower.tolist(), strict=True))
     if contact.load == 0.0:
         return [_still(contact, np.zeros(2), np.array(each)) for each in forces]
-    if announce is not None:
-        announce("pressing at the level of a cycle")
+    LOGGER.info("pressing at the level of a cycle")
     load = contact.cached(FrictionLevels).load
     points = [[point_at(load, Q, contact.scene)[1] for Q in each] for each in forces]
     return _at_the_load(contact, points, forces)
@@ -362,12 +356,11 @@ def steady(
     loads: ArrayLike,
     forces: ArrayLike,
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> Cycle:
     """The steady state of a closed path of P and Q, |Q| <= f P, straight between its points.
 
     loads, forces : (m,) P and Q at its points [force]; from the last it goes back to the first
-    influence, announce : as in `load_path`
+    influence : as in `load_path`
 
     Raises what `load_path` raises.
 
@@ -377,7 +370,7 @@ def steady(
     ('0.3500', 12)
     """
     points = points_of(scene, loads, forces)
-    contact = pressed_for(scene, [load for load, _ in points], influence, announce)
+    contact = pressed_for(scene, [load for load, _ in points], influence)
     P, Q = (np.array(each, dtype=np.float64) for each in (loads, forces))
     if contact.load == 0.0:
         return _still(contact, P, Q)
@@ -523,7 +516,6 @@ def _still(contact: Contact, loads: Array, forces: Array) -> Cycle:
 def loops(
     cycles: Sequence[Cycle],
     points: int = 200,
-    announce: Announce | None = None,
     asperities: ArrayLike | None = None,
 ) -> list[Loop]:
     """The loops of several cycles of one contact at constant load, which share their levels.
@@ -545,13 +537,10 @@ def loops(
     chosen = indices("asperities", asperities, len(contact.scene))
     widest = max(each.force_amplitude for each in cycles)
     shared = widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))
-    return [
-        _loop(each, shared[1:][shared[1:] < each.force_amplitude], chosen, announce)
-        for each in cycles
-    ]
+    return [_loop(each, shared[1:][shared[1:] < each.force_amplitude], chosen) for each in cycles]
 
 
-def _loop(cycle: Cycle, way: Array, chosen: Indices, announce: Announce | None) -> Loop:
+def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
     """Through the points where Q has gone by twice as much as `way` says, down and up again."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
@@ -568,8 +557,7 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices, announce: Announce | None) 
     heights[len(way) - 1], heights[-1] = bottom, top
     ways = [(P, height) for height in heights]
     begin = follow(MemoryCurve.pressed(P), [(P, top), (P, bottom), (P, top)])[0][-1]
-    if announce is not None:
-        announce(f"{len(way) - 1} levels of a loop")
+    LOGGER.info(f"{len(way) - 1} levels of a loop")
     if cycle.order == "fails" and levels.proved:
         points = [(P, top), (P, bottom), *ways]
         found = followed(levels, MemoryCurve.pressed(P), points, 1).states

@@ -28,7 +28,6 @@ from convexrough.influence import Kind
 from convexrough.numbers.balls import TINY, UP, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
@@ -166,7 +165,6 @@ def load_path(
     start: Contact | None = None,
     influence: Kind | None = None,
     steps: int | None = None,
-    announce: Announce | None = None,
 ) -> LoadPath:
     """Any path of the total load P and the shear force Q, |Q| <= f P, straight between its points.
 
@@ -175,7 +173,6 @@ def load_path(
     influence : how to couple the asperities; None for the cheapest that is exact
     steps     : take the general step, which assumes no order, so many times per segment; None for
         the memory curve, and as many as are needed where order fails. Nothing is proved of them.
-    announce  : told in a line how far long work has come
 
     Raises InputError for an empty path, loads that are negative, shear beyond f P (where, and by
     how much) or left at a load of 0; SolverError where a normal problem is not solved.
@@ -185,13 +182,12 @@ def load_path(
     >>> (path.displacements > 0).tolist(), path.presses
     ([False, True, True], 4)
     """
-    return walk(scene, loads, forces, start, influence, steps, announce)
+    return walk(scene, loads, forces, start, influence, steps)
 
 
-def history(contact: Contact, *, forces: ArrayLike, announce: Announce | None = None) -> History:
+def history(contact: Contact, *, forces: ArrayLike) -> History:
     """Any sequence of shear forces (m,) [force], |Q| <= f P, from the freshly pressed contact.
 
-    announce : told in a line how far long work has come
 
     >>> past = cr.history(contact, forces=contact.load * np.array([0.4, 0.0]))
     >>> print([f"{moved:.3g}" for moved in past.displacements])  # the way back is not the way there
@@ -216,7 +212,6 @@ def walk(
     start: Contact | None = None,
     influence: Kind | None = None,
     steps: int | None = None,
-    announce: Announce | None = None,
     stepper: type[Stepper] = Stepper,
 ) -> LoadPath:
     """`load_path`, with a choice of how a general step is solved."""
@@ -227,19 +222,17 @@ def walk(
     if start is not None:
         curve = MemoryCurve.pressed(_same_scene(scene, start).cached(FrictionLevels).load)
         influence = influence or start.influence
-    contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence, announce)
+    contact = pressed_for(scene, [curve.load, *(load for load, _ in points)], influence)
     Q = frozen(np.array(forces, dtype=np.float64))
     if contact.load == 0.0:
         return LoadPath(contact, **_nothing(contact, Q))
     return LoadPath(contact, forces=Q, **_followed(contact, curve, points, steps, stepper))
 
 
-def pressed_for(
-    scene: Scene, loads: Sequence[Fraction], influence: Kind | None, announce: Announce | None
-) -> Contact:
+def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None) -> Contact:
     """The scene at the highest of these loads."""
     if highest := float(max(loads)):
-        return press(scene, load=highest, influence=influence, announce=announce)
+        return press(scene, load=highest, influence=influence)
     apart = 1e-9 * float(scene.asperities.tip_radii.max())
     return press(scene, approach=-float(scene.offsets.max()) - apart)
 

@@ -17,7 +17,7 @@ from convexrough.friction.order import Order
 from convexrough.friction.shapes import elliptic_path
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.scene import Scene
@@ -80,12 +80,11 @@ def phase_losses(
     factors: ArrayLike = (1.0,),
     chords: int = 24,
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> PhaseLosses:
     """The loss of an elliptic path at several phases and sizes; symbols as in `elliptic_path`.
 
     chords : number per ellipse; the relative error of the loss is about chords^-2
-    influence, announce : as in `load_path`
+    influence : as in `load_path`
 
     Raises what `elliptic_path` and `steady` raise.
 
@@ -118,8 +117,7 @@ def phase_losses(
     rough, smooth = list[Cycle](), list[float]()
     pairs = list(product(sizes.tolist(), turns.tolist()))
     for k, (size, phase) in enumerate(pairs):
-        if announce is not None:
-            announce(f"ellipse {k + 1} of {len(pairs)}")
+        LOGGER.info(f"ellipse {k + 1} of {len(pairs)}")
         rough.append(settled(scene, size, phase))
         smooth.append(settled(alone, size, phase).loss if alone else np.nan)
     sliding = [np.isin(each.status, ("sliding", "intermittent")).sum() for each in rough]

@@ -20,7 +20,7 @@ from convexrough.friction.order import Order
 from convexrough.friction.state import states_of, stick_radii, words
 from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
@@ -159,13 +159,11 @@ def shear(
     *,
     force: float | None = None,
     displacement: float | None = None,
-    announce: Announce | None = None,
 ) -> ShearState:
     """Shear a pressed contact, first loading, at constant normal load.
 
     force [force] Q or displacement [length] X of the deep points : exactly one. A force within 16
         roundoffs of f P is read as f P: gross sliding
-    announce : told in a line how far long work has come
 
     Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding) or X its
     displacement there, and SolverError where a normal problem is not solved.
@@ -184,8 +182,7 @@ def shear(
     if contact.load == 0.0:
         return _nothing_loaded(contact, displacement or 0.0)
     levels = contact.cached(FrictionLevels)
-    if announce is not None:
-        announce("pressing at the load P - Q / f")
+    LOGGER.info("pressing at the load P - Q / f")
     if force is not None:
         height = height_of(levels, force)
     else:

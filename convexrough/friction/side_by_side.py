@@ -25,7 +25,7 @@ from convexrough.friction.order import Order
 from convexrough.friction.path import LoadPath, walk
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.record import LINE, Record, Table
 from convexrough.scene.scene import Scene
 
@@ -108,12 +108,10 @@ def compare_paths(
     forces: ArrayLike,
     start: Contact | None = None,
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> PathComparison:
     """Follow a path by the general step, the memory curve and the conic step.
 
     loads, forces, start, influence : as in `load_path`
-    announce : told the name of each way before it starts
 
     Raises InputError as `load_path`, and SolverError where none of them answers.
 
@@ -126,8 +124,7 @@ def compare_paths(
     entries = list[PathEntry]()
 
     def enter(way: Way, found: Callable[[], LoadPath]) -> None:
-        if announce is not None:
-            announce(way)
+        LOGGER.info(way)
         answered = [each.path for each in entries if each.path is not None]
         entries.append(_entry(way, found, answered[0] if answered else None))
 

@@ -8,7 +8,7 @@ from typing import Any
 from convexrough import gallery
 from convexrough.atomic import to_json
 from convexrough.gallery.pack import packed
-from convexrough.progress import tell
+from convexrough.progress import LOGGER
 from convexrough.tabular.columns import markdown
 from convexrough.version import __version__
 
@@ -34,7 +34,7 @@ def exported(names: Iterable[str]) -> Iterator[tuple[str, bytes]]:
     """The files of these cases by their names, and last index.md and index.json."""
     index: dict[str, Any] = {}
     for name in names:
-        tell(name)
+        LOGGER.info(name)
         about, files = packed(gallery.case(name))
         yield from files.items()
         index[name] = about

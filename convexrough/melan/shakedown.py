@@ -25,7 +25,6 @@ from convexrough.influence import Kind
 from convexrough.melan import program
 from convexrough.melan.elastic_shares import scalar_shares
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
 from convexrough.record import Along, Table
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
@@ -110,14 +109,13 @@ def shakedown(
     force_amplitudes: ArrayLike,
     kind: Theory = "exact",
     influence: Kind | None = None,
-    announce: Announce | None = None,
 ) -> Shakedown:
     """The largest factor of a closed path around (loads, forces) that shakes down.
 
     loads, forces : P0 and Q0 [force]; Q0 is (2,) for "vector"
     load_amplitudes, force_amplitudes : (m,) p and q of the points of the path [force], a number
         for all; q is (m, 2) for "vector". Only "exact" allows p that is not 0
-    influence, announce : as in `load_path`
+    influence : as in `load_path`
 
     Raises InputError for bad values, |Q0| >= f P0, or a path on which nothing moves.
 
@@ -146,7 +144,7 @@ def shakedown(
         given = "one point" if len(q) else "none"
         raise InputError("force_amplitudes", found=given, expected=expected)
     if kind == "exact":
-        contact = press(scene, load=P0, influence=influence, announce=announce)
+        contact = press(scene, load=P0, influence=influence)
         found = _exact(contact, float(t0), p, t)
     elif np.any(p):
         expected = 'none: only "exact" holds where the normal load varies'

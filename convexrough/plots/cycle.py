@@ -112,7 +112,7 @@ def loops_figure(
     names, meaning : entries and title of the legend of the asperities
     loops : of the cycles, with those of the asperities;  count : of cycles from which these are
     """
-    loops = steady_loops(cycles, POINTS, None, asperities) if loops is None else loops
+    loops = steady_loops(cycles, POINTS, asperities) if loops is None else loops
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     whole, upright, single = figure.subplots(1, 3, width_ratios=[1, 1, 1.1])
     x, q = scale.displacement, scale.force

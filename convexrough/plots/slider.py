@@ -20,7 +20,6 @@ from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.friction.cycle import Cycle, cycles
 from convexrough.friction.path import History, history
-from convexrough.progress import Announce
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
@@ -45,13 +44,13 @@ class Slides:
     loading: History
 
     @classmethod
-    def of(cls, contact: Contact, announce: Announce | None = None) -> Slides:
+    def of(cls, contact: Contact) -> Slides:
         """Of a contact. Raises InputError if the scene has no friction, or another base."""
         sphere_radius(contact.scene.sphere_radius, "slider page")
         limit = checks.friction(contact.scene.friction) * contact.load
         fractions = np.linspace(0.0, 1.0, _forces(int(np.count_nonzero(contact.loads))))
-        steady = cycles(contact, fractions * limit, announce=announce)
-        loading = history(contact, forces=fractions * limit, announce=announce)
+        steady = cycles(contact, fractions * limit)
+        loading = history(contact, forces=fractions * limit)
         return cls(contact, fractions, steady, loading)
 
 

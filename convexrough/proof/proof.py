@@ -20,7 +20,7 @@ from convexrough.atomic import replacing
 from convexrough.errors import InputError, ProofError
 from convexrough.normal.level import Level
 from convexrough.numbers.pairs import Pair
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.proof.arguments import Trial
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
@@ -85,7 +85,6 @@ def prove(
     approach: float | None = None,
     load: float | None = None,
     sheared: Sequence[tuple[float, Near]] = (),
-    announce: Announce | None = None,
 ) -> Proof:
     """A proof of the solution near these loads, wherever they came from.
 
@@ -93,7 +92,6 @@ def prove(
     approach [length] or load [force] : what is prescribed, exactly one
     sheared : shear forces Q [force] of states to prove, too, with the loss of the cycle from -Q to
         Q; and what is near the solution at the load P - Q / f
-    announce : told in a line how far long work has come
 
     The bounds are those that the checker computes in exact arithmetic, so proving takes as long as
     checking does: a minute for 3,000 asperities.
@@ -121,7 +119,7 @@ def prove(
     for argument in trial.arguments():
         document["argument"] = _written(argument._asdict())
         try:
-            proved = checker.prove(document, announce or (lambda line: None))
+            proved = checker.prove(document, LOGGER.info)
         except checker.Refused as error:
             refusal = str(error)
         else:

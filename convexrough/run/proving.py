@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from convexrough.friction.shear import ShearState, shear
-from convexrough.progress import tell
 from convexrough.proof import Proof
 from convexrough.run.stage import Result, limit
 from convexrough.run.stages.cycle import Cycled
@@ -29,4 +28,4 @@ def prove_results(results: Sequence[Result]) -> Proof:
                 states[amplitude] = shear(contact, force=amplitude)
     most = BELOW_LIMIT * limit(contact) if contact.scene.friction else 0.0
     chosen = [states[force] for force in sorted(states) if 0 < force < most]
-    return contact.proof(sheared=chosen, announce=tell)
+    return contact.proof(sheared=chosen)

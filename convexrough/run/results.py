@@ -21,7 +21,7 @@ import numpy as np
 
 from convexrough.atomic import remove_unfinished, replacing, to_json, unfinished, write_text
 from convexrough.errors import FileError
-from convexrough.progress import tell
+from convexrough.progress import LOGGER
 from convexrough.run.scene_file import SceneFile
 from convexrough.run.stage import Result, Summary
 from convexrough.run.summary import headed, summarise
@@ -123,12 +123,12 @@ def write_results(
     """
     written = []
     for result in results:
-        tell(f"writing {result.name}")
+        LOGGER.info(f"writing {result.name}")
         written += write_tables(folder, result.tables())
     if figures:
         units = units or UnitNames()
         for result in results:
-            tell(f"drawing {result.name}")
+            LOGGER.info(f"drawing {result.name}")
             drawn = result.figures(length_unit=units.length, force_unit=units.force)
             written += write_figures(folder, drawn, **saved)
     path = folder / "summary.json"
@@ -143,7 +143,7 @@ def slider_page(pressed: Result, units: UnitNames) -> str:
     """
     from convexrough.plots.slider import Slides, slider_html  # matplotlib: only when it draws
 
-    return slider_html(Slides.of(pressed.contact, tell), pressed.lines(units), units)
+    return slider_html(Slides.of(pressed.contact), pressed.lines(units), units)
 
 
 def write_json(path: Path, summary: Summary) -> Path:

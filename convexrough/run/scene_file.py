@@ -17,7 +17,6 @@ from convexrough.errors import FileError, InputError, SceneFileError
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
-from convexrough.progress import tell
 from convexrough.record import Record
 from convexrough.run.tables import read_summits, read_text
 from convexrough.scene.asperities import Asperities, largest_tip_radius
@@ -96,7 +95,7 @@ class SceneFile(Record):
 
     def press(self) -> Contact:
         """As the file says. Raises what `press` raises."""
-        return solve(self.problem(), self.solver, announce=tell)
+        return solve(self.problem(), self.solver)
 
     def compute(self, contact: Contact) -> list[Result]:
         """The result of each stage, of the pressed contact first."""

@@ -110,9 +110,9 @@ class Table(BaseModel):
             table = validated(keys)
         except ValidationError as error:
             found += [_again(each) for each in error.errors()]
-        found += [_told(*each, keys) for each in cls.mistakes_between(keys)]
+        found += [_mistake(*each, keys) for each in cls.mistakes_between(keys)]
         if not found:
-            found = [_told(*each, keys) for each in table.mistakes_within()]
+            found = [_mistake(*each, keys) for each in table.mistakes_within()]
         if found:
             raise ValidationError.from_exception_data(cls.__name__, found)
         return table
@@ -142,7 +142,7 @@ class Table(BaseModel):
         yield from ()
 
 
-def _told(key: str, said: str, keys: Any) -> InitErrorDetails:
+def _mistake(key: str, said: str, keys: Any) -> InitErrorDetails:
     kind = PydanticCustomError("told", "{said}", {"said": said})
     return InitErrorDetails(type=kind, loc=(key,) if key else (), input=keys)
 

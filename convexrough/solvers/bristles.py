@@ -42,7 +42,6 @@ from convexrough.arrays import Array
 from convexrough.convex.definite import is_definite
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.progress import Announce
 from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.newton import newton_step
 from convexrough.solvers.programs import Answer, QuadraticProgram, RawAnswer, Reduction, run_osqp
@@ -96,7 +95,6 @@ class BristleQP:
         self,
         problem: NormalProblem,
         start: Array | None = None,
-        announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates (own units). OSQP starts where it likes: `start` is not used."""
         program = BristleProgram.assemble(problem, self.bristles, self.name)

@@ -20,7 +20,6 @@ from convexrough.arrays import Array, Indices
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.progress import Announce
 from convexrough.solvers.newton import newton_step
 from convexrough.solvers.programs import Answer
 from convexrough.solvers.solution import Solution
@@ -154,7 +153,6 @@ class ConeSolver(ABC):
         self,
         problem: NormalProblem,
         start: Array | None = None,
-        announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates: with four cones, with five where a cut box stops an asperity.
 

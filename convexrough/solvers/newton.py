@@ -23,7 +23,7 @@ from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import refined_loads
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.solvers.pressing import Pressed, Pressing, negligible, on_constraint
 from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
@@ -61,7 +61,6 @@ class Newton:
         self,
         problem: NormalProblem,
         start: Array | None = None,
-        announce: Announce | None = None,
     ) -> Solution:
         """Loads of the candidates, from any start that is not negative (own units)."""
         indentation = _start(problem, start)
@@ -74,7 +73,7 @@ class Newton:
         while True:
             begin = indentation[near]
             del indentation  # half of the memory of a large scene is vectors
-            state, steps = self._iterate(problem, near, begin, announce)
+            state, steps = self._iterate(problem, near, begin)
             iterations += steps
             if len(near) == len(problem):
                 return self._ended(problem, state.forces, state, iterations)
@@ -108,23 +107,21 @@ class Newton:
         problem: NormalProblem,
         near: Indices,
         indentation: Array,
-        announce: Announce | None,
     ) -> tuple[Pressed, int]:
         """The solution of some of the candidates: all others carry nothing."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
 
-        def tell(step: int, state: Pressed) -> None:
-            if announce is not None:
-                residual, touching = state.residual / state.scale, np.count_nonzero(state.forces)
-                announce(f"step {step}, residual {residual:.1e}, {touching:,} touching")
+        def report(step: int, state: Pressed) -> None:
+            residual, touching = state.residual / state.scale, np.count_nonzero(state.forces)
+            LOGGER.info(f"step {step}, residual {residual:.1e}, {touching:,} touching")
 
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
             state = law.evaluate(indentation)
             if self._refines(problem):  # what is left then is linear
                 stopping = replace(stopping, linear=negligible(indentation))
-            return newton.solve(law, state, stopping, tell=tell)
+            return newton.solve(law, state, stopping, report=report)
         except SolverError as error:
             if error.iterate is not None:
                 error.iterate = among_zeros(error.iterate, near, len(problem))

@@ -10,7 +10,6 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import Trial
-from convexrough.progress import Announce
 from convexrough.record import Record
 
 
@@ -58,5 +57,4 @@ class Solver(Protocol):
         self,
         problem: NormalProblem,
         start: Array | None = None,
-        announce: Announce | None = None,
     ) -> Solution: ...

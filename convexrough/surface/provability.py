@@ -19,7 +19,7 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
 from convexrough.plottable import Plottable
-from convexrough.progress import Announce
+from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.surface.summits import Summits
@@ -90,7 +90,6 @@ def provability(
     press: Press,
     *,
     levels: Sequence[float] = LEVELS,
-    announce: Announce | None = None,
 ) -> Provability:
     """Press what is left of the summits at each pruning, and look how far that can be trusted.
 
@@ -111,8 +110,7 @@ def provability(
         if not (summits.prominences >= prune * summits.origin.max_height).any():
             break
         left = summits.pruned(prune)
-        if announce is not None:
-            announce(f"pruning {prune:.3g}: {len(left):,} summits")
+        LOGGER.info(f"pruning {prune:.3g}: {len(left):,} summits")
         rows.append((prune, left.origin.threshold, len(left), *_pressed(left, press)))
     columns = [np.array(column) for column in zip(*rows, strict=True)]
     return Provability(*map(frozen, columns))

@@ -136,8 +136,8 @@ def plan_of(
     if keys is None or mistakes:
         varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # not as they will be
         others = validate({name: it for name, it in tables.items() if name not in varied})[1]
-        told = [each for each in others if "missing table" not in each]
-        raise SceneFileError(str(path), [*mistakes, *told])
+        rest = [each for each in others if "missing table" not in each]
+        raise SceneFileError(str(path), [*mistakes, *rest])
     grid = keys.grid(tables)
     study, mistakes = _of_values(grid)
     if study is None or mistakes:

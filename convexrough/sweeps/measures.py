@@ -71,8 +71,8 @@ def _numbers(
             yield from _numbers(each, f"{name}.{key}", row, labels)
     elif isinstance(value, list):
         for i, each in enumerate(value):
-            told = _label(each, labels) if isinstance(each, dict) and labels else str(i)
-            yield from _numbers(each, name, f"{row}_{told}" if row else told, labels)
+            label = _label(each, labels) if isinstance(each, dict) and labels else str(i)
+            yield from _numbers(each, name, f"{row}_{label}" if row else label, labels)
     elif isinstance(value, (int, float)):
         yield (name, row), float(value)
 

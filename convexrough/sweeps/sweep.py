@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from convexrough import checks
 from convexrough.errors import InputError, MistakesError
-from convexrough.progress import tell
+from convexrough.progress import LOGGER
 from convexrough.run.stage import Stage
 from convexrough.scene.scene import Scene
 from convexrough.sweeps.batch import Columns, table
@@ -122,10 +122,10 @@ def run(
     if out is not None:
         folder = make_folder(Path(out), plan.manifest(), overwrite=overwrite)
         todo, found = folder.missing(todo, resume)
-        tell(found)
+        LOGGER.info(found)
     count = sum(map(len, todo))
     held = [table(plan.batch(range(0)), [])]  # no rows, all columns
-    for columns in _told(computed(map(plan.batch, todo), executor), count):
+    for columns in _report_progress(computed(map(plan.batch, todo), executor), count):
         if folder is None:
             held.append(columns)
         else:
@@ -152,8 +152,8 @@ def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
     return [plan.part(number) for number in range(first, stop)]
 
 
-def _told(found: Iterator[Columns], count: int) -> Iterator[Columns]:
-    """The rows themselves; how far they have come is told on the way."""
+def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
+    """The rows themselves, with progress reported on the way."""
     began, done, failed = time.monotonic(), 0, 0
     for columns in found:
         yield columns
@@ -162,7 +162,7 @@ def _told(found: Iterator[Columns], count: int) -> Iterator[Columns]:
         rate = done / max(time.monotonic() - began, 1e-9)
         left = timedelta(seconds=round((count - done) / rate))
         said = f"{done:,} of {count:,} scenes, {rate:,.3g} a second, {left} left"
-        tell(said + (f", {failed:,} failed" if failed else ""))
+        LOGGER.info(said + (f", {failed:,} failed" if failed else ""))
 
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:

@@ -174,7 +174,7 @@ def test_a_task_that_fails_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
 def command(command: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The command line, which finds a run that was made before."""
     made = tiny()
-    monkeypatch.setattr(suite, "run", lambda quick, announce: made)
+    monkeypatch.setattr(suite, "run", lambda quick: made)
     return command
 
 

@@ -124,6 +124,7 @@ def test_sums_of_many_loads_and_of_many_rows(monkeypatch: pytest.MonkeyPatch) ->
     assert DenseInfluence.assemble(points[:0], 1.0).sums(Pair.exact(loads[0, :0])).shape == (0,)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("made", [False, True])
 @pytest.mark.parametrize("count", [20, 61, 300, 700])
 def test_sums_among_some(count: int, made: bool) -> None:

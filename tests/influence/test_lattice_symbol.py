@@ -58,7 +58,7 @@ def test_closed_forms() -> None:
     assert least_symbol(np.diag([1.0, 51.0])) == -np.inf
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(bases(), st.integers(0, 2**32 - 1))
 def test_no_piece_of_a_lattice_has_less(basis: Array, seed: int) -> None:
     """Eigenvalues of 1 / r among any sites; the bound is not far below those of large pieces."""

@@ -5,6 +5,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
+from attacks import ATTACKS, assert_honest, attack
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -34,68 +35,7 @@ from convexrough.normal.problem import NormalProblem
 Array = NDArray[np.float64]
 
 
-def assert_honest(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
-    """Every word agrees with the proved solution, and every bound covers the distance to it."""
-    for word, load, gap in zip(certificate.status, exact.loads, exact.gaps, strict=True):
-        assert word in ("contact", "open", "undecided")
-        assert word != "contact" or load > 0
-        assert word != "open" or gap > 0
-    assert (np.abs(multiprecision.errors(loads, exact.loads)) <= certificate.load_errors).all()
-    gap_errors = np.abs(multiprecision.errors(certificate.gaps, exact.gaps))
-    assert (gap_errors <= certificate.gap_errors).all()
-    drift = abs(float(multiprecision.errors([certificate.approach], [exact.approach])[0]))
-    assert drift <= certificate.approach_error
-
-
-def attack(kind: str, loads: Array, rng: np.random.Generator) -> Array:
-    """Wrong loads: each a mistake that a user or a solver could make."""
-    wrong = loads.copy()
-    loaded = np.flatnonzero(loads)
-    if kind == "dropped" and len(loaded):
-        wrong[rng.choice(loaded)] = 0.0
-    elif kind == "smallest dropped" and len(loaded):
-        wrong[loaded[np.argmin(loads[loaded])]] = 0.0
-    elif kind == "added":
-        wrong[rng.integers(len(loads))] += loads.max() * 10.0 ** rng.uniform(-16, 0)
-    elif kind == "perturbed":
-        wrong *= 1 + 10.0 ** rng.uniform(-15, -1) * rng.standard_normal(len(loads))
-        wrong = np.maximum(wrong, 0.0)
-    elif kind == "swapped":
-        i, j = rng.integers(len(loads), size=2)
-        wrong[[i, j]] = wrong[[j, i]]
-    elif kind == "zero":
-        wrong[:] = 0.0
-    elif kind == "random":
-        wrong = loads.max() * rng.random(len(loads)) ** 4
-    elif kind == "huge":
-        wrong = loads * 1e6
-    elif kind == "scaled":
-        wrong = loads * (1 + rng.uniform(-0.1, 0.1))
-    elif kind == "rounded":
-        digits = int(rng.integers(1, 16))
-        wrong = np.array([float(f"{load:.{digits}e}") for load in loads])
-    elif kind == "single precision":
-        wrong = loads.astype(np.float32).astype(np.float64)
-    return wrong
-
-
-ATTACKS = [
-    "none",
-    "dropped",
-    "smallest dropped",
-    "added",
-    "perturbed",
-    "swapped",
-    "zero",
-    "random",
-    "huge",
-    "scaled",
-    "rounded",
-    "single precision",
-]
-
-
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("kind", ATTACKS)
 @pytest.mark.parametrize(("name", "operator"), CASES)
 def test_attacks_on_known_scenes(name: str, operator: Kind, kind: str) -> None:
@@ -112,7 +52,7 @@ def test_attacks_on_known_scenes(name: str, operator: Kind, kind: str) -> None:
             assert_honest(judged, wrong, exact_load)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("kind", ATTACKS)
 @pytest.mark.parametrize("operator", OPERATORS)
 def test_attacks_on_a_local_certificate(operator: Kind, kind: str) -> None:
@@ -134,7 +74,7 @@ def test_attacks_on_a_local_certificate(operator: Kind, kind: str) -> None:
         assert not ((certificate.status == "contact") & (contact.status == "open")).any()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(random_cases(crowding=1.2, most=10), st.sampled_from(ATTACKS), st.integers(0, 2**32 - 1))
 def test_attacks_on_random_scenes(
     drawn: tuple[cr.Scene, float, Kind], kind: str, seed: int
@@ -158,6 +98,7 @@ def test_attacks_on_random_scenes(
             assert_honest(certificate, wrong, exact)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", operators(paper()))
 @pytest.mark.parametrize(("digits", "bound"), [(3, 2e-2), (6, 2e-5), (9, 2e-8)])
 def test_rounded_loads_of_the_paper(digits: int, bound: float, kind: Kind) -> None:
@@ -171,18 +112,6 @@ def test_rounded_loads_of_the_paper(digits: int, bound: float, kind: Kind) -> No
     assert certificate.load_error <= bound * contact.loads.max()
     assert (certificate.status == contact.status).all()
     assert certificate.holds
-
-
-@pytest.mark.parametrize("kind", operators(paper()))
-def test_a_dropped_asperity_is_not_called_open(kind: Kind) -> None:
-    scene = paper()
-    contact = cr.press(scene, approach=PAPER_APPROACH)
-    for i in (0, 3, 36):
-        dropped = contact.loads.copy()
-        dropped[i] = 0.0
-        certificate = cr.certify(scene, dropped, approach=PAPER_APPROACH, influence=kind)
-        assert certificate.status[i] != "open"
-        assert certificate.load_errors[i] >= contact.loads[i]
 
 
 @pytest.mark.parametrize("steps", [-2, -1, 0, 1, 2])
@@ -247,6 +176,7 @@ def test_scopes() -> None:
     assert list(judged.in_the_way) == [0, 1]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("operator", OPERATORS)
 def test_shells_that_fit_the_contacts(operator: Kind) -> None:
     """Where neighbours differ in size, half the distance to each would prove nothing."""
@@ -261,7 +191,7 @@ def test_shells_that_fit_the_contacts(operator: Kind) -> None:
     assert contact.certificate.holds
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("operator", OPERATORS)
 @pytest.mark.parametrize("seed", range(20))
 def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
@@ -299,6 +229,7 @@ def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     assert margin > 0 or smallest < 1.1e-3
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", operators(rough()))
 def test_bounds_do_not_depend_on_who_solved(kind: Kind) -> None:
     """`press` and `certify` give the same judgement of the same loads."""
@@ -312,6 +243,7 @@ def test_bounds_do_not_depend_on_who_solved(kind: Kind) -> None:
     assert (again.status == contact.status).all()
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_the_rounding_of_the_residual_is_counted(name: str, kind: Kind) -> None:
     """Loads correctly rounded from 50 digits are known to half a unit in the last place."""
@@ -338,6 +270,7 @@ def test_gaps_of_screened_asperities() -> None:
     assert_honest(certificate, cr.press(scene, approach=1e-8).loads, exact)
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("seed", range(40))
 def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:
     """Where contact points are rounded, so is their distance, to whom it may concern."""
@@ -358,6 +291,7 @@ def test_loads_too_small_to_scale() -> None:
     assert certificate.load_error > 1e-9
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", operators(paper()))
 def test_judging_loads_of_screened_asperities(kind: Kind) -> None:
     """A load on an asperity that cannot touch is proved to be wrong by just that load."""
@@ -398,23 +332,6 @@ def test_both_or_neither_control() -> None:
             cr.certify(paper(), np.zeros(61), **control)
 
 
-def exact_energy(scene: cr.Scene, loads: Array, approach: Any) -> Any:
-    """Phi(P) of float64 loads, as a ball of arb."""
-    balls = [arb(float(load)) for load in loads]
-    E, R = arb(scene.material.contact_modulus), arb(scene.sphere_radius)
-    a, energy = scene.asperities, arb(0)
-    for i in np.flatnonzero(loads):
-        P = balls[i]
-        k = (9 / (16 * E * E) * (1 / R + 1 / arb(float(a.tip_radii[i])))).root(3)
-        x, y = (arb(float(c)) for c in a.positions[i])
-        D = approach + arb(float(a.heights[i])) - (x * x + y * y) / (2 * R)
-        energy += 3 * k * P.root(3) ** 5 / 5 - D * P
-        for j, other in enumerate(balls[:i]):
-            dx, dy = (arb(float(c)) for c in a.positions[i] - a.positions[j])
-            energy += P * other / (arb.pi() * E * (dx * dx + dy * dy).sqrt())
-    return energy
-
-
 @pytest.mark.parametrize("size", [1e-18, 1e-13, 1e-9])
 def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> None:
     scene = rough()
@@ -425,8 +342,13 @@ def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> Non
     problem = NormalProblem.assemble(scene, approach=PAPER_APPROACH)
     assert farthest not in problem.candidates
     with ctx.workdps(60):
-        energies = [exact_energy(scene, P, PAPER_APPROACH) for P in (wrong, contact.loads)]
-        excess = float(energies[0] - energies[1])
+        one, other = (
+            multiprecision.energy(
+                scene, [arb(load) for load in loads.tolist()], arb(PAPER_APPROACH)
+            )
+            for loads in (wrong, contact.loads)
+        )
+        excess = float(one - other)
     assert excess > 0
     gap = certify_on(problem, wrong).duality_gap
     assert gap >= excess

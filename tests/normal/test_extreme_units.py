@@ -49,6 +49,7 @@ def test_near_points_among_far_ones_on_no_lattice() -> None:
 SIZES = (1e-60, 1e-20, 1e20, 1e60)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("modulus", [1e-60, 1.0, 1e60])

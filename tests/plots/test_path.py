@@ -6,10 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 from figure_checks import discs, fits, words
-from matplotlib.colors import to_rgba
 from numpy.testing import assert_allclose
-from path_scenes import LARGEST, ONE, PAPER, ROUGH, TWO, follow
-from scenes import MATERIAL, PAPER_APPROACH
+from path_scenes import LARGEST, ONE, PAPER, TWO, follow
 
 import convexrough as cr
 from convexrough import plots
@@ -28,7 +26,7 @@ def limits() -> dict[str, cr.Shakedown]:
     return {
         "constant": cr.shakedown(PAPER, loads=P, force_amplitudes=swing),
         "about a mean": cr.shakedown(PAPER, loads=P, forces=0.1 * P, force_amplitudes=swing),
-        "ellipse": cr.shakedown(ROUGH, loads=0.9 * P, load_amplitudes=p, force_amplitudes=q),
+        "ellipse": cr.shakedown(PAPER, loads=0.9 * P, load_amplitudes=p, force_amplitudes=q),
         "elastic": cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="elastic"),
         "vector": cr.shakedown(
             PAPER, loads=P, force_amplitudes=np.column_stack((swing, 0 * swing)), kind="vector"
@@ -43,9 +41,9 @@ def losses() -> cr.PhaseLosses:
         load=0.7 * P,
         load_amplitude=0.2 * P,
         force_amplitude=0.14 * P,
-        phases=np.linspace(0, np.pi, 7),
+        phases=np.linspace(0, np.pi, 3),
         factors=[0.5, 1.0],
-        chords=8,
+        chords=6,
     )
 
 
@@ -90,7 +88,7 @@ def test_losses_against_phase_are_drawn() -> None:
     fits(figure)
     (axes,) = figure.axes
     half, _, whole, *_ = (line.get_ydata() for line in axes.lines)
-    assert_allclose(half / whole, found.losses[:7] * 8 / found.losses[7:])
+    assert_allclose(half / whole, found.losses[:3] * 8 / found.losses[3:])
     assert axes.get_ylabel().endswith("J]")
 
 
@@ -127,33 +125,6 @@ def test_the_map_changes_at_the_limits(name: str) -> None:
             error = 1.5 / n / max(unit_p, unit_t)
             low, high = (int((factors < at + side * error).sum()) for side in (-1, 1))
             assert low <= here <= high
-
-
-@cache
-def many() -> cr.Scene:
-    asperities = cr.Asperities.hexagonal(
-        spacing=1.7e-4, tip_radius=1.36e-3, within=8.5e-3, height_std=2e-7, seed=3
-    )
-    return cr.Scene(1.0, asperities, MATERIAL, friction=0.5, geometry="summit")
-
-
-def test_many_asperities_are_a_mosaic() -> None:
-    scene = many()
-    load = cr.press(scene, approach=PAPER_APPROACH).load
-    path = cr.load_path(scene, loads=[load, load], forces=[0.0, 0.2 * load])
-    figures = plots.path_figures(path, **UNITS)
-    for figure in figures.values():
-        fits(figure)
-    place = figures["path_stick_slip"].axes[1]
-    assert not any(discs(place, word) for word in LOOKS)
-    colours = np.asarray(place.images[0].get_array())
-    shown = colours[..., 3] > 0.5
-    dark = np.abs(colours - to_rgba(LOOKS["sliding"][0])).max(axis=-1) < 0.02
-    sliding = (path.status[1] == "sliding").sum() / np.count_nonzero(path.asperity_loads[1])
-    assert dark.sum() / shown.sum() == pytest.approx(sliding, abs=0.05)
-    limit = cr.shakedown(scene, loads=load, force_amplitudes=[0.1 * load, -0.1 * load])
-    for figure in plots.shakedown_figures(limit, **UNITS).values():
-        fits(figure)
 
 
 def test_axes_of_ones_own() -> None:

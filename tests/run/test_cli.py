@@ -1,12 +1,8 @@
-"""The command line as its users meet it: output, files, exit status."""
+"""The command line as its users meet it: output, files, exit status; processes in test_process."""
 
 import csv
 import json
-import os
 import re
-import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,21 +14,6 @@ from scene_files import HEXAGONAL, scene_text
 import convexrough as cr
 from convexrough.run import results
 from convexrough.run.scene_file import read_scene
-
-
-def shell(
-    *arguments: str, cwd: Path, stdout: int = subprocess.PIPE, before: str = ""
-) -> subprocess.CompletedProcess[str]:
-    """Run it as a shell does; `before` is Python to run first."""
-    code = "import sys; from convexrough.cli import main; sys.exit(main())"
-    return subprocess.run(
-        [sys.executable, "-c", before + code, *arguments],
-        cwd=cwd,
-        stdout=stdout,
-        stderr=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
 
 
 def test_new_then_run_then_verify(command: Any, tmp_path: Path) -> None:
@@ -402,61 +383,3 @@ def test_usage_errors(command: Any, arguments: tuple[str, ...]) -> None:
     outcome = command(*arguments)
     assert (outcome.status, outcome.out) == (2, "")
     assert "Usage: convexrough" in outcome.err
-
-
-# As a process: real exit status, no traceback, signals.
-
-
-def test_version_and_help(tmp_path: Path) -> None:
-    version = shell("--version", cwd=tmp_path)
-    assert (version.returncode, version.stderr) == (0, "")
-    assert version.stdout.split()[-1] == cr.__version__
-    text = shell("--help", cwd=tmp_path)
-    assert text.returncode == 0
-    assert all(name in text.stdout for name in ("run", "verify", "new", "paper"))
-
-
-def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
-    heavy = {"pydantic", "matplotlib", "rich", "cvxpy", "scipy.spatial", "scipy.linalg"}
-    loaded = f"print(*({heavy} & set(sys.modules)))"
-    code = f"import sys, convexrough.cli as c; c.main(['--help']); {loaded}"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ran.stdout.splitlines()[-1] == ""
-
-
-def test_exit_status_of_a_process(tmp_path: Path) -> None:
-    (tmp_path / "good.toml").write_text(scene_text())
-    (tmp_path / "bad.toml").write_text(scene_text(LATTICE.format(-1, 1)))
-    good = shell("run", "good.toml", "--json", "--no-figures", cwd=tmp_path)
-    assert (good.returncode, good.stderr) == (0, "")
-    json.loads(good.stdout)
-    for arguments in (("run", "bad.toml"), ("run", "none.toml"), ("run", "."), ("frob",)):
-        bad = shell(*arguments, cwd=tmp_path)
-        assert (bad.returncode, bad.stdout) == (2, ""), arguments
-        assert "Traceback" not in bad.stderr
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "bad.toml", "good-results", "good.toml",
-    ]  # fmt: skip
-
-
-def test_a_reader_that_leaves(tmp_path: Path) -> None:
-    """As in `convexrough run scene.toml | head -0`."""
-    (tmp_path / "a.toml").write_text(scene_text())
-    reading, writing = os.pipe()
-    os.close(reading)
-    ran = shell("run", "a.toml", "--no-figures", cwd=tmp_path, stdout=writing)
-    os.close(writing)
-    assert ran.stderr == ""
-    assert ran.returncode == 1
-    assert (tmp_path / "a-results" / "summary.json").exists()
-
-
-def test_an_interrupt(tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text())
-    interrupt = "lambda *a, **k: os.kill(os.getpid(), signal.SIGINT)"
-    # A job in the background inherits a signal that is ignored; this one must not.
-    before = "import os, signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    before += f"import convexrough.contact as c; c.solve = {interrupt}\n"
-    ran = shell("run", "a.toml", cwd=tmp_path, before=before)
-    assert ran.returncode == 128 + signal.SIGINT
-    assert "Traceback" not in ran.stderr

@@ -223,7 +223,7 @@ def test_no_toml(tmp_path: Path, content: bytes, expected: str) -> None:
 # What `within` is when the file does not say
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("pattern", ["hexagonal", "square"])
 @pytest.mark.parametrize("normal", ["approach = 2e-5", "load = 2e-7", "load = 1e-9"])

@@ -7,26 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
 
-SCENE = """
-[sphere]
-radius = 1.0
-[material]
-contact_modulus = 1.0
-poisson_ratio = 0.3
-[asperities]
-pattern = "hexagonal"
-spacing = 0.0025
-tip_radius = 0.02
-within = 0.0102
-geometry = "summit"
-[normal]
-load = 3.60853389e-7
-[friction]
-coefficient = 0.5
-"""
+SCENE = scene_text(
+    HEXAGONAL + "within = 0.0102", "load = 3.60853389e-7", "[friction]\ncoefficient = 0.5\n"
+)
 
 
 def write(table: str, scene: str = SCENE) -> None:
@@ -41,7 +28,7 @@ def read(name: str) -> dict[str, Any]:
 
 def test_a_run(command: Any) -> None:
     write('[gradient]\nof = "loss"\nfraction = 0.5\n')
-    outcome = command("run", "scene.toml", "--out", "out")
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 0, outcome.err
     assert "gradient of the loss at Q/(fP) = 0.5, load held" in outcome.out
     summary = json.loads(Path("out/summary.json").read_text())["gradient"]
@@ -56,8 +43,6 @@ def test_a_run(command: Any) -> None:
     assert summary["by"]["contact_modulus"] == gradient.contact_modulus
     assert summary["largest_by_height"] == gradient.heights[summary["largest_at"]]
     assert abs(summary["largest_by_height"]) == np.abs(gradient.heights).max()
-    for kind in ("png", "svg"):
-        assert Path(f"out/gradient.{kind}").stat().st_size > 0
 
 
 def printed(out: str) -> dict[str, str]:
@@ -105,7 +90,7 @@ def test_what_is_printed(command: Any) -> None:
 )
 def test_mistakes(command: Any, table: str, said: str) -> None:
     write(f"[gradient]\n{table}\n")
-    outcome = command("run", "scene.toml", "--out", "out")
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 2
     assert said in outcome.err
 
@@ -116,7 +101,7 @@ def test_where_there_is_none(command: Any) -> None:
     said = "[gradient] fraction: found 1, a force of 1.804266945e-07: gross sliding, expected a "
     said += "force below f P: with the approach held f P may fall below the force"
     write(f"[gradient]\n{keys}\n[cycle]\nmaximum = [0.5]\n")
-    outcome = command("run", "scene.toml", "--out", "out")
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 3
     summary = json.loads(Path("out/summary.json").read_text())
     assert said in summary["gradient"]["none_because"]
@@ -129,6 +114,6 @@ def test_where_there_is_none(command: Any) -> None:
 
 def test_nothing_touches(command: Any) -> None:
     write('[gradient]\nof = "load"\n', SCENE.replace("load = 3.60853389e-7", "approach = -1e-6"))
-    outcome = command("run", "scene.toml", "--out", "out")
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 3
     assert "gradient of the load: none, contact: found no load, expected" in outcome.out

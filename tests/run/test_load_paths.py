@@ -8,26 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
 
-SCENE = """
-[sphere]
-radius = 1.0
-[material]
-contact_modulus = 1.0
-poisson_ratio = 0.3
-[asperities]
-pattern = "hexagonal"
-spacing = 0.0025
-tip_radius = 0.02
-within = 0.0102
-geometry = "summit"
-[normal]
-approach = 5e-5
-[friction]
-coefficient = 0.5
-"""
+FRICTION = "[friction]\ncoefficient = 0.5\n"
+SCENE = scene_text(HEXAGONAL + "within = 0.0102", more=FRICTION)
 PATHS = """
 [path]
 loads = [0.6, 0.6, 1.0, 1.0]
@@ -44,7 +30,7 @@ force_amplitudes = [1.8042669437333e-07, -1.8042669437333e-07]
 
 def test_a_run(command: Any) -> None:
     Path("scene.toml").write_text(SCENE + PATHS)
-    outcome = command("run", "scene.toml", "--out", "out")
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 0, outcome.err
     assert "indentations increase with the load: proved" in outcome.out
     summary = json.loads(Path("out/summary.json").read_text())
@@ -63,8 +49,6 @@ def test_a_run(command: Any) -> None:
     for name in ("steady", "shakedown"):
         with Path(f"out/{name}.csv").open() as file:
             assert len(list(csv.DictReader(file))) == 61
-    for stem in ("path", "path_stick_slip", "steady", "shakedown", "shakedown_map"):
-        assert Path(f"out/{stem}.png").stat().st_size > 5000
 
 
 @pytest.mark.parametrize(
@@ -121,7 +105,7 @@ kind = "{kind}"
 reference = 1.80426694373333e-07
 '''
     Path("scene.toml").write_text(SCENE + table)
-    outcome = command("run", "scene.toml", "--out", "out")
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 0, outcome.err
     limit = json.loads(Path("out/summary.json").read_text())["shakedown"]
     assert limit["factor"] == pytest.approx(factor, rel=1e-9)
@@ -132,23 +116,12 @@ reference = 1.80426694373333e-07
         columns = next(csv.reader(file))
     slips = ["slip"] if kind == "elastic" else ["slip_0_x", "slip_0_y", "slip_1_x", "slip_1_y"]
     assert [name for name in columns if name.startswith("slip")] == slips
-    assert Path("out/shakedown.png").stat().st_size > 5000
 
 
-SHADED = """
-[sphere]
-radius = 1e6
-[material]
-contact_modulus = 1.0
-poisson_ratio = 0.3
-[asperities]
-pattern = "file"
-path = "shaded.csv"
-geometry = "summit"
-[normal]
-approach = 1.4
-[friction]
-coefficient = 0.5
+SHADED = scene_text(
+    'pattern = "file"\npath = "shaded.csv"\ngeometry = "summit"', "approach = 1.4", FRICTION
+).replace("radius = 1.0", "radius = 1e6")
+STAGES = """
 [path]
 loads = [0.8, 1.0]
 forces = [0.0, 0.1]
@@ -169,9 +142,9 @@ def test_nothing_is_proved_where_order_fails(command: Any) -> None:
     turn = 2 * np.pi * np.arange(5) / 5
     rows = ["0,0,-0.06,0.05", *(f"{np.cos(t)},{np.sin(t)},0,1" for t in turn)]
     Path("shaded.csv").write_text("\n".join(["x,y,height,tip_radius", *rows]))
-    Path("scene.toml").write_text(SHADED.replace("LOAD", "1.0").split("[path]")[0])
+    Path("scene.toml").write_text(SHADED)
     pressed = json.loads(command("run", "scene.toml", "--no-figures", "--json").out)["normal"]
-    Path("scene.toml").write_text(SHADED.replace("LOAD", repr(pressed["load"])))
+    Path("scene.toml").write_text(SHADED + STAGES.replace("LOAD", repr(pressed["load"])))
     outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 3
     summary = json.loads(Path("out/summary.json").read_text())
@@ -205,7 +178,7 @@ def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
 def test_losses_against_phase(command: Any) -> None:
     asked = "chords = 12 }\nphases = [0.0, 1.2]\nfactors = [0.5, 1.0]"
     Path("scene.toml").write_text(SCENE + PATHS.replace("chords = 12 }", asked))
-    outcome = command("run", "scene.toml", "--out", "out")
+    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 0, outcome.err
     assert "loss against phase" in outcome.out
     summary = json.loads(Path("out/summary.json").read_text())["steady"]["phase_losses"]
@@ -216,4 +189,3 @@ def test_losses_against_phase(command: Any) -> None:
     assert all(float(row["loss_error"]) >= 0 for row in rows)
     steady = json.loads(Path("out/summary.json").read_text())["steady"]["loss"]
     assert summary["loss"][2] == pytest.approx(steady, rel=1e-12, abs=0.0)  # the ellipse itself
-    assert Path("out/phase_losses.png").stat().st_size > 5000

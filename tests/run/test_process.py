@@ -1,5 +1,7 @@
 """The command as a process: `python -m`, interrupts, and an output that nobody takes."""
 
+import json
+import os
 import signal
 import subprocess
 import sys
@@ -16,23 +18,58 @@ START = (
 )
 
 
-def module(*arguments: str, cwd: Path, stdout: int) -> subprocess.CompletedProcess[str]:
+def module(
+    *arguments: str, cwd: Path, stdout: int = subprocess.PIPE
+) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "convexrough", *arguments]
     return subprocess.run(
         command, cwd=cwd, stdout=stdout, stderr=subprocess.PIPE, text=True, check=False
     )
 
 
+def test_help_imports_nothing_heavy() -> None:
+    heavy = {"pydantic", "matplotlib", "rich", "cvxpy", "scipy.spatial", "scipy.linalg"}
+    loaded = f"print(*({heavy} & set(sys.modules)))"
+    code = f"import sys, convexrough.cli as c; c.main(['--help']); {loaded}"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert all(name in ran.stdout for name in ("run", "verify", "new", "paper"))
+    assert ran.stdout.splitlines()[-1] == ""
+
+
+def test_exit_status_of_a_process(tmp_path: Path) -> None:
+    (tmp_path / "good.toml").write_text(scene_text())
+    good = module("run", "good.toml", "--json", "--no-figures", cwd=tmp_path)
+    assert (good.returncode, good.stderr) == (0, "")
+    json.loads(good.stdout)
+    bad = module("run", "none.toml", cwd=tmp_path)
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert "Traceback" not in bad.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["good-results", "good.toml"]
+
+
+def test_a_reader_that_leaves(tmp_path: Path) -> None:
+    """As in `convexrough run scene.toml | head -0`."""
+    (tmp_path / "a.toml").write_text(scene_text())
+    reading, writing = os.pipe()
+    os.close(reading)
+    ran = module("run", "a.toml", "--no-figures", cwd=tmp_path, stdout=writing)
+    os.close(writing)
+    assert (ran.returncode, ran.stderr) == (1, "")
+    assert (tmp_path / "a-results" / "summary.json").exists()
+
+
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_a_shell_is_given_a_script(
     shell: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("_CONVEXROUGH_COMPLETE", f"{shell}_source")
-    done = module(cwd=tmp_path, stdout=subprocess.PIPE)
+    done = module(cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert f"{shell}_complete" in done.stdout
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("words", "completed"), [("ver", ["plain,verify"]), ("run --pr", ["plain,--proof"])]
 )
@@ -42,10 +79,11 @@ def test_a_line_is_completed(
     monkeypatch.setenv("_CONVEXROUGH_COMPLETE", "bash_complete")
     monkeypatch.setenv("COMP_WORDS", f"convexrough {words}")
     monkeypatch.setenv("COMP_CWORD", str(len(words.split())))
-    done = module(cwd=tmp_path, stdout=subprocess.PIPE)
+    done = module(cwd=tmp_path)
     assert (done.returncode, done.stdout.split(), done.stderr) == (0, completed, "")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("delay", [0.02, 0.1, 0.3, 0.6, 1.0])
 def test_an_interrupt_at_any_moment(tmp_path: Path, delay: float) -> None:
     rough = HEXAGONAL.replace("0.0025", "1e-4").replace("0.02", "8e-4")

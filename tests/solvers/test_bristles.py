@@ -28,6 +28,7 @@ def errors(reference: cr.Contact, prescribed: dict[str, Any], solver: BristleQP)
     return (loads - reference.loads) / reference.loads.max()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize("name", ["rough", "rough, closest"])
 def test_second_order(name: str, control: str) -> None:
@@ -40,6 +41,7 @@ def test_second_order(name: str, control: str) -> None:
     assert order == pytest.approx(2.0, abs=0.15)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize("name", NAMED)
 def test_every_scene(name: str, control: str) -> None:

@@ -6,10 +6,11 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
+from attacks import ATTACKS, attack
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, STEEL
+from scenes import MATERIAL, PAPER_APPROACH, STEEL, solve_exactly
 
 import convexrough as cr
 from convexrough.influence import Kind
@@ -99,7 +100,7 @@ def residual(problem: NormalProblem, contact: cr.Contact) -> float:
     return problem.residual(loads, approach) / approach
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("kind", ["lattice", "scattered"])
 @pytest.mark.parametrize("name", SCENES)
@@ -147,7 +148,7 @@ def test_loads_tend_to_those_of_a_smooth_sphere(k: int) -> None:
     assert 0 < 1 - contact.load / smooth < 0.5 / np.sqrt(k)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(0.02, 1.0),
@@ -185,6 +186,7 @@ def test_manufactured_contacts(
     assert not ((contact.status == "contact") & (gaps > 1e-9 * approach)).any()
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("kind", ["none", "one", "far", "huge", "random", "opposite"])
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_any_start(kind: str, control: str) -> None:
@@ -205,6 +207,7 @@ def test_any_start(kind: str, control: str) -> None:
     assert_allclose(contact.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("approach", "steps"), [(-1e-6, 0), (1e-12, 6), (1e-8, 8), (1e-6, 8), (1e-5, 8), (1e-4, 12)]
 )
@@ -221,7 +224,7 @@ def test_approaches_of_any_size(approach: float, steps: int) -> None:
         assert_allclose(again.loads, contact.loads, rtol=0, atol=1e-9 * contact.loads.max())
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("above", [1e-7, 4e-6])
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_a_far_tall_asperity_is_found(control: str, above: float) -> None:
@@ -241,6 +244,7 @@ def test_a_far_tall_asperity_is_found(control: str, above: float) -> None:
     assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_those_left_out_at_first_are_found(control: str) -> None:
     """The contact lies beside the axis, and across from it there are peaks. In rings about the axis
@@ -279,6 +283,7 @@ def test_units_do_not_matter(length: float, force: float) -> None:
     assert (contact.status == known.status).all()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("angle", [0.0, 0.7, np.pi / 2])
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_order_and_orientation_do_not_matter(control: str, angle: float) -> None:
@@ -296,25 +301,13 @@ def test_order_and_orientation_do_not_matter(control: str, angle: float) -> None
 
 
 @pytest.mark.sample(2)
-@pytest.mark.parametrize("kind", ["dropped", "perturbed", "swapped", "single precision", "added"])
+@pytest.mark.parametrize("kind", sorted({*ATTACKS} - {"zero"}))
 def test_the_certificate_under_attack(kind: str) -> None:
     """Its bounds hold and its words stay right for thousands of wrong loads, too."""
     pressed, approach = SCENES["rough"]
     known = dense_answer("rough")
     for seed in range(3):
-        rng = np.random.default_rng(seed)
-        wrong, loaded = known.loads.copy(), np.flatnonzero(known.loads)
-        if kind == "dropped":
-            wrong[rng.choice(loaded, 1 + 9 * seed)] = 0.0
-        elif kind == "perturbed":
-            wrong *= 1 + 10.0 ** rng.uniform(-12, -2) * rng.uniform(-1, 1, len(wrong))
-        elif kind == "swapped":
-            i, j = rng.choice(loaded, 2)
-            wrong[[i, j]] = wrong[[j, i]]
-        elif kind == "single precision":
-            wrong = wrong.astype(np.float32).astype(np.float64)
-        else:
-            wrong[rng.integers(len(wrong), size=5)] += 10.0 ** rng.uniform(-9, 0) * wrong.max()
+        wrong = attack(kind, known.loads, np.random.default_rng(seed))
         for prescribed in ({"approach": approach}, {"load": known.load}):
             judged = cr.certify(pressed, wrong, **prescribed, influence="lattice")
             slack = known.certificate.load_errors + 1e-14 * known.loads.max()
@@ -329,15 +322,7 @@ def test_fifty_digits_of_some_hundred() -> None:
     """A contact through transforms, proved in ball arithmetic."""
     pressed = scene(1.6, height_std=1e-6, seed=9)
     contact = cr.press(pressed, approach=PAPER_APPROACH, influence="lattice")
-    exact = multiprecision.solve(
-        pressed.asperities.positions,
-        pressed.asperities.tip_radii,
-        pressed.asperities.heights,
-        sphere_radius=1.0,
-        contact_modulus=1.0,
-        approach=PAPER_APPROACH,
-        start=contact.loads,
-    )
+    exact = solve_exactly(pressed, approach=PAPER_APPROACH, start=contact.loads)
     truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
     assert contact.certificate.holds
     assert truth.max() <= 1e-13 * contact.loads.max()
@@ -346,6 +331,7 @@ def test_fifty_digits_of_some_hundred() -> None:
     assert (gaps <= contact.certificate.gap_errors).all()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("power", [-100, -60, 60, 90])
 def test_extreme_units_and_loads_a_little_off(power: int) -> None:
     """Sums of 1 / r^3 stay in the range of single precision, and the bounds hold."""
@@ -368,34 +354,35 @@ def test_extreme_units_and_loads_a_little_off(power: int) -> None:
     assert through.model_error == pytest.approx(true.model_error, rel=0.02)
 
 
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("kind", ["lattice", "scattered"])
-def test_few_touching_under_a_load(kind: Kind) -> None:
+def test_few_touching_under_a_load(kind: Kind, seed: int) -> None:
     """A defect that is the same at all that touch lies wholly in the change of the approach."""
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     flat = cr.Asperities.square(spacing=2.5e-3, tip_radius=0.01, within=0.05)
-    for _ in range(3 if kind == "lattice" else 1):
-        heights = flat.distances**2 / 2
-        few = int(rng.integers(1, 6))
-        heights[rng.choice(len(flat), few, replace=False)] += rng.uniform(1e-5, 3e-5, few)
-        asperities = cr.Asperities(flat.positions, 0.01, heights)
-        pressed = cr.Scene(1.0, asperities, MATERIAL, friction=0.3, geometry="summit")
-        load = 0.5 * cr.press(pressed, approach=1e-6).load
-        contact = cr.press(pressed, load=load, influence=kind)
-        assert contact.certificate.holds
-        assert cr.shear(contact, force=0.15 * load).certificate.holds
+    heights = flat.distances**2 / 2
+    few = int(rng.integers(1, 6))
+    heights[rng.choice(len(flat), few, replace=False)] += rng.uniform(1e-5, 3e-5, few)
+    asperities = cr.Asperities(flat.positions, 0.01, heights)
+    pressed = cr.Scene(1.0, asperities, MATERIAL, friction=0.3, geometry="summit")
+    load = 0.5 * cr.press(pressed, approach=1e-6).load
+    contact = cr.press(pressed, load=load, influence=kind)
+    assert contact.certificate.holds
+    assert cr.shear(contact, force=0.15 * load).certificate.holds
 
 
 @pytest.mark.parametrize("approach", [0.0, -1e-6, 5e-5])
-def test_news_of_the_steps(approach: float) -> None:
+def test_progress_of_the_steps(approach: float, caplog: pytest.LogCaptureFixture) -> None:
     asperities = cr.Asperities.square(
         spacing=2.5e-3, tip_radius=0.02, within=0.01, height_std=1e-5, seed=1
     )
-    news: list[str] = []
+    caplog.set_level("INFO", logger="convexrough")
     cr.press(
         cr.Scene(1.0, asperities, MATERIAL, geometry="summit"),
         approach=approach,
-        announce=news.append,
     )
+    news = caplog.messages
     assert news[-1] == "certifying"
     assert news[0].startswith("step 1, residual ")
     assert " touching" in news[0]

@@ -37,6 +37,7 @@ def cost(program: Any, x: Any) -> float:
     return float(0.5 * x @ (whole @ x) + program.linear @ x)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize("five", [False, True])
 def test_the_cone_program_holds_the_contact(five: bool, control: str) -> None:

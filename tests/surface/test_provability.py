@@ -18,12 +18,12 @@ def press(asperities: cr.Asperities) -> cr.Contact:
     return cr.press(scene, load=300.0)
 
 
-def test_each_level_is_a_press() -> None:
+def test_each_level_is_a_press(caplog: pytest.LogCaptureFixture) -> None:
     summits = MAP.summits(0.0)
-    told: list[str] = []
-    curve = provability(summits, press, levels=[0.2, 0.0, 0.05, 0.05], announce=told.append)
+    caplog.set_level("INFO", logger="convexrough")
+    curve = provability(summits, press, levels=[0.2, 0.0, 0.05, 0.05])
     assert curve.prune.tolist() == [0.0, 0.05, 0.2]
-    assert len(told) == 3
+    assert sum(line.startswith("pruning") for line in caplog.messages) == 3
     for i, prune in enumerate(curve.prune):
         left = MAP.summits(float(prune))
         contact = press(left)

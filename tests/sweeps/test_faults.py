@@ -16,7 +16,7 @@ from typing import Any
 
 import psutil
 import pytest
-from sweep_files import SMALL, same, started, tables, told, toml
+from sweep_files import SMALL, reported_to, same, started, tables, toml
 
 import convexrough as cr
 from convexrough.sweeps.folder import open_folder
@@ -113,7 +113,7 @@ def test_workers_are_killed_at_any_moment(
             left -= 1
 
     while True:
-        with suppress(cr.WorkerError), told(kill):
+        with suppress(cr.WorkerError), reported_to(kill):
             cr.sweep(file / "a.toml", workers=2, out=file / "a-sweep", resume=True)
         if rows(file) == SCENES:
             break
@@ -156,12 +156,12 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, event: str) -> Non
 FULL = """
 import resource
 import convexrough as cr
-from sweep_files import told
+from sweep_files import reported_to
 def fill(news):
     if "of 64 scenes" in news:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
 try:
-    with told(fill):
+    with reported_to(fill):
         cr.sweep("a.toml", workers=1, out="a-sweep")
 except cr.FileError as error:
     print(error)

@@ -232,9 +232,9 @@ def test_the_figure(contact: cr.Contact) -> None:
 
 def test_the_page_has_every_option_and_exit_status(command: Any) -> None:
     page = (Path(__file__).parents[2] / "docs" / "how-to" / "verify.md").read_text()
-    told = command("verify", "--help").out
-    for option in re.findall(r"^ +(--\w+)", told, re.M):
+    shown = command("verify", "--help").out
+    for option in re.findall(r"^ +(--\w+)", shown, re.M):
         assert f"`{option}" in page or f" {option} " in page, option
     for status in ("0 only if", "2 wrong", "3 otherwise", "4 no"):
-        assert status in " ".join(told.split())
+        assert status in " ".join(shown.split())
         assert f"| {status[0]} |" in page

@@ -125,7 +125,7 @@ class Cycled(Result):
             chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)
         elif stage.loop_asperities != "all":
             chosen = stage.loop_asperities
-        return loops(self.found, stage.loop_points or affordable, None, chosen)
+        return loops(self.found, stage.loop_points or affordable, chosen)
 
     @cached_property
     def worn(self) -> list[Fretting]:

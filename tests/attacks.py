@@ -1,0 +1,72 @@
+"""Wrong loads that a certificate is given, and what it must never say of any."""
+
+from typing import Any
+
+import multiprecision
+import numpy as np
+from numpy.typing import NDArray
+
+import convexrough as cr
+
+Array = NDArray[np.float64]
+
+
+def assert_honest(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
+    """Every word agrees with the proved solution, and every bound covers the distance to it."""
+    for word, load, gap in zip(certificate.status, exact.loads, exact.gaps, strict=True):
+        assert word in ("contact", "open", "undecided")
+        assert word != "contact" or load > 0
+        assert word != "open" or gap > 0
+    assert (np.abs(multiprecision.errors(loads, exact.loads)) <= certificate.load_errors).all()
+    gap_errors = np.abs(multiprecision.errors(certificate.gaps, exact.gaps))
+    assert (gap_errors <= certificate.gap_errors).all()
+    drift = abs(float(multiprecision.errors([certificate.approach], [exact.approach])[0]))
+    assert drift <= certificate.approach_error
+
+
+def attack(kind: str, loads: Array, rng: np.random.Generator) -> Array:
+    """Wrong loads: each a mistake that a user or a solver could make."""
+    wrong = loads.copy()
+    loaded = np.flatnonzero(loads)
+    if kind == "dropped" and len(loaded):
+        wrong[rng.choice(loaded)] = 0.0
+    elif kind == "smallest dropped" and len(loaded):
+        wrong[loaded[np.argmin(loads[loaded])]] = 0.0
+    elif kind == "added":
+        wrong[rng.integers(len(loads))] += loads.max() * 10.0 ** rng.uniform(-16, 0)
+    elif kind == "perturbed":
+        wrong *= 1 + 10.0 ** rng.uniform(-15, -1) * rng.standard_normal(len(loads))
+        wrong = np.maximum(wrong, 0.0)
+    elif kind == "swapped":
+        i, j = rng.integers(len(loads), size=2)
+        wrong[[i, j]] = wrong[[j, i]]
+    elif kind == "zero":
+        wrong[:] = 0.0
+    elif kind == "random":
+        wrong = loads.max() * rng.random(len(loads)) ** 4
+    elif kind == "huge":
+        wrong = loads * 1e6
+    elif kind == "scaled":
+        wrong = loads * (1 + rng.uniform(-0.1, 0.1))
+    elif kind == "rounded":
+        digits = int(rng.integers(1, 16))
+        wrong = np.array([float(f"{load:.{digits}e}") for load in loads])
+    elif kind == "single precision":
+        wrong = loads.astype(np.float32).astype(np.float64)
+    return wrong
+
+
+ATTACKS = [
+    "none",
+    "dropped",
+    "smallest dropped",
+    "added",
+    "perturbed",
+    "swapped",
+    "zero",
+    "random",
+    "huge",
+    "scaled",
+    "rounded",
+    "single precision",
+]
