@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,34 +10,14 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.contact import Contact, solve
 from convexrough.errors import InputError, TableError
-from convexrough.friction.verdict import ShearVerdict, claims_sliding, verify_shear
-from convexrough.normal.claims import Claim
+from convexrough.friction.verdict import claims_sliding, verify_shear
 from convexrough.normal.problem import NormalProblem
 from convexrough.verdict.claims import Claimed, Manner, read_loads, read_shear_forces
-from convexrough.verdict.verdict import Verdict, verify_on
+from convexrough.verdict.report import Verified
+from convexrough.verdict.verdict import verify_on
 
 #: What a file may call an asperity under shear. "undecided" claims nothing: then the force does.
 WORDS = ("sliding", "partial", "sticking", "open", "undecided")
-
-
-class Verified(NamedTuple):
-    """The verdicts on the claims of files; `notes` say how these were read.
-
-    sheared : on shear forces, None without these
-    """
-
-    verdict: Verdict
-    sheared: ShearVerdict | None
-    notes: list[str]
-
-    @property
-    def claims(self) -> list[Claim]:
-        """One or both."""
-        return [self.verdict, *([] if self.sheared is None else [self.sheared])]
-
-    @property
-    def holds(self) -> bool:
-        return all(claim.holds for claim in self.claims)
 
 
 def verify_files(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,18 +11,39 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Indices
 from convexrough.compare import joined
+from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plausibility import described_modulus
 from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import aligned, bound, listed
 from convexrough.tabular.units import NAMELESS, UnitNames
-from convexrough.verdict.files import Verified
+from convexrough.verdict.verdict import Verdict
 
 #: From this part on errors are said in per cent.
 PERCENT = 1e-4
 
 #: Asperities that a list on the terminal names before it says how many more there are.
 MOST_LISTED = 10
+
+
+class Verified(NamedTuple):
+    """The verdicts on the claims of files; `notes` say how these were read.
+
+    sheared : on shear forces, None without these
+    """
+
+    verdict: Verdict
+    sheared: ShearVerdict | None
+    notes: list[str]
+
+    @property
+    def claims(self) -> list[Claim]:
+        """One or both."""
+        return [self.verdict, *([] if self.sheared is None else [self.sheared])]
+
+    @property
+    def holds(self) -> bool:
+        return all(claim.holds for claim in self.claims)
 
 
 def verdict_summary(found: Verified) -> dict[str, Any]:
