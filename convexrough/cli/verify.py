@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from convexrough.run.scene_file import SceneFile
     from convexrough.tabular.units import UnitNames
     from convexrough.verdict.claims import Manner
-    from convexrough.verdict.files import Verified
+    from convexrough.verdict.report import Verified
 
 
 def claim_options(command: Command) -> Command:
