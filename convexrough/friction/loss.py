@@ -72,7 +72,7 @@ def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
         list[Ball](),
     )
     known = list(dict.fromkeys(at))
-    for start in range(0, len(known), some := max(1, NUMBERS // len(levels.candidates))):
+    for start in range(0, len(known), some := max(1, NUMBERS // (1 + len(levels.candidates)))):
         slip, slide = _of_pairs(levels, known[start : start + some])
         found.append((slip + slide).sum())
     place = {pair: k for k, pair in enumerate(known)}
@@ -184,7 +184,7 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
         parts += [(weight, (P, R), (L, M)) for (P, L), (R, M) in pairwise(edges)]
     levels.prepare(load for _, *both in parts for pair in both for load in pair)
     totals = [Ball.exact(np.zeros(len(levels.candidates)))] * 2
-    some = max(1, NUMBERS // (4 * len(levels.candidates)))
+    some = max(1, NUMBERS // (4 + 4 * len(levels.candidates)))
     for start in range(0, len(parts), some):
         here = parts[start : start + some]
         pairs = [(P, L) for _, loads, fronts in here for P in loads for L in fronts]

@@ -189,12 +189,7 @@ def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
 
 
 def _points(positions: ArrayLike) -> Array:
-    try:
-        if np.asarray(positions).dtype.kind in "USV":  # text stands for no number
-            raise TypeError("no numbers")
-        points = np.array(positions, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError("positions", found=repr(positions)[:60], expected="numbers") from error
+    points = checks.numbers("positions", positions)
     if points.size == 0:
         raise InputError("positions", found="no asperity", expected="at least one")
     if points.ndim != 2 or points.shape[1] != 2:
