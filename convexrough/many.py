@@ -210,14 +210,16 @@ def press_many(
     controls = checks.array(name, given, length=m, sign=sign, one="scene")
     totals = {each: np.zeros(m) for each in TOTALS}
     loads, errors = np.zeros((2, m, n))
-    words, alone = np.full((m, n), "undecided"), np.ones(m, dtype=bool)
+    statuses, alone = np.full((m, n), "undecided"), np.ones(m, dtype=bool)
     with threads.one_where(MATRICES):
         rows = list(_in_rows(scenes, controls, by_load))
     for each in rows:
         found, at, units = each.high, each.places, each.problem.units
         alone[at] = False
         loads[at], errors[at] = found.loads.value * units.force, found.loads.error * units.force
-        words[at] = np.where(found.touching, "contact", np.where(found.open, "open", "undecided"))
+        statuses[at] = np.where(
+            found.touching, "contact", np.where(found.open, "open", "undecided")
+        )
         totals["approaches"][at] = found.approach.value * units.length
         totals["approach_errors"][at] = found.approach.error * units.length
         off = np.abs(loads[at].sum(axis=1) - found.load.value * units.force)
@@ -226,7 +228,7 @@ def press_many(
     for k in np.flatnonzero(alone).tolist():
         one = known[k] = _pressed(scenes[k], name, controls[k])
         proof = one.certificate
-        loads[k], errors[k], words[k] = one.loads, proof.load_errors, proof.status
+        loads[k], errors[k], statuses[k] = one.loads, proof.load_errors, proof.status
         totals["approaches"][k], totals["approach_errors"][k] = one.approach, proof.approach_error
         rounding = n * ROUNDOFF * one.load  # of the sum
         totals["load_errors"][k] = (proof.load_errors.sum() + rounding) * (1 + SAFETY)
@@ -237,7 +239,7 @@ def press_many(
         controls=controls,
         asperity_loads=frozen(loads),
         asperity_load_errors=frozen(errors),
-        status=frozen(words),
+        status=frozen(statuses),
         alone=frozen(np.flatnonzero(alone)),
         **{each: frozen(values) for each, values in totals.items()},
     )
@@ -392,13 +394,13 @@ def _cycles(
     travel = f * ((2.0 - nu) / ((1.0 - nu) * 2.0)) * units.length
     loss = (slip + slide).sum() * 4.0 * (f * units.force) * travel
     moved = (high.approach - low.approach) * travel
-    words = np.where(high.open, "open", np.full(high.open.shape, "undecided", dtype="<U12"))
-    words[high.touching & low.touching] = "partial"
-    words[high.touching & low.open] = "sliding"
+    statuses = np.where(high.open, "open", np.full(high.open.shape, "undecided", dtype="<U12"))
+    statuses[high.touching & low.touching] = "partial"
+    statuses[high.touching & low.open] = "sliding"
     return found.good & ordered & inside, {
         "losses": loss.value,
         "loss_errors": loss.error,
         "displacement_amplitudes": moved.value,
         "displacement_errors": moved.error,
-        "status": words,
+        "status": statuses,
     }

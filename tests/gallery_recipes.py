@@ -125,8 +125,8 @@ def _solved(threshold: str, side: int) -> Recipe:
     theta, what = THRESHOLDS[threshold]
     radius = theta * (1 + side * ASIDE) * math.pi / 4 * SPACING
     scene, approach = manufactured(APART, [TIP_RADIUS] * 2, [radius] * 2, [0.0] * 2)
-    word = "above" if side > 0 else "below"
-    why = f"convexity number 1e-9 {word} {threshold}, {what}; the discs overlap"
+    side_name = "above" if side > 0 else "below"
+    why = f"convexity number 1e-9 {side_name} {threshold}, {what}; the discs overlap"
     return Recipe("convexity", why, scene, approach=approach)
 
 
@@ -136,8 +136,8 @@ def _bounded(threshold: str, side: int) -> Recipe:
     radius = theta * (1 + side * ASIDE) * math.pi / 4 * SPACING
     scene = placed(APART, sphere_radius=1e6)
     relative = 1.0 / (1e-6 + 1.0 / TIP_RADIUS)
-    word = "above" if side > 0 else "below"
-    why = f"convexity number of the a priori box 1e-9 {word} {threshold}, {what}"
+    side_name = "above" if side > 0 else "below"
+    why = f"convexity number of the a priori box 1e-9 {side_name} {threshold}, {what}"
     return Recipe("convexity", why, scene, approach=radius * radius / relative)
 
 
@@ -163,12 +163,12 @@ def _unequal(crowding: float) -> Recipe:
     return Recipe("convexity", why, scene, approach=approach)
 
 
-def _discs(count: int, crowding: float, word: str) -> Recipe:
+def _discs(count: int, crowding: float, side_name: str) -> Recipe:
     """Equal contacts whose radii sum to this part of their distance."""
     points = APART if count == 2 else hexagon(1)
     radii = [0.5 * crowding * SPACING] * count
     scene, approach = manufactured(points, [TIP_RADIUS] * count, radii, [0.0] * count)
-    why = f"{count} equal contacts, discs {word}: (a_i + a_j) / r_ij = {crowding:g}"
+    why = f"{count} equal contacts, discs {side_name}: (a_i + a_j) / r_ij = {crowding:g}"
     return Recipe("discs", why, scene, approach=approach)
 
 
@@ -177,14 +177,14 @@ def _loaded(part: float, why: str) -> Recipe:
 
 
 LIMITS: Recipes = {
-    f"convexity-{kind}-{threshold.replace('/', '-')}-{word}": partial(make, threshold, side)
+    f"convexity-{kind}-{threshold.replace('/', '-')}-{side_name}": partial(make, threshold, side)
     for kind, make in (("solution", _solved), ("bound", _bounded))
     for threshold in THRESHOLDS
-    for word, side in (("below", -1), ("above", 1))
+    for side_name, side in (("below", -1), ("above", 1))
 }
 LIMITS |= {
-    f"convexity-fitted-{word}": partial(_unequal, crowding)
-    for word, crowding in (("below", 1.51), ("above", 1.513))
+    f"convexity-fitted-{side_name}": partial(_unequal, crowding)
+    for side_name, crowding in (("below", 1.51), ("above", 1.513))
 }
 LIMITS |= {
     "convexity-end-below": partial(_ending, 0.998, "just convex"),
@@ -193,7 +193,7 @@ LIMITS |= {
 LIMITS |= {
     f"discs-{count}-{name}": partial(_discs, count, crowding, word)
     for count in (2, 7)
-    for name, crowding, word in (
+    for name, crowding, side in (
         ("almost-touching", 0.999, "that almost touch"),
         ("overlapping", 1.05, "that overlap, where the model has ended"),
     )
@@ -232,7 +232,7 @@ KINDS = {
 }
 
 
-#: In a word, on which side of touching.
+#: On which side of touching.
 SIDES = {"gap": "open", "indentation": "in contact"}
 
 
@@ -286,11 +286,11 @@ def _losing(stage: str) -> Recipe:
     radius = STAGES["touching"][0] * distance
     tips = [TIP_RADIUS, *[2.0] * 3]
     scene, _ = manufactured(points, tips, [0.0] + [radius] * 3, [-2e-8, 0.0, 0.0, 0.0])
-    part, fraction, word = STAGES[stage]
+    part, fraction, side = STAGES[stage]
     relative = 1.0 / (1.0 + 1.0 / tips[1])
     radius = part * distance
     load = 4.0 * radius * radius * radius / relative
-    why = f"a short asperity that loses contact as the load rises, no discs overlapping: {word}"
+    why = f"a short asperity that loses contact as the load rises, no discs overlapping: {side}"
     return Recipe("losing-contact", why, scene, load=load, fraction=fraction)
 
 
@@ -411,7 +411,7 @@ UNITS = {
 
 def _in_units(unit: str) -> Recipe:
     """Steel on steel: a ball of 10 mm on 19 asperities, half a micron of approach."""
-    length, force, words = UNITS[unit]
+    length, force, why = UNITS[unit]
     modulus = 210e9 / (2 * (1 - 0.3 * 0.3)) * (force / length / length)
     points = [(x * length, y * length) for x, y in hexagon(2, 25e-6)]
     heights = [1e-8 * length * height for height in roughness(len(points), 6)]
@@ -419,7 +419,7 @@ def _in_units(unit: str) -> Recipe:
     scene = cr.Scene(
         0.01 * length, asperities, cr.Material(modulus, 0.3), FRICTION, geometry="summit"
     )
-    return Recipe("units", words, scene, approach=0.5e-6 * length)
+    return Recipe("units", why, scene, approach=0.5e-6 * length)
 
 
 UNITS_OF: Recipes = {f"units-{unit}": partial(_in_units, unit) for unit in UNITS}

@@ -37,7 +37,7 @@ PROMISED = 1e-4
 SHORTEST = 1e-12
 
 
-class State(Protocol):
+class Iterate(Protocol):
     """A point of the iteration.
 
     unknown  : eta;  forces : p(eta), as far as the constraints let them;  defect : F
@@ -58,7 +58,7 @@ class State(Protocol):
     def scale(self) -> float: ...
 
 
-Point = TypeVar("Point", bound=State)
+Point = TypeVar("Point", bound=Iterate)
 
 
 class Law(Protocol[Point]):

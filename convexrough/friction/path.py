@@ -23,7 +23,7 @@ from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
 from convexrough.friction.shear import limited
-from convexrough.friction.state import States, states_of, used_by, words
+from convexrough.friction.state import States, states_of, statuses_of, used_by
 from convexrough.influence import Kind
 from convexrough.numbers.balls import TINY, UP, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
@@ -54,7 +54,7 @@ class Path(Table, Plottable):
     status         : (m, n) "stuck", "partial", "sliding", "open" or "undecided"
     curves         : the memory curve after each point; it and the fronts rest on order
     order          : "proved" that no indentation falls with the load, as far as the path asks;
-        "proved for one step": words and bounds of states are those of the program with one step
+        "proved for one step": statuses and bounds of states are those of the program with one step
         for each segment, and no loss is proved; "fails": general steps answer, without a proof
     presses        : how many normal problems were solved
     start          : [force] the load of the pressed contact that it starts from; 0 of none
@@ -301,7 +301,7 @@ def _followed(
     if steps is None and (order != "fails" or not levels.proved):
         found = states_of(levels, curves)
         spent, spent_errors = rounded(_cumulated(losses(levels, costs)) * levels.loss_unit)
-        status = np.array([words(levels, each, order) for each in curves])
+        status = np.array([statuses_of(levels, each, order) for each in curves])
         if order == "fails":
             found = found.unproved()
         if order != "proved":

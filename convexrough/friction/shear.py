@@ -17,7 +17,7 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import followed
 from convexrough.friction.levels import AT_THE_END, FrictionLevels, rounded
 from convexrough.friction.order import Order
-from convexrough.friction.state import states_of, stick_radii, words
+from convexrough.friction.state import states_of, statuses_of, stick_radii
 from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -244,7 +244,7 @@ def _state(
         moved = float(found.displacements[0])
     else:
         curve = start.go(levels.load, height)[0]
-        found, status = states_of(levels, [curve]), words(levels, curve, order)
+        found, status = states_of(levels, [curve]), statuses_of(levels, curve, order)
         level = levels.at(levels.load - abs(height))
         radii, radius_errors = stick_radii(levels, level)
         size, off = rounded((levels.top.load - level.load) * levels.force_unit)

@@ -40,7 +40,7 @@ class Batch:
         return f"{self.numbers[0]} to {self.numbers[-1]}"
 
 
-class Rows(NamedTuple):
+class BatchRows(NamedTuple):
     """The rows of a batch, and the versions of the programs that computed them."""
 
     columns: Columns
@@ -54,12 +54,12 @@ def different(versions: Mapping[str, str]) -> str:
     return ", ".join(said)
 
 
-def compute(batch: Batch) -> Rows:
+def compute(batch: Batch) -> BatchRows:
     """The rows of a batch: each depends on its scene alone, and says why where that fails."""
     with one_thread:
         press = batch.source.opened()
         rows = [_row(press, number, batch.columns) for number in batch.numbers]
-    return Rows(table(batch, rows), VERSIONS)
+    return BatchRows(table(batch, rows), VERSIONS)
 
 
 def _row(press: Press, number: int, columns: tuple[Column, ...]) -> Row:

@@ -6,15 +6,15 @@ import math
 from collections.abc import Sequence
 
 #: A table: a heading, and rows of as many cells.
-Table = Sequence[Sequence[str]]
+TextTable = Sequence[Sequence[str]]
 
 
-def aligned(table: Table, *, left: int = 0) -> list[str]:
+def aligned(table: TextTable, *, left: int = 0) -> list[str]:
     """Lines of a table, the first `left` columns aligned to the left."""
     return ["  ".join(row).rstrip() for row in _padded(table, left)]
 
 
-def markdown(table: Table, *, left: int) -> list[str]:
+def markdown(table: TextTable, *, left: int) -> list[str]:
     """The same as a table in Markdown."""
     rows = _padded(table, left)
     rule = ["-" * max(3, len(cell)) for cell in rows[0]]
@@ -27,7 +27,7 @@ def bound(value: float) -> str:
     return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
 
 
-def _padded(table: Table, left: int) -> list[list[str]]:
+def _padded(table: TextTable, left: int) -> list[list[str]]:
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return [
         [

@@ -20,7 +20,7 @@ from convexrough.verdict.claims import PLAIN, Claimed, Manner, read_loads, read_
 from convexrough.verdict.verdict import Verdict, verify_on
 
 #: What a file may call an asperity under shear. "undecided" claims nothing: then the force does.
-WORDS = ("sliding", "partial", "sticking", "open", "undecided")
+STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,8 +108,8 @@ def _claims(path: Path | None, forces: Claimed, contact: Contact) -> NDArray[np.
     if forces.status is None:
         return None
     said = np.char.lower(np.char.strip(forces.status))
-    if len(unknown := np.unique(said[~np.isin(said, WORDS)])):
-        valid = ", ".join(WORDS)
+    if len(unknown := np.unique(said[~np.isin(said, STATUSES)])):
+        valid = ", ".join(STATUSES)
         named = [repr(str(each)) for each in unknown[:10]]
         mistakes = [f"column status: found {each}, expected {valid}" for each in named]
         raise TableError(str(path), mistakes)

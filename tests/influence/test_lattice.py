@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scenes import paper, rough, steel
 
 import convexrough as cr
-from convexrough.influence.convolution import Box, _pass_roundoffs
+from convexrough.influence.convolution import SiteBox, _pass_roundoffs
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
@@ -360,7 +360,7 @@ def test_passes_of_the_transforms() -> None:
 def test_convolutions(shape: tuple[int, int], power: int) -> None:
     """Also on a box of one row, or one site; and what they lose stays below the bounds."""
     basis = turned(BASES["hexagonal"], 0.4)
-    box = Box(shape, basis)
+    box = SiteBox(shape, basis)
     assert all(p >= 2 * n - 1 for p, n in zip(box.padded, shape, strict=True))
     sites = np.stack(np.unravel_index(np.arange(shape[0] * shape[1]), shape), axis=1) @ basis
     inverse = inverse_distances(sites, sites) ** power
