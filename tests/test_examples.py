@@ -65,6 +65,7 @@ def test_example(path: Path) -> None:
         assert computed == pytest.approx(reference, rel=tolerance, abs=1e-12), name
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_lesson(path: Path, shown: list[int]) -> None:
     """Every claim holds, and a class that runs the script sees its picture in large letters."""

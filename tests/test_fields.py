@@ -34,6 +34,7 @@ def on_circles(contact: cr.Contact, fraction: float, angles: int = 7) -> Any:
     return centres[:, None] + a[:, None, None] * circle
 
 
+@pytest.mark.sample(2)
 def test_the_pressure_of_each_asperity_integrates_to_its_load(contact: cr.Contact) -> None:
     touching = contact.loads > 0
     nodes, weights = np.polynomial.legendre.leggauss(14)
@@ -46,6 +47,7 @@ def test_the_pressure_of_each_asperity_integrates_to_its_load(contact: cr.Contac
     assert_allclose(load, contact.loads[touching], rtol=1e-10)
 
 
+@pytest.mark.sample(2)
 def test_no_pressure_outside_the_discs(contact: cr.Contact) -> None:
     assert (fields.pressure(contact, on_circles(contact, 1 - 1e-6)) > 0).all()
     assert_array_equal(fields.pressure(contact, on_circles(contact, 1 + 1e-6)), 0.0)
@@ -61,6 +63,7 @@ def test_nothing_pressed_nothing_felt() -> None:
     assert_array_equal(fields.peak_pressures(contact), 0.0)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("stretch", [1e-6, 2.0**30])
 @pytest.mark.parametrize("harden", [1e-9, 2.0**40])
 def test_units_do_not_matter(stretch: float, harden: float) -> None:

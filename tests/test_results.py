@@ -5,7 +5,6 @@ import dataclasses
 import doctest
 import importlib
 import pickle
-import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -95,29 +94,32 @@ def on(asperities: cr.Asperities, surface: cr.surface.Surface) -> cr.Contact:
     return cr.press(cr.Scene(radius, asperities, MATERIAL, geometry="summit"), load=10.0)
 
 
-NAMES = tuple(results())
-WITH_TABLES = tuple(name for name in NAMES if hasattr(results()[name], "to_dataframe"))
-DRAWN = tuple(name for name in NAMES if hasattr(results()[name], "plot"))
+def having(method: str) -> dict[str, Any]:
+    return {name: each for name, each in results().items() if hasattr(each, method)}
 
 
 def test_every_kind_is_here() -> None:
     public = {name for name in cr.__all__ if dataclasses.is_dataclass(getattr(cr, name))}
     settings = {"FrictionConic", "FrictionNewton", "Material"}
     sweeps = {"SweepTable"}  # tested in tests/sweeps
-    assert public - settings - sweeps <= set(NAMES)
-    assert set(DRAWN) == {"Contact", "ShearState", "VectorShearState", "Cycle", "Fretting",
+    assert public - settings - sweeps <= set(results())
+    assert set(having("plot")) == {"Contact", "ShearState", "VectorShearState", "Cycle", "Fretting",
                           "History", "Verdict", "Comparison", "LoadPath", "Shakedown",
                           "MemoryCurve", "PhaseLosses", "PathComparison",
                           "Gradient", "Surface", "Summits", "Provability"}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_result_is_printed_on_one_screen(name: str) -> None:
-    lines = repr(results()[name]).split("\n")
-    assert lines[0] == name
-    assert 2 <= len(lines) <= 24
-    assert max(map(len, lines)) <= 110
-    assert "array(" not in repr(results()[name])
+def test_a_result_is_printed_on_one_screen_and_in_a_notebook() -> None:
+    for name, result in results().items():
+        lines = repr(result).split("\n")
+        assert lines[0] == name
+        assert 2 <= len(lines) <= 24, name
+        assert max(map(len, lines)) <= 110, name
+        assert "array(" not in repr(result), name
+        cells = Cells()
+        cells.feed(result._repr_html_())
+        shown = [part.strip() for line in lines for part in line.strip().split("  ", 1)]
+        assert [text.strip() for text in cells.text if text.strip()] == [it for it in shown if it]
 
 
 def test_what_is_printed_is_what_is_there() -> None:
@@ -140,16 +142,6 @@ class Cells(HTMLParser):
         self.text.append(data)
 
 
-@pytest.mark.sample(8)
-@pytest.mark.parametrize("name", NAMES)
-def test_a_notebook_shows_the_same_lines(name: str) -> None:
-    cells = Cells()
-    cells.feed(results()[name]._repr_html_())
-    lines = [line.strip().split("  ", 1) for line in repr(results()[name]).split("\n")]
-    shown = [part.strip() for line in lines for part in line]
-    assert [text.strip() for text in cells.text if text.strip()] == [it for it in shown if it]
-
-
 def arrays(record: Any) -> Iterator[np.ndarray[Any, Any]]:
     """Those of a result and of the results inside."""
     for field in dataclasses.fields(record):
@@ -164,19 +156,16 @@ def arrays(record: Any) -> Iterator[np.ndarray[Any, Any]]:
                     yield from arrays(each)
 
 
-@pytest.mark.sample(16)
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize(
-    "copied", [lambda it: pickle.loads(pickle.dumps(it)), copy.deepcopy], ids=["pickle", "deepcopy"]
-)
-def test_pickling_keeps_every_bit_and_what_is_read_only(name: str, copied: Any) -> None:
-    first, second = results()[name], copied(results()[name])
-    assert type(second) is type(first)
-    assert repr(second) == repr(first)
-    for one, other in zip(arrays(first), arrays(second), strict=True):
-        assert one is not other
-        np.testing.assert_array_equal(one, other)
-        assert not other.flags.writeable
+def test_copies_keep_every_bit_and_what_is_read_only() -> None:
+    replace = getattr(copy, "replace", dataclasses.replace)  # copy.replace is new in Python 3.13
+    for name, first in results().items():
+        assert repr(replace(first)) == repr(first), name
+        for second in (pickle.loads(pickle.dumps(first)), copy.deepcopy(first)):
+            assert (type(second), repr(second)) == (type(first), repr(first))
+            for one, other in zip(arrays(first), arrays(second), strict=True):
+                assert one is not other
+                np.testing.assert_array_equal(one, other)
+                assert not other.flags.writeable
 
 
 @pytest.mark.parametrize(
@@ -206,16 +195,6 @@ def test_a_pickled_contact_goes_on() -> None:
     np.testing.assert_array_equal(state.forces, results()["ShearState"].forces)
 
 
-@pytest.mark.sample(8)
-@pytest.mark.parametrize("name", NAMES)
-def test_replace(name: str) -> None:
-    replace = getattr(copy, "replace", dataclasses.replace)  # copy.replace is new in Python 3.13
-    result = results()[name]
-    assert repr(replace(result)) == repr(result)
-    first = dataclasses.fields(result)[0].name
-    assert getattr(replace(result, **{first: getattr(result, first)}), first) is not None
-
-
 def columns(result: Any) -> dict[str, np.ndarray[Any, Any]]:
     """Every array that a result says it has, by the name of one value."""
     arrays = result._along.values() if hasattr(result, "_along") else ()
@@ -229,34 +208,27 @@ def columns(result: Any) -> dict[str, np.ndarray[Any, Any]]:
     }
 
 
-@pytest.mark.parametrize("name", WITH_TABLES)
-def test_a_data_frame_has_the_arrays(name: str) -> None:
-    result = results()[name]
-    frame = result.to_dataframe()
-    rows = {"History": "point", "Loop": "point", "Comparison": "entry", "LoadPath": "point"}
-    rows |= {"MemoryCurve": "vertex", "PhaseLosses": "ellipse", "PathComparison": "entry"}
-    rows |= {"Provability": "level", "Contacts": "scene", "Cycles": "scene"}
-    assert frame.index.name == rows.get(name, "asperity")
-    for column, values in columns(result).items():
-        if values.ndim == 1 and column in frame.columns:
-            np.testing.assert_array_equal(frame[column].to_numpy(), values)
-        elif f"{column}_x" in frame.columns:
-            np.testing.assert_array_equal(frame[f"{column}_y"].to_numpy(), values[:, 1])
-    for key, value in frame.attrs.items():
-        assert getattr(result, key) == value
+#: What a row of a table is, where it is no asperity.
+ROWS = {"History": "point", "Loop": "point", "Comparison": "entry", "LoadPath": "point",
+        "MemoryCurve": "vertex", "PhaseLosses": "ellipse", "PathComparison": "entry",
+        "Provability": "level", "Contacts": "scene", "Cycles": "scene"}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", WITH_TABLES)
-def test_a_data_set_has_the_arrays(name: str) -> None:
-    result = results()[name]
-    held = result.to_xarray()
-    for key, values in columns(result).items():
-        if name != "MemoryCurve":  # names its own
-            np.testing.assert_array_equal(held[key].to_numpy(), values)
-    for key, value in held.attrs.items():
-        assert getattr(result, key) == value
-    if "load" in held:
-        held["load"][0] = -1.0  # a copy: the result stays as it is
+def test_data_frames_and_data_sets_have_the_arrays() -> None:
+    for name, result in having("to_dataframe").items():
+        frame, held = result.to_dataframe(), result.to_xarray()
+        assert frame.index.name == ROWS.get(name, "asperity")
+        for column, values in columns(result).items():
+            if values.ndim == 1 and column in frame.columns:
+                np.testing.assert_array_equal(frame[column].to_numpy(), values)
+            elif f"{column}_x" in frame.columns:
+                np.testing.assert_array_equal(frame[f"{column}_y"].to_numpy(), values[:, 1])
+            if name != "MemoryCurve":  # names its own
+                np.testing.assert_array_equal(held[column].to_numpy(), values)
+        for key, value in (*frame.attrs.items(), *held.attrs.items()):
+            assert getattr(result, key) == value
+        if "load" in held:
+            held["load"][0] = -1.0  # a copy: the result stays as it is
 
 
 def test_asperities_can_be_found_by_name() -> None:
@@ -286,29 +258,14 @@ def test_without_an_extra(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert issubclass(ExtraError, ImportError)
 
 
-def test_nothing_is_loaded_before_it_is_asked_for() -> None:
-    code = """
-import sys, convexrough as cr
-scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), cr.Material(1.0, 0.3))
-repr(cr.press(scene, approach=1e-4))
-print({"pandas", "xarray", "matplotlib"} & set(sys.modules))
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "set()"
-
-
-@pytest.mark.sample(6)
-@pytest.mark.parametrize("name", DRAWN)
-def test_axes_in_axes_out(name: str) -> None:
-    result = results()[name]
-    alone = result.plot(length_unit="mm", force_unit="N")
-    assert isinstance(alone, Axes)
-    alone.figure.canvas.draw()
-    mine, other = Figure().subplots(1, 2)
-    assert plots.plot(result, other) is other
-    assert other.has_data()
-    assert not mine.has_data()
-    assert other.get_xlabel()
+def test_axes_in_axes_out() -> None:
+    for name, result in having("plot").items():
+        alone = result.plot(length_unit="mm", force_unit="N")
+        assert isinstance(alone, Axes)
+        mine, other = Figure().subplots(1, 2)
+        assert plots.plot(result, other) is other
+        assert (mine.has_data(), other.has_data()) == (False, True), name
+        assert other.get_xlabel()
 
 
 def test_what_has_no_picture_says_so() -> None:
@@ -344,6 +301,6 @@ def test_examples_in_docstrings(module: str, tmp_path: Path) -> None:
     assert runner.failures == 0
 
 
-@pytest.mark.parametrize("name", [name for name in PUBLIC if not name.endswith("Error")])
-def test_every_public_name_has_an_example(name: str) -> None:
-    assert "\n    >>> " in (getattr(cr, name).__doc__ or "")
+def test_every_public_name_has_an_example() -> None:
+    for name in PUBLIC:
+        assert name.endswith("Error") or "\n    >>> " in (getattr(cr, name).__doc__ or ""), name

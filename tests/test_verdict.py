@@ -42,7 +42,7 @@ def corrupted(contact: cr.Contact, kind: str, rng: Any) -> tuple[Any, set[int]]:
     return loads, {int(i)}
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("seeds", [range(k, k + 5) for k in range(0, 50, 5)], ids=str)
 @pytest.mark.parametrize("kind", KINDS)

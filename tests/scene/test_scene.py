@@ -1,7 +1,5 @@
 """Material, asperities, scene: geometry by independent means, and bad values."""
 
-import subprocess
-import sys
 from fractions import Fraction
 from typing import Any
 
@@ -228,18 +226,6 @@ def test_arrays_are_copies_and_read_only() -> None:
     assert (asperities.positions == 0).all()
     for values in (asperities.positions, asperities.tip_radii, asperities.heights):
         assert not values.flags.writeable
-
-
-def test_import_is_light() -> None:
-    """Heavy libraries load when first used, not on import."""
-    code = """if True:
-        import sys
-        import convexrough
-        heavy = {"cvxpy", "clarabel", "osqp", "matplotlib", "scipy", "pydantic", "click", "rich"}
-        loaded = heavy & set(sys.modules)
-        sys.exit(str(loaded) if loaded else 0)
-    """
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_roughened_is_what_the_patterns_draw() -> None:
