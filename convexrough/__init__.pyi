@@ -26,7 +26,6 @@ from .friction.fretting import Fretting as Fretting
 from .friction.fretting import fretting as fretting
 from .friction.levels import prove_order as prove_order
 from .friction.onset import onset_of_sliding as onset_of_sliding
-from .friction.path import History as History
 from .friction.path import LoadPath as LoadPath
 from .friction.path import history as history
 from .friction.path import load_path as load_path

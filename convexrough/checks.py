@@ -42,6 +42,16 @@ def between(what: str, value: float | None, low: float, high: float) -> float:
     return number
 
 
+def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
+    """A copy as float64 numbers, of any shape; text, dates and complex numbers are none."""
+    try:
+        if np.asarray(values).dtype.kind not in "biufO":
+            raise TypeError("no real numbers")
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(what, found=repr(values)[:60], expected=expected) from error
+
+
 def array(
     what: str,
     values: ArrayLike,
@@ -56,12 +66,7 @@ def array(
     A number stands for a vector of `length` equal values. smallest : smallest size, unless 0
     one : the name of what has one value each, in messages
     """
-    try:
-        if np.iscomplexobj(values) or np.asarray(values).dtype.kind in "USV":
-            raise TypeError("no real numbers")
-        vector: Array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(what, found=repr(values)[:60], expected="numbers") from error
+    vector = numbers(what, values)
     if vector.ndim == 0 and length is not None:
         vector = even(float(vector), length)
     if vector.ndim != 1 or (length is not None and vector.size != length):
@@ -94,12 +99,7 @@ def friction(coefficient: float | None) -> float:
 
 def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
     """Shear forces, of any shape; raises InputError unless |Q| <= limit = f P."""
-    try:
-        if np.iscomplexobj(forces) or np.asarray(forces).dtype.kind in "USV":
-            raise TypeError("no real numbers")
-        given = np.asarray(forces, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(what, found=repr(forces)[:60], expected="numbers") from error
+    given = numbers(what, forces)
     good = np.abs(given) <= limit * (1 + 1e-15)  # nan is not
     if not good.all():
         place = np.unravel_index(int(np.argmin(good)), given.shape)

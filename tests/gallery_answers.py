@@ -1,7 +1,9 @@
-"""The answers of the gallery, in ball arithmetic: convexrough/gallery/cases.json is its output.
+"""The answers of the gallery, in ball arithmetic, of the scenes in convexrough/gallery/cases.json.
 
     PYTHONPATH=tests python tests/gallery_answers.py            computes all anew and writes them
     PYTHONPATH=tests python tests/gallery_answers.py one collinear   only those
+
+A new case is a line without "answer".
 
 Every digit is proved by an interval Newton step (`multiprecision`). Friction is Ciavarella and
 Jaeger's theorem, Q_i = f (P_i - p_i(P - Q / f)), of two such states.
@@ -15,36 +17,14 @@ from typing import Any
 
 import numpy as np
 from flint import arb, ctx
-from gallery_recipes import FITTED, RECIPES, Recipe
 from multiprecision import NotProved
 from scenes import solve_exactly
 
 import convexrough as cr
 from convexrough.gallery import cases
-from convexrough.sphere import hertz
 
 PATH = Path(cr.gallery.__file__).with_name(cases.DATA)
 DIGITS, KEPT = 75, 50  # near Q = 0 a difference loses 12
-
-
-def tune(name: str) -> float:
-    """The height with the gap, indentation or load that the name says, over approach or load."""
-    make, which = FITTED[name]
-    _, kind, near = name.split("-", 2)
-    low = make(-1.0)  # far below all others
-    contact = cr.press(low.scene, approach=low.approach)
-    exact = solve_exactly(low.scene, approach=low.approach, start=contact.loads, digits=DIGITS)
-    with ctx.workdps(DIGITS):
-        touches = arb(-1.0) + exact.gaps[which]
-        size = arb(near)
-        if kind == "load":
-            R = low.scene.relative_radii[which]
-            k = arb(float(hertz.local_coefficient(1.0, R)))
-            heaviest = max(exact.loads, key=lambda load: float(load.mid()))
-            off = k * (size * heaviest) ** (arb(2) / 3)
-        else:
-            off = size * arb(low.approach) * (-1 if kind == "gap" else 1)
-        return float((touches + off).mid())
 
 
 def digits(ball: arb) -> str:
@@ -56,40 +36,24 @@ def digits(ball: arb) -> str:
         return str(ball.str(KEPT, radius=False))
 
 
-def stored(recipe: Recipe) -> dict[str, Any]:
-    """All that is stored of a case."""
-    scene, a = recipe.scene, recipe.scene.asperities
-    given = {"approach": recipe.approach} if recipe.load is None else {"load": recipe.load}
-    contact = cr.press(scene, **given)
-    full = solve_exactly(scene, **given, start=contact.loads, digits=DIGITS)
-    force = recipe.fraction * scene.friction * float(full.load.mid())
+def answer(case: dict[str, Any]) -> dict[str, Any]:
+    """What is stored as the answer of a case."""
+    a = cr.Asperities(case["positions"], case["tip_radii"], case["heights"])
+    material = cr.Material(case["contact_modulus"], case["poisson_ratio"])
+    scene = cr.Scene(case["sphere_radius"], a, material, case["friction"], case["geometry"])
+    contact = cr.press(scene, **case["prescribed"])
+    full = solve_exactly(scene, **case["prescribed"], start=contact.loads, digits=DIGITS)
     return {
-        "family": recipe.family,
-        "why": recipe.why,
-        "sphere_radius": scene.sphere_radius,
-        "contact_modulus": scene.material.contact_modulus,
-        "poisson_ratio": scene.material.poisson_ratio,
-        "friction": scene.friction,
-        "geometry": scene.geometry,
-        "positions": a.positions.tolist(),
-        "tip_radii": a.tip_radii.tolist(),
-        "heights": a.heights.tolist(),
-        "prescribed": given,
-        "shear_force": force,
-        "reversals": recipe.reversals,
-        "answer": {
-            "approach": digits(full.approach),
-            "load": digits(full.load),
-            "loads": [digits(load) for load in full.loads],
-            "gaps": [digits(gap) for gap in full.gaps],
-            **sheared(recipe, full, force),
-        },
+        "approach": digits(full.approach),
+        "load": digits(full.load),
+        "loads": [digits(load) for load in full.loads],
+        "gaps": [digits(gap) for gap in full.gaps],
+        **sheared(scene, full, case["shear_force"]),
     }
 
 
-def sheared(recipe: Recipe, full: Any, force: float) -> dict[str, Any]:
+def sheared(scene: cr.Scene, full: Any, force: float) -> dict[str, Any]:
     """Nothing where an asperity would be dragged along."""
-    scene = recipe.scene
     with ctx.workdps(DIGITS + 30):
         f, nu = arb(scene.friction), arb(scene.material.poisson_ratio)
         travel = f * (2 - nu) / (2 * (1 - nu))
@@ -118,24 +82,14 @@ def true_statuses(case: cr.gallery.HardCase, statuses: Any) -> bool:
 
 
 def write(wanted: list[str]) -> None:
-    """A line for each case. A height that is fitted is stored first, and read by its recipe."""
+    """A line for each case."""
     found = json.loads(PATH.read_text())
-    for name in wanted:
-        if name in FITTED:
-            make, _ = FITTED[name]
-            heights = make(tune(name)).scene.asperities.heights.tolist()
-            found[name] = {**found[next(iter(FITTED))], **found.get(name, {}), "heights": heights}
-            _save(found)
-        found[name] = stored(RECIPES[name]())
+    for name in wanted or found:
+        found[name]["answer"] = answer(found[name])
         print(name, found[name]["answer"]["load"][:12])
-    _save({name: found[name] for name in RECIPES})
-
-
-def _save(found: dict[str, Any]) -> None:
     lines = [f"{json.dumps(name)}: {json.dumps(case)}" for name, case in found.items()]
     PATH.write_text("{\n" + ",\n".join(lines) + "\n}\n")
-    cases._cases.cache_clear()
 
 
 if __name__ == "__main__":
-    write(sys.argv[1:] or list(RECIPES))
+    write(sys.argv[1:])

@@ -151,17 +151,17 @@ class Oracle:
 
 @dataclass(frozen=True)
 class Sheared:
-    """A friction state, in the scene's units over f or c_t f."""
+    """A friction state, in the scene's units over f or c_t f; delta is X over c_t f."""
 
     oracle: Oracle
     T: Balls
     eta: Balls
     u: Balls
-    displacement: Balls
+    delta: Balls
 
     @property
     def displacement(self) -> Balls:
-        return self.oracle.ratio * self.oracle.setup.friction * self.displacement
+        return self.oracle.ratio * self.oracle.setup.friction * self.delta
 
     @property
     def forces(self) -> Balls:
@@ -184,7 +184,7 @@ class Sheared:
         psi = t - arb(3) / 5 * (1 - cube_root(left) ** 5)
         energy = (P * self.oracle.thresholds * psi).sum() + (u @ (self.oracle.inner @ u)) / 2
         f = self.oracle.setup.friction
-        return 8 * self.oracle.ratio * f * f * (self.T * self.displacement / 2 - energy)
+        return 8 * self.oracle.ratio * f * f * (self.T * self.delta / 2 - energy)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ arithmetic, proves it. The oracle shares no code with the package that it judges
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, log2
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from flint import arb, arb_mat, ctx
@@ -119,6 +119,13 @@ def solve(
         return Reference(tuple(loads), tuple(gaps), depth, total)
 
 
+class Map(Protocol):
+    """A map of balls with its derivative, whose zero is asked for."""
+
+    def residual(self, x: Balls) -> Balls: ...
+    def jacobian(self, x: Balls) -> Balls: ...
+
+
 @dataclass(frozen=True)
 class NormalMap:
     """The map F of the module's docstring; its argument x = (delta_1, .., delta_m, D0) [length].
@@ -172,7 +179,7 @@ class NormalMap:
         return matrix
 
 
-def newton(problem: NormalMap, x: Balls, *, tolerance: arb) -> Balls:
+def newton(problem: Map, x: Balls, *, tolerance: arb) -> Balls:
     """The point x with sum |F(x)| <= tolerance [length], by Newton steps that shrink this sum."""
     residual = _mid(problem.residual(x))
     for _ in range(NEWTON_STEPS):
@@ -191,7 +198,7 @@ def newton(problem: NormalMap, x: Balls, *, tolerance: arb) -> Balls:
     raise NotProved("Newton did not arrive")
 
 
-def prove(problem: NormalMap, x: Balls, *, radius: arb) -> Balls:
+def prove(problem: Map, x: Balls, *, radius: arb) -> Balls:
     """Balls that hold a zero of F, the only one in the box X = x +/- radius [length].
 
     Interval Newton: if x - J^-1 F(x) lies inside X for every matrix J with entries in dF/dx(X),

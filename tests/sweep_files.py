@@ -16,8 +16,7 @@ import numpy as np
 
 import convexrough as cr
 from convexrough.progress import LOGGER
-from convexrough.sweeps.measures import Stages
-from convexrough.sweeps.scenes import Press, Tables
+from convexrough.sweeps.scenes import Ask, Asked, Tables
 
 SMALL: dict[str, Any] = {
     "sphere": {"radius": 1.0},
@@ -123,12 +122,12 @@ class Deadly(Tables):
 
     worst: int = 0
 
-    def opened(self) -> Press:
-        press = super().opened()
+    def opened(self) -> Ask:
+        ask = super().opened()
 
-        def press_one(number: int) -> tuple[cr.Contact, Stages]:
+        def ask_one(number: int) -> Asked:
             if number == self.worst:
                 os.kill(os.getpid(), signal.SIGKILL)
-            return press(number)
+            return ask(number)
 
-        return press_one
+        return ask_one

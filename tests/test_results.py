@@ -57,7 +57,6 @@ def results() -> dict[str, Any]:
         cr.shear_vector(contact, force=Q),
         cycle,
         cycle.loop(16, asperities=[0, 3]),
-        cr.history(contact, forces=[Q, -Q / 2]),
         cr.verify(scene, wrong, approach=PAPER_APPROACH),
         compare(scene, approach=PAPER_APPROACH, solvers=few),
         cr.smooth(scene, load=contact.load),
@@ -104,7 +103,7 @@ def test_every_kind_is_here() -> None:
     sweeps = {"SweepTable"}  # tested in tests/sweeps
     assert public - settings - sweeps <= set(results())
     assert set(having("plot")) == {"Contact", "ShearState", "VectorShearState", "Cycle", "Fretting",
-                          "History", "Verdict", "Comparison", "LoadPath", "Shakedown",
+                          "Verdict", "Comparison", "LoadPath", "Shakedown",
                           "MemoryCurve", "PhaseLosses", "PathComparison",
                           "Gradient", "Surface", "Summits", "Provability"}  # fmt: skip
 
@@ -209,7 +208,7 @@ def columns(result: Any) -> dict[str, np.ndarray[Any, Any]]:
 
 
 #: What a row of a table is, where it is no asperity.
-ROWS = {"History": "point", "Loop": "point", "Comparison": "entry", "LoadPath": "point",
+ROWS = {"Loop": "point", "Comparison": "entry", "LoadPath": "point",
         "MemoryCurve": "vertex", "PhaseLosses": "ellipse", "PathComparison": "entry",
         "Provability": "level", "Contacts": "scene", "Cycles": "scene"}  # fmt: skip
 
@@ -232,7 +231,7 @@ def test_data_frames_and_data_sets_have_the_arrays() -> None:
 
 
 def test_asperities_can_be_found_by_name() -> None:
-    contact, past = results()["Contact"], results()["History"]
+    contact, past = results()["Contact"], results()["LoadPath"]
     x, y = contact.scene.asperities.positions.T
     frame = contact.to_dataframe()
     np.testing.assert_array_equal(frame["x"], x)

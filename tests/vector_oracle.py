@@ -19,15 +19,14 @@ import numpy as np
 from flint import arb, ctx
 from multiprecision import (
     GUARD_DIGITS,
-    HALVINGS,
-    NEWTON_STEPS,
     Balls,
     NotProved,
     _contact_points,
     _exact,
     _influence,
     _mid,
-    _solve,
+    newton,
+    prove,
 )
 
 import convexrough as cr
@@ -76,7 +75,13 @@ class VectorMap:
         across = np.array([[arb(1), arb(0)], [arb(0), arb(1)]]) - along
         return size / length * eta, slope * along + size / length * across
 
-    def evaluate(self, x: Balls) -> tuple[Balls, Balls]:
+    def residual(self, x: Balls) -> Balls:
+        return self._evaluate(x)[0]
+
+    def jacobian(self, x: Balls) -> Balls:
+        return self._evaluate(x)[1]
+
+    def _evaluate(self, x: Balls) -> tuple[Balls, Balls]:
         """F and its derivative."""
         n = len(self.loads)
         eta, displacement = x[:-2], x[-2:]
@@ -108,12 +113,8 @@ def solve_vectors(
     with ctx.workdps(digits + GUARD_DIGITS):
         problem, x = _problem(scene, loads, force, start, displacement)
         size = max(float(abs(value)) for value in x)
-        x = _newton(problem, x, tolerance=arb(size) * arb(10) ** (-digits - GUARD_DIGITS // 2))
-        box = np.array([arb(each, arb(size) * arb(10) ** (-digits)) for each in x])
-        inside = x - _solve(problem.evaluate(box)[1], problem.evaluate(x)[0])
-        if not all(whole.contains_interior(part) for whole, part in zip(box, inside, strict=True)):
-            raise NotProved("the interval Newton step leaves its box")
-        return _state(problem, inside)
+        x = newton(problem, x, tolerance=arb(size) * arb(10) ** (-digits - GUARD_DIGITS // 2))
+        return _state(problem, prove(problem, x, radius=arb(size) * arb(10) ** (-digits)))
 
 
 def _problem(
@@ -173,25 +174,6 @@ def _kernel(points: Balls, influence: Balls, bias: Any) -> Balls:
                 block[1, 1] += 1 - bias
                 kernel[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = influence[i, j] * block
     return kernel
-
-
-def _newton(problem: VectorMap, x: Balls, *, tolerance: Any) -> Balls:
-    """Damped steps that shrink the sum of |F|."""
-    value, jacobian = (_mid(each) for each in problem.evaluate(x))
-    for _ in range(NEWTON_STEPS):
-        size = np.abs(value).sum()
-        if size <= tolerance:
-            return x
-        step = _solve(jacobian, value, "approx")
-        for share in (arb(1) / 2**halvings for halvings in range(HALVINGS)):
-            trial = _mid(x - share * step)
-            after = [_mid(each) for each in problem.evaluate(trial)]
-            if np.abs(after[0]).sum() <= (1 - share / 1000) * size:
-                break
-        else:
-            raise NotProved("no part of Newton's step shrinks the residual")
-        x, (value, jacobian) = trial, after
-    raise NotProved("Newton did not arrive")
 
 
 def _state(problem: VectorMap, x: Balls) -> VectorReference:

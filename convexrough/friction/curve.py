@@ -45,7 +45,7 @@ class Piece(NamedTuple):
     load_after: Fraction
 
     @property
-    def at_constant_load(self) -> bool:
+    def load_constant(self) -> bool:
         """The load stays."""
         return self.load_before == self.load_after
 

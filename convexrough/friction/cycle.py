@@ -25,21 +25,14 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.frames import Variables
 from convexrough.friction.curve import MemoryCurve, Piece
-from convexrough.friction.general_step import followed
-from convexrough.friction.levels import FrictionLevels, rounded
+from convexrough.friction.levels import FrictionLevels, height_at, rounded
 from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
-from convexrough.friction.path import (
-    Point,
-    follow,
-    levels_needed,
-    point_at,
-    points_of,
-    pressed_for,
-)
+from convexrough.friction.path import points_of, pressed_for
 from convexrough.friction.shear import level_at
-from convexrough.friction.state import by_status, displacements_of, states_of, stick_radii
+from convexrough.friction.state import by_status, displacements_of, stick_radii
+from convexrough.friction.walk import Point, Walk, levels_needed
 from convexrough.influence import Kind
 from convexrough.numbers.balls import Ball
 from convexrough.plottable import Plottable
@@ -68,7 +61,7 @@ class Cycle(Table, Plottable):
     loss_error, loss_first_error : proved bounds on |loss - solution|, infinite without proof
     status           : "stuck" where a cycle has no slip, "partial" where a disc sticks for ever,
         "sliding" where it slides as a whole once in each direction per cycle, "intermittent"
-        where contact is lost in the cycle, "open" where it never touches, or "undecided"
+        where contact is lost in the cycle, "open" where it never bears load, or "undecided"
     slips            : [length] of gross slip, in each direction per cycle; nan where intermittent
     stick_radii      : [length] of the disc that sticks for ever
     slip_errors, stick_radius_errors : [length] proved bounds
@@ -76,7 +69,7 @@ class Cycle(Table, Plottable):
     balance_defect   : relative difference to the loss by the trapezoid rule; nan where P varies
     loss_normalised  : loss / W0, W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) of the highest load
     smooth_normalised : the same for the smooth sphere, e((max - min) / 2 f P); nan where P varies,
-        and both where the base has no smooth reference
+        and both where nothing is loaded or the base has no smooth reference
     displacement_amplitude : X_a, half the range of X at the points [length]
     displacement_error : proved bound on |X_a - solution| [length], infinite without proof
     order            : "proved" that no indentation falls with the load between L* and P, so that
@@ -161,10 +154,7 @@ class Cycle(Table, Plottable):
 
     @cached_property
     def _shares(self) -> tuple[Array, Array, Array]:
-        n = len(self.scene)
-        if self.contact.load == 0.0:
-            return (frozen(np.zeros(n)),) * 3
-        levels = self.contact.cached(FrictionLevels)
+        levels, n = self.contact.cached(FrictionLevels), len(self.scene)
         if self.order == "fails" and levels.proved:
             unknown = frozen(np.full(n, np.nan))
             return unknown, unknown, frozen(np.full(n, np.inf))
@@ -176,9 +166,10 @@ class Cycle(Table, Plottable):
     @cached_property
     def _later(self) -> list[Piece]:
         """What the front runs through each time but the first."""
-        pairs = zip(self.loads.tolist(), self.forces.tolist(), strict=True)
-        points = [point_at(Fraction(load), force, self.scene) for load, force in pairs]
-        return _Closed(MemoryCurve(), points).later
+        levels = self.contact.cached(FrictionLevels)
+        pairs = zip(map(Fraction, self.loads.tolist()), self.forces.tolist(), strict=True)
+        points = [(P, height_at(P, Q, self.scene)) for P, Q in pairs]
+        return _Closed.around(levels, MemoryCurve(), points).later
 
     @property
     def force_amplitude(self) -> float:
@@ -305,19 +296,16 @@ def cycles(
     """
     checks.instance("contact", contact, Contact)
     f = checks.friction(contact.scene.friction)
-    limit = f * contact.load
+    limit, levels = f * contact.load, contact.cached(FrictionLevels)
     checks.exactly_one("maximum", maximum, "displacement", displacement)
     if displacement is not None:
         if minimum is not None:
             expected = "none beside a displacement, whose cycles are symmetric"
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
-        if contact.load > 0.0:
-            levels = contact.cached(FrictionLevels)
-            heights = [levels.load - level_at("displacement", levels, x) for x in amplitudes]
-            ends = [(height, -height) for height in heights]
-            return _at_the_load(contact, ends, [(float(f * h), -float(f * h)) for h in heights])
-        maximum = 0.0 * amplitudes
+        heights = [levels.load - level_at("displacement", levels, x) for x in amplitudes]
+        ends = [(height, -height) for height in heights]
+        return _at_the_load(contact, ends, [(float(f * h), -float(f * h)) for h in heights])
     assert maximum is not None  # exactly_one
     upper = checks.bearable("maximum", checks.array("maximum", maximum), limit)
     lower = -upper
@@ -329,12 +317,8 @@ def cycles(
         expected = f"at least the minimum, {lower[i]:g}; by default that is its negative"
         raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
     forces = list(zip(upper.tolist(), lower.tolist(), strict=True))
-    if contact.load == 0.0:
-        return [_still(contact, np.zeros(2), np.array(each)) for each in forces]
     LOGGER.info("pressing at the level of a cycle")
-    load = contact.cached(FrictionLevels).load
-    points = [[point_at(load, Q, contact.scene)[1] for Q in each] for each in forces]
-    return _at_the_load(contact, points, forces)
+    return _at_the_load(contact, [[levels.height(Q) for Q in each] for each in forces], forces)
 
 
 def _at_the_load(
@@ -372,60 +356,88 @@ def steady(
     points = points_of(scene, loads, forces)
     contact = pressed_for(scene, [load for load, _ in points], influence)
     P, Q = (np.array(each, dtype=np.float64) for each in (loads, forces))
-    if contact.load == 0.0:
-        return _still(contact, P, Q)
     return _cycles(contact, MemoryCurve(), [(points, P, Q)])[0]
 
 
-class _Closed:
-    """The memory curves and pieces of a closed path: on the way, in the first cycle, and later."""
+class _Closed(Walk):
+    """A closed path of m points, followed twice: the second time it is what it is for ever."""
 
-    def __init__(self, start: MemoryCurve, points: Sequence[Point]) -> None:
-        begun, costs = follow(start, [*points, points[0]])
-        self.curves, later = follow(begun[-1], [*points[1:], points[0]])
-        self.first = [piece for cost in costs for piece in cost]
-        self.later = [p for cost in later for p in cost if p.slope * p.sign != 1]
-        plus, minus = min(p + t for p, t in points), min(p - t for p, t in points)
-        self.still, self.force_level = (plus + minus) / 2, (plus - minus) / 2
-        self.least = min(load for load, _ in points)
+    @classmethod
+    def around(cls, levels: FrictionLevels, start: MemoryCurve, points: list[Point]) -> _Closed:
+        return cls(levels, start, [*points, *points, points[0]])
+
+    @property
+    def once(self) -> int:
+        """m"""
+        return len(self.points) // 2
+
+    @property
+    def steady(self) -> list[MemoryCurve]:
+        """The curves of the second time."""
+        return self.curves[self.once + 1 :]
+
+    @cached_property
+    def first(self) -> list[Piece]:
+        """What the front runs through on the way and the first time."""
+        return [piece for cost in self.pieces[: self.once + 1] for piece in cost]
+
+    @cached_property
+    def later(self) -> list[Piece]:
+        """What it runs through each time after."""
+        pieces = (piece for cost in self.pieces[self.once + 1 :] for piece in cost)
+        return [piece for piece in pieces if piece.slope * piece.sign != 1]
+
+    @cached_property
+    def stuck(self) -> Point:
+        """(L*, T*)"""
+        plus, minus = min(p + t for p, t in self.points), min(p - t for p, t in self.points)
+        return (plus + minus) / 2, (plus - minus) / 2
+
+    @property
+    def least(self) -> Fraction:
+        """The least load."""
+        return min(load for load, _ in self.points)
+
+    @cached_property
+    def needed(self) -> set[Fraction]:
+        """Without those of the way there."""
+        pieces = self.first, self.later
+        return levels_needed(self.steady, pieces) | {self.stuck[0], self.least}
+
+    @property
+    def height(self) -> Fraction:
+        """Half the range of T."""
+        heights = [height for _, height in self.points]
+        return (max(heights) - min(heights)) / 2
 
 
 def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
 ) -> list[Cycle]:
     """Of closed paths with these points, P and Q each, from one state on."""
-    levels, closed = contact.cached(FrictionLevels), [_Closed(start, path) for path, _, _ in asked]
-    needed = [
-        levels_needed(each.curves, [*each.first, *each.later]) | {each.still, each.least}
-        for each in closed
-    ]
-    levels.prepare(load for each in needed for load in each)
-    widest_first = sorted(range(len(needed)), key=lambda k: min(needed[k]))
-    orders = {k: levels.order(needed[k]) for k in widest_first}
+    levels = contact.cached(FrictionLevels)
+    closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
+    levels.prepare(load for each in closed for load in each.needed)
+    for needed in sorted((each.needed for each in closed), key=min):
+        levels.order(needed)  # what the widest proves holds of the others
     spent = losses(levels, [pieces for each in closed for pieces in (each.first, each.later)])
-    moved = displacements_of(levels, [curve for each in closed for curve in each.curves])
-    ends = np.cumsum([0, *(len(each.curves) for each in closed)]).tolist()
+    moved = displacements_of(levels, [curve for each in closed for curve in each.steady])
+    ends = np.cumsum([0, *(each.once for each in closed)]).tolist()
     return [
-        _cycle(contact, start, path, each, orders[k], spent[2 * k : 2 * k + 2], moved[slice(*far)])
+        _cycle(contact, *path[1:], each, spent[2 * k : 2 * k + 2], moved[slice(*far)])
         for k, (path, each, far) in enumerate(zip(asked, closed, pairwise(ends), strict=True))
     ]
 
 
 def _cycle(
-    contact: Contact,
-    start: MemoryCurve,
-    path: tuple[list[Point], Array, Array],
-    closed: _Closed,
-    order: Order,
-    spent: Ball,
-    moved: Ball,
+    contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
 ) -> Cycle:
     """One of them. spent : the first time, and later;  moved : X of its curves."""
-    levels, (points, loads, forces) = contact.cached(FrictionLevels), path
+    levels, order = closed.levels, closed.order
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
     amplitude, amplitude_error = (float(part) for part in rounded(half))
-    rest, top, bottom = (levels.at(each) for each in (closed.still, levels.load, closed.least))
+    rest, top, bottom = (levels.at(s) for s in (closed.stuck[0], levels.load, closed.least))
     sliding = bottom.touching & rest.open
     intermittent = top.touching & bottom.open
     statuses = {
@@ -437,25 +449,26 @@ def _cycle(
         (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
     )
     radii, radius_errors = stick_radii(levels, rest)
-    constant = all(load == levels.load for load, _ in points)
-    height = (max(t for _, t in points) - min(t for _, t in points)) / 2
+    constant = all(load == levels.load for load, _ in closed.points)
     defect = np.nan
     if constant:
-        other = float((trapezoid_loss(top, rest) * 4.0 * levels.loss_unit).value) if height else 0.0
-        defect = abs(other - loss) / (loss or 1.0)
+        other = trapezoid_loss(top, rest) * 4.0 * levels.loss_unit
+        defect = abs(float(other.value) - loss) / (loss or 1.0)
     if order != "proved":
         error = first_error = np.inf
     if order == "fails":
-        if levels.proved:
-            first, loss, amplitude = _stepped(levels, start, points)
         amplitude_error, statuses = np.inf, {}
         slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
+    if closed.general is not None:
+        first, both = closed.general.losses[[closed.once, -1]]
+        loss = both - first
+        amplitude = float(np.ptp(closed.general.states.displacements[closed.once :])) / 2.0
     everywhere = {name: levels.to_scene(which) for name, which in statuses.items()}
     slides = everywhere.get("sliding", np.zeros(len(levels.scene), dtype=bool))
     lost, kept = levels.to_scene(intermittent), levels.to_scene(bottom.touching)
     doubtful = levels.to_scene(~(rest.touching | rest.open))
     slip_errors = np.where(slides | doubtful, slip_errors, 0.0) if statuses else slip_errors
-    reference = smooth_reference(contact.scene, contact.load)
+    reference = smooth_reference(contact.scene, contact.load) if levels.load else None
     whole = reference.energy_scale if reference else np.nan  # W0
     found = Cycle(
         contact=contact,
@@ -470,11 +483,11 @@ def _cycle(
         slip_errors=frozen(slip_errors),
         stick_radii=radii,
         stick_radius_errors=frozen(radius_errors),
-        level=float(closed.still),
-        force_level=float(levels.coefficient.value) * float(closed.force_level),
+        level=float(closed.stuck[0]),
+        force_level=float(levels.coefficient.value) * float(closed.stuck[1]),
         balance_defect=defect,
         loss_normalised=float(loss) / whole,
-        smooth_normalised=float(mindlin.loss(float(height / levels.load)))
+        smooth_normalised=float(mindlin.loss(float(closed.height / levels.load)))
         if constant and reference
         else np.nan,
         displacement_amplitude=amplitude,
@@ -484,33 +497,6 @@ def _cycle(
     )
     found.__dict__["_later"] = closed.later
     return found
-
-
-def _stepped(
-    levels: FrictionLevels, start: MemoryCurve, points: list[Point]
-) -> tuple[float, float, float]:
-    """By general steps: what the first cycle and the way there cost, the second, and its X_a."""
-    m = len(points)
-    found = followed(levels, start, [*points, *points, points[0]])
-    X = found.states.displacements[m:]
-    spent = found.losses
-    return float(spent[m]), float(spent[2 * m] - spent[m]), float(np.ptp(X)) / 2.0
-
-
-def _still(contact: Contact, loads: Array, forces: Array) -> Cycle:
-    """Where nothing is loaded."""
-    zero = frozen(np.zeros(len(contact.scene)))
-    return Cycle(
-        contact,
-        frozen(loads),
-        frozen(forces),
-        *(0.0,) * 4,
-        contact.status,
-        *(zero,) * 4,
-        *(0.0,) * 7,
-        "proved",
-        0,
-    )
 
 
 def loops(
@@ -546,27 +532,20 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))
     forces[len(way) - 1], forces[-1] = low, high
-    if contact.load == 0.0:
-        none = frozen(np.zeros((len(forces), len(chosen))))
-        return Loop(chosen, frozen(forces), frozen(np.zeros(len(forces))), none, none)
     levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
-    P, top, bottom = levels.load, *(point_at(levels.load, Q, contact.scene)[1] for Q in (high, low))
+    P, top, bottom = levels.load, levels.height(high), levels.height(low)
     drops = [2 * Fraction(each) / f for each in way.tolist()]
-    heights = [max(top - drop, bottom) for drop in drops]
+    heights = [top, bottom, *(max(top - drop, bottom) for drop in drops)]
     heights += [min(bottom + drop, top) for drop in drops[1:]]
-    heights[len(way) - 1], heights[-1] = bottom, top
-    ways = [(P, height) for height in heights]
-    begin = follow(MemoryCurve.pressed(P), [(P, top), (P, bottom), (P, top)])[0][-1]
+    heights[len(way) + 1], heights[-1] = bottom, top
     LOGGER.info(f"{len(way) - 1} levels of a loop")
-    if cycle.order == "fails" and levels.proved:
-        points = [(P, top), (P, bottom), *ways]
-        found = followed(levels, MemoryCurve.pressed(P), points, 1).states
-        moved = found.displacements[2:]
-        fields = (each[2:][:, chosen] for each in (found.forces, found.asperity_displacements))
-    else:
-        found = states_of(levels, follow(begin, ways)[0], chosen)
-        moved = found.displacements
-        fields = (each for each in (found.forces, found.asperity_displacements))
-    loaded = contact.loads[chosen] > 0
-    mine = [frozen(np.where(loaded, each, 0.0)) for each in fields]
-    return Loop(chosen, frozen(forces), frozen(np.array(moved)), *mine)
+    steps = 1 if cycle.order == "fails" and levels.proved else None
+    walk = Walk(levels, MemoryCurve.pressed(P), [(P, height) for height in heights], steps)
+    found, loaded = walk.states(chosen), contact.loads[chosen] > 0
+    mine = (found.forces, found.asperity_displacements)
+    return Loop(
+        chosen,
+        frozen(forces),
+        frozen(np.array(found.displacements[2:])),
+        *(frozen(np.where(loaded, each[2:], 0.0)) for each in mine),
+    )

@@ -27,6 +27,7 @@ from convexrough.normal.stack import Rows
 from convexrough.numbers.balls import TINY, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.scene.scene import Scene
 
 #: Roundoffs of f P by which a shear force may differ from f P and count as gross sliding.
 AT_THE_END = 16
@@ -72,6 +73,10 @@ class FrictionLevels:
     def loss_unit(self) -> Ball:
         """c_t f^2, in the scene's units [force length]."""
         return self.force_unit * self.travel_unit
+
+    def height(self, force: float | Fraction) -> Fraction:
+        """T = Q / f at the load P."""
+        return height_at(self.load, force, self.scene)
 
     @property
     def top(self) -> Level:
@@ -223,6 +228,14 @@ class FrictionLevels:
         if self.by_load:
             return exactly(loads).scaled(1.0 / self.units.force)
         return self.top.load - exactly([self.load - x for x in loads]).scaled(1 / self.units.force)
+
+
+def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction:
+    """T = Q / f, exactly; P or -P where it is that to rounding: gross sliding."""
+    height = Fraction(force) / Fraction(checks.friction(scene.friction))
+    if abs(load - abs(height)) > AT_THE_END * Fraction(ROUNDOFF) * load:
+        return height
+    return load if height > 0 else -load
 
 
 def prove_order(contact: Contact, *, most: int = 5000) -> Order:

@@ -15,14 +15,15 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import followed
-from convexrough.friction.levels import AT_THE_END, FrictionLevels, rounded
+from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.order import Order
-from convexrough.friction.state import states_of, statuses_of, stick_radii
+from convexrough.friction.state import stick_radii
+from convexrough.friction.walk import Walk
 from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import SAFETY
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
@@ -179,12 +180,10 @@ def shear(
         displacement = checks.finite("displacement", displacement)
     else:
         force = one_force("force", force, friction * contact.load)
-    if contact.load == 0.0:
-        return _nothing_loaded(contact, displacement or 0.0)
     levels = contact.cached(FrictionLevels)
     LOGGER.info("pressing at the load P - Q / f")
     if force is not None:
-        height = height_of(levels, force)
+        height = levels.height(force)
     else:
         height = levels.load - level_at("displacement", levels, abs(displacement or 0.0))
         height = height if (displacement or 0.0) >= 0 else -height
@@ -197,18 +196,6 @@ def one_force(what: str, value: ArrayLike | None, limit: float) -> float:
     if given.ndim:
         raise InputError(what, found=f"shape {given.shape}", expected="one number")
     return float(given)
-
-
-def height_of(levels: FrictionLevels, force: float) -> Fraction:
-    """T = Q / f at the load P; P itself where it is that to rounding: gross sliding."""
-    return limited(levels.load, Fraction(force) / Fraction(checks.friction(levels.scene.friction)))
-
-
-def limited(load: Fraction, height: Fraction) -> Fraction:
-    """T, or P or -P where it is that to rounding."""
-    if abs(load - abs(height)) > AT_THE_END * Fraction(ROUNDOFF) * load:
-        return height
-    return load if height > 0 else -load
 
 
 def level_at(what: str, levels: FrictionLevels, displacement: float) -> Fraction:
@@ -232,31 +219,28 @@ def _state(
 ) -> ShearState:
     """The state at T, by levels; or, where order is seen to fail, by general steps."""
     start, loaded = MemoryCurve.pressed(levels.load), contact.loads > 0
-    order = levels.order({levels.load - abs(height)})
-    if order == "fails" and levels.proved and height:
-        if displacement is not None:
-            height = _by_steps(levels, displacement)
-        general = followed(levels, start, [(levels.load, height)])
-        found, status = general.states, general.status[0]
-        squared = contact.scene.relative_radii * general.fronts[0]
+    walk = Walk(levels, start, [(levels.load, height)])
+    if walk.general is not None and displacement is not None:
+        walk = Walk(levels, start, [(levels.load, _by_steps(levels, displacement))])
+    found, order = walk.states(), walk.order
+    if walk.general is not None:
+        squared = contact.scene.relative_radii * walk.general.fronts[0]
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
-        total, force_uncertainty = float(height) * checks.friction(contact.scene.friction), 0.0
-        moved = float(found.displacements[0])
+        total = float(walk.points[0][1]) * checks.friction(contact.scene.friction)
+        force_uncertainty = 0.0
     else:
-        curve = start.go(levels.load, height)[0]
-        found, status = states_of(levels, [curve]), statuses_of(levels, curve, order)
         level = levels.at(levels.load - abs(height))
         radii, radius_errors = stick_radii(levels, level)
         size, off = rounded((levels.top.load - level.load) * levels.force_unit)
         total, force_uncertainty = float(np.copysign(size, displacement or 0.0)), float(off)
-        moved = float(found.displacements[0]) if displacement is None else displacement
     error = float(found.displacement_errors[0]) if displacement is None else 0.0
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
     most = np.abs(found.drifts[0]) + found.drift_errors[0]  # where it may or may not touch
     slip_errors = np.where(loaded, found.drift_errors[0], 0.0) + np.where(unsure, most, 0.0)
     if order == "fails":
-        found, error, force_uncertainty = found.unproved(), np.inf, np.inf
+        error = force_uncertainty = np.inf
         slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
+    status = walk.status()[0]
     certificate = ShearCertificate(
         scope=contact.certificate.scope if levels.proved and order != "fails" else "none",
         order=order,
@@ -270,7 +254,7 @@ def _state(
     return ShearState(
         contact=contact,
         force=total if force is None else force,
-        displacement=moved,
+        displacement=float(found.displacements[0]) if displacement is None else displacement,
         forces=found.forces[0],
         displacements=frozen(np.where(loaded, found.asperity_displacements[0], 0.0)),
         slips=frozen(np.where(loaded, found.drifts[0], 0.0)),
@@ -292,17 +276,6 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
 
     root = brentq(beyond, -1.0, 1.0, xtol=1e-12)
     return Fraction(root) * levels.load
-
-
-def _nothing_loaded(contact: Contact, displacement: float) -> ShearState:
-    if displacement:
-        raise InputError("displacement", found=displacement, expected="0, as nothing is loaded")
-    zero = frozen(np.zeros(len(contact.scene)))
-    normal = contact.certificate
-    certificate = ShearCertificate(
-        normal.scope, "proved", normal.status, zero, zero, zero, 0.0, 0.0
-    )
-    return ShearState(contact, 0.0, 0.0, zero, zero, zero, zero, certificate)
 
 
 def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> ShearCertificate:

@@ -168,7 +168,7 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
     contact = state.contact
     checks.instance("direction", direction, Direction)
     sheared = Frictional.of(state)
-    if sheared.height(state.force) == sheared.known.load:
+    if abs(sheared.known.height(state.force)) == sheared.known.load:
         expected = "a force below f P, where the derivative is finite"
         raise InputError("force", found=f"{state.force}: gross sliding", expected=expected)
     sign = -1.0 if state.force < 0 else 1.0
@@ -284,12 +284,7 @@ def _bending(geometry: Geometry, heights: Ball, tips: Ball, moved: Ball, sphere:
 def _moved(positions: ArrayLike, n: int) -> Array:
     """(n, 2) checked; one number stands for all."""
     expected = f"({n}, 2) finite numbers: x and y of each asperity"
-    try:
-        if np.asarray(positions).dtype.kind not in "biuf":
-            raise TypeError("no real numbers")
-        moved = np.asarray(positions, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError("positions", found=repr(positions)[:60], expected=expected) from error
+    moved = checks.numbers("positions", positions, expected)
     if moved.shape not in ((), (n, 2)):
         raise InputError("positions", found=f"shape {moved.shape}", expected=expected)
     if not (np.abs(moved) <= checks.LARGEST).all():  # nan is not

@@ -11,8 +11,8 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle
-from convexrough.friction.path import History, LoadPath
-from convexrough.friction.shear import limited
+from convexrough.friction.levels import height_at
+from convexrough.friction.path import LoadPath
 from convexrough.gradients.along import NONE, Along, Walk
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held
 from convexrough.gradients.pulled import Part
@@ -55,41 +55,32 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
     return Gradient.of(Number.of(contact, top, parts, explicit), holding)
 
 
-def history_gradient(
-    history: History,
+def path_gradient(
+    path: LoadPath,
     *,
     losses: ArrayLike | None = None,
     displacements: ArrayLike | None = None,
     holding: Holding | None = None,
 ) -> Gradient:
-    """As `History.gradient`."""
-    sheared, holding = Frictional.of(history), control_held(history.contact, holding)
-    m = len(history.forces)
-    if losses is None and displacements is None:
-        expected = "at least one: weights on what is to be differentiated"
-        raise InputError("losses, displacements", found="none", expected=expected)
+    """As `LoadPath.gradient`."""
+    sheared, m = Frictional.of(path), len(path.forces)
+    holding = control_held(path.contact, holding)
     spent, far = (
         checks.array(name, 0.0 if given is None else given, length=m, one="force")
         for name, given in (("losses", losses), ("displacements", displacements))
     )
-    if any(sheared.height(force) == sheared.known.load for force in history.forces.tolist()):
+    if losses is None and displacements is None:
+        spent = np.eye(m)[-1]
+    known = sheared.known
+    if path.load_constant and any(
+        abs(known.height(force)) == known.load for force in path.forces.tolist()
+    ):
         expected = "forces below f P: where all slide, a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
     later = np.cumsum(spent[::-1])[::-1]  # what is lost at a step counts in all that follow
     steps = [(k, Fraction(later[k]), Fraction(far[k])) for k in range(m)]
-    walk = Walk(sheared.known.load, steps)
-    loads = np.full(len(history.forces), float(sheared.known.load))
-    return _gradient(sheared, walk, loads, history.forces, holding, paths=False)
-
-
-def path_gradient(path: LoadPath, *, displacement: float | None = None) -> Gradient:
-    """As `LoadPath.gradient`."""
-    lost, moved = Fraction(displacement is None), Fraction(0)
-    if displacement is not None:
-        moved = Fraction(checks.finite("displacement", displacement))
-    last = len(path.loads) - 1
-    walk = Walk(Fraction(path.start), [(k, lost, moved * (k == last)) for k in range(last + 1)])
-    return _gradient(Frictional.of(path), walk, path.loads, path.forces, "load", paths=True)
+    walk = Walk(Fraction(path.start), steps)
+    return _gradient(sheared, walk, path.loads, path.forces, holding, paths=not path.load_constant)
 
 
 def _gradient(
@@ -99,13 +90,14 @@ def _gradient(
     if paths and holding == "approach":
         expected = '"load": the loads of all points are prescribed'
         raise InputError("holding", found='"approach"', expected=expected)
-    m, f = len(applied), sheared.f
-    P, fraction = [Fraction(load) for load in loads.tolist()], Fraction(float(f.value))
-    T = [limited(p, Fraction(q) / fraction) for p, q in zip(P, applied.tolist(), strict=True)]
+    m, scene = len(applied), sheared.contact.scene
+    P = [Fraction(load) for load in loads.tolist()]
+    T = [height_at(p, q, scene) for p, q in zip(P, applied.tolist(), strict=True)]
     along = Along(sheared.known, walk, P, T)
     parts, spent, far = along.parts({} if paths else sheared.top_moves)
     nothing = [Fraction(0)] * m
     each = [[Fraction(int(i == k)) for i in range(m)] for k in range(m)]
+    f = sheared.f
     forces, force_sides = along.slopes([(nothing, one) for one in each], 1.0 / f)
     scaled, _ = along.slopes([(nothing, T)], 1.0 / f)
     by_friction = (spent * 2.0 + far) / f - scaled[0]

@@ -16,7 +16,7 @@ from convexrough.errors import InputError, ProofError
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
-from convexrough.friction.shear import ShearState, limited
+from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held, levels
 from convexrough.gradients.pulled import ZERO, Moves, Part, product
 from convexrough.normal.level import Level, Levels
@@ -73,14 +73,9 @@ class Frictional:
         """[force] of levels."""
         return self.known.units.force
 
-    def height(self, force: float | Fraction) -> Fraction:
-        """T = |Q| / f, or P where it is that to rounding: then all slide."""
-        f = Fraction(checks.friction(self.contact.scene.friction))
-        return limited(self.known.load, abs(Fraction(force)) / f)
-
     def below(self, what: str, force: float | Fraction, holding: Holding) -> Level:
         """The level L = P - |Q| / f."""
-        height = self.height(force)
+        height = abs(self.known.height(force))
         if height == self.known.load and holding == "approach":
             expected = "a force below f P: with the approach held f P may fall below the force"
             raise InputError(what, found=f"{float(force)}: gross sliding", expected=expected)

@@ -7,8 +7,10 @@ for ever once L* falls below its onset sigma_i: docs/theory/shakedown.md, "The e
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple, cast
+from functools import partial
+from typing import ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +33,9 @@ from convexrough.scene.scene import Scene
 from convexrough.vector_shear.loaded import Loaded
 
 Theory = Literal["exact", "elastic", "vector"]
+
+#: Shakedown with what is prescribed: to be called with what is found.
+Limit: TypeAlias = "Callable[..., Shakedown]"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,40 +148,27 @@ def shakedown(
         expected = "a path that moves: at least two points, such as [Q, -Q]"
         given = "one point" if len(q) else "none"
         raise InputError("force_amplitudes", found=given, expected=expected)
-    if kind == "exact":
-        contact = press(scene, load=P0, influence=influence)
-        found = _exact(contact, float(t0), p, t)
-    elif np.any(p):
+    if kind != "exact" and np.any(p):
         expected = 'none: only "exact" holds where the normal load varies'
         raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)
-    else:
-        contact = press(scene, load=P0, influence=influence)
-        found = _elastic(contact, float(t0), t) if kind == "elastic" else _vector(contact, t0, t)
-    return Shakedown(
+    contact = press(scene, load=P0, influence=influence)
+    limit = partial(
+        Shakedown,
         scene=scene,
         kind=kind,
         load=P0,
         force=frozen(f * t0) if kind == "vector" else float(f * t0),
         load_amplitudes=frozen(p),
         force_amplitudes=frozen(q),
-        **found._asdict(),
     )
+    if kind == "exact":
+        return _exact(limit, contact, float(t0), p, t)
+    if kind == "elastic":
+        return _elastic(limit, contact, float(t0), t)
+    return _vector(limit, contact, t0, t)
 
 
-class _Found(NamedTuple):
-    """As in `Shakedown`."""
-
-    factor: float
-    lower: float
-    upper: float
-    factors: Array
-    gross: float
-    witness: Array
-    mechanism: Array
-    order: Order | None = None
-
-
-def _exact(contact: Contact, t0: float, p: Array, t: Array) -> _Found:
+def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Shakedown:
     levels, scene = contact.cached(FrictionLevels), contact.scene
     f, P0 = checks.friction(scene.friction), float(levels.load)
     plus, minus = float((-(p + t)).max()), float((-(p - t)).max())
@@ -198,7 +190,7 @@ def _exact(contact: Contact, t0: float, p: Array, t: Array) -> _Found:
     )
     height = t0 - lower * (plus - minus) / 2 if fall > 0 else t0
     gaps = np.maximum(-beyond.indentations, 0.0) * (contact.loads > 0)
-    return _Found(
+    return limit(
         factor=float(factors[last]),
         lower=lower * (1 - SAFETY) if proved else 0.0,
         upper=upper * (1 + SAFETY) if proved else np.inf,
@@ -210,7 +202,7 @@ def _exact(contact: Contact, t0: float, p: Array, t: Array) -> _Found:
     )
 
 
-def _elastic(contact: Contact, t0: float, t: Array) -> _Found:
+def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
     """The scalar program in closed form: alternating slip of one asperity, or gross sliding."""
     f = checks.friction(contact.scene.friction)
     problem, shares = Loaded.of(contact), scalar_shares(contact)
@@ -240,7 +232,7 @@ def _elastic(contact: Contact, t0: float, t: Array) -> _Found:
     part = (t0 / problem.units.force - room_low.sum()) / (width.sum() or 1.0)
     factors = np.full(len(contact.scene), np.nan)
     factors[problem.touching] = each
-    return _Found(
+    return limit(
         factor=factor,
         lower=lower * (1 - SAFETY) if proved else 0.0,
         upper=upper * (1 + SAFETY) if proved else np.inf,
@@ -251,11 +243,11 @@ def _elastic(contact: Contact, t0: float, t: Array) -> _Found:
     )
 
 
-def _vector(contact: Contact, t0: Array, t: Array) -> _Found:
+def _vector(limit: Limit, contact: Contact, t0: Array, t: Array) -> Shakedown:
     f = checks.friction(contact.scene.friction)
     found = program.solve(contact, t0, t)
     slips = np.hypot(*np.moveaxis(found.slips, -1, 0)).max()
-    return _Found(
+    return limit(
         factor=found.factor,
         lower=found.lower,
         upper=found.upper,
@@ -268,10 +260,7 @@ def _vector(contact: Contact, t0: Array, t: Array) -> _Found:
 
 def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
     """(m, 2) of forces in the plane; one of them, or a number along x, if one is expected."""
-    try:
-        given = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(what, found=repr(values)[:60], expected="numbers") from error
+    given = checks.numbers(what, values)
     if given.ndim == 0 and dimensions == 1:
         given = np.array([float(given), 0.0])
     if given.ndim != dimensions or given.shape[-1] != 2 or not np.isfinite(given).all():

@@ -40,7 +40,7 @@ class PaperStates:
     steady: cr.Cycle
     loop: cr.Loop
     fractions: Array
-    path: cr.History
+    path: cr.LoadPath
     cycles: list[cr.Cycle]
 
     @classmethod

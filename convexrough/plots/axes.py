@@ -15,7 +15,7 @@ from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.fretting import Fretting
-from convexrough.friction.path import History, LoadPath, Path
+from convexrough.friction.path import LoadPath
 from convexrough.friction.phases import PhaseLosses
 from convexrough.friction.shear import ShearState
 from convexrough.friction.side_by_side import PathComparison
@@ -67,17 +67,18 @@ def plot(
 
     result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
         Cycle: its loop, or the plane of loads where P varies; Fretting: map of slip amplitudes;
-        History: its path, Q against X; Gradient: map of derivatives; Verdict: map of asperities
-        that are not as claimed; Comparison, PathComparison: what each solver or method took;
-        LoadPath, MemoryCurve: the plane of loads; PhaseLosses: loss against phase; Shakedown: map
-        of the factors; Surface, Summits: map; Provability: contacts by pruning
+        LoadPath: Q against X where the load is held, else the plane of loads; MemoryCurve: that
+        plane; Gradient: map of derivatives; Verdict: map of asperities that are not as claimed;
+        Comparison, PathComparison: what each solver or method took; PhaseLosses: loss against
+        phase; Shakedown: map of the factors; Surface, Summits: map; Provability: contacts by
+        pruning
     axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
     length_unit, force_unit : of the scene; where they are named, axes are in SI units with prefixes
 
     Raises InputError for anything else.
     """
     if _draw.dispatch(type(result)) is _draw.dispatch(object):
-        expected = "a result that has a picture: a Contact, a state, a Cycle, History, ..."
+        expected = "a result that has a picture: a Contact, a state, a Cycle, LoadPath, ..."
         raise InputError("result", found=f"type {type(result).__name__}", expected=expected)
     if axes is None:
         axes = Figure(figsize=(SINGLE, 3.2), layout="constrained").subplots()
@@ -93,7 +94,7 @@ def thumbnail(result: object) -> str:
     """A small picture of a result as an image of HTML: of a cycle or a path a map of its status."""
     figure = Figure(figsize=(SINGLE, 3.0), layout="constrained")
     axes = figure.subplots()
-    if isinstance(result, (Cycle, Path)) and result.contact.loads.any() and len(result.forces):
+    if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):
         status = result.status if isinstance(result, Cycle) else result.status[-1]
         scale, radii = Scale(result.contact), result.contact.contact_radii
         draw_contact(axes, scale, status_layers(status, radii))
@@ -133,11 +134,6 @@ def _(cycle: Cycle, axes: Axes, *units: str) -> None:
         draw_loop(axes, scale, smooth_loop(scale.sphere, loop.forces), loop.forces, smooth=True)
     axes.legend(fontsize=TICK, frameon=False, loc="upper left")
     return label(axes, scale.displacement.label("X"), scale.force.label("Q"))
-
-
-@_draw.register
-def _(past: History, axes: Axes, *units: str) -> None:
-    draw_path_loop(axes, past, Scale(past.contact, *units), between(past))
 
 
 @_draw.register
@@ -185,7 +181,10 @@ def _draw_times(axes: Axes, rows: Sequence[tuple[str, Any, str]]) -> None:
 
 @_draw.register
 def _(path: LoadPath, axes: Axes, *units: str) -> None:
-    draw_path(axes, path, units[1])
+    if path.load_constant:
+        draw_path_loop(axes, path, Scale(path.contact, *units), between(path))
+    else:
+        draw_path(axes, path, units[1])
 
 
 @_draw.register

@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, Normalize
 
 from convexrough.arrays import Array
-from convexrough.friction.path import History, LoadPath, Path
+from convexrough.friction.path import LoadPath
 from convexrough.plots.asperity_map import (
     draw_map,
     map_window,
@@ -42,7 +42,7 @@ MOST_MAPS = 8
 
 
 def history_figures(
-    past: History, *, fine: Path | None = None, length_unit: str = "", force_unit: str = ""
+    past: LoadPath, *, fine: LoadPath | None = None, length_unit: str = "", force_unit: str = ""
 ) -> Figures:
     """The figure of a history.
 
@@ -65,7 +65,7 @@ def history_figures(
 
 
 def path_figures(
-    path: LoadPath, *, fine: Path | None = None, length_unit: str = "", force_unit: str = ""
+    path: LoadPath, *, fine: LoadPath | None = None, length_unit: str = "", force_unit: str = ""
 ) -> Figures:
     """The figures of a load path.
 
@@ -85,7 +85,7 @@ def path_figures(
     return Figures({"path": figure, "path_stick_slip": _maps(path, scale)})
 
 
-def draw_loop(axes: Axes, path: Path, scale: Scale, fine: Path) -> None:
+def draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     """Q against X."""
     x, q = scale.displacement, scale.force
     _draw_darkening(axes, path, fine, x.of(fine.displacements), q.of(fine.forces))
@@ -94,7 +94,7 @@ def draw_loop(axes: Axes, path: Path, scale: Scale, fine: Path) -> None:
     label(axes, x.short("X"), q.short("Q"))
 
 
-def draw_cost(axes: Axes, path: Path, scale: Scale, fine: Path) -> None:
+def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     """Energy lost since the beginning against the point."""
     m = len(path.losses)
     energy = scale.energy(float(path.losses.max(initial=0.0)))
@@ -110,7 +110,9 @@ def draw_cost(axes: Axes, path: Path, scale: Scale, fine: Path) -> None:
     label(axes, "step", energy.label("W"))
 
 
-def _draw_darkening(axes: Axes, path: Path, fine: Path, x: Array, y: Array) -> ScalarMappable:
+def _draw_darkening(
+    axes: Axes, path: LoadPath, fine: LoadPath, x: Array, y: Array
+) -> ScalarMappable:
     """A curve from the origin, light first and dark last; nothing so light that it is lost."""
     steps = max(1, len(path.forces))
     colours = ScalarMappable(Normalize(0, steps), ListedColormap(shades_of(256, low=0.15)))

@@ -19,7 +19,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.friction.cycle import Cycle, cycles
-from convexrough.friction.path import History, history
+from convexrough.friction.path import LoadPath, history
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
@@ -41,7 +41,7 @@ class Slides:
     contact: Contact
     fractions: Array
     steady: list[Cycle]
-    loading: History
+    loading: LoadPath
 
     @classmethod
     def of(cls, contact: Contact) -> Slides:
@@ -137,7 +137,7 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
 
 
 def _stick(
-    contact: Contact, loading: History, steady: list[Cycle], drawn: Indices
+    contact: Contact, loading: LoadPath, steady: list[Cycle], drawn: Indices
 ) -> list[list[int]]:
     """c_i / a_i = (1 - Q_i / (f P_i))^(1/3) in thousandths, 0 sliding, -1 undecided."""
     left = np.maximum(1.0 - _shares(contact, loading, drawn), 0.0)
@@ -148,13 +148,13 @@ def _stick(
     return [row.tolist() for row in rows]
 
 
-def _shares(contact: Contact, loading: History, which: Indices) -> Array:
+def _shares(contact: Contact, loading: LoadPath, which: Indices) -> Array:
     """(m, k) Q_i / (f P_i)."""
     limits = checks.friction(contact.scene.friction) * contact.loads[which]
     return np.asarray(loading.asperity_forces[:, which] / limits)
 
 
-def _followed(contact: Contact, loading: History, which: Indices, X0: float) -> dict[str, Any]:
+def _followed(contact: Contact, loading: LoadPath, which: Indices, X0: float) -> dict[str, Any]:
     """Curves and proofs of the asperities that can be followed."""
     x, y = contact.scene.asperities.positions[which].T
     certificate = contact.certificate

@@ -85,10 +85,12 @@ class Asperities(Record):
         tip_radius_cv = checks.non_negative("tip_radius_cv", tip_radius_cv)
         if height_std == 0 and tip_radius_cv == 0:
             return self
-        n, seed = len(self), checked_seed(seed)
-        width = np.sqrt(np.log1p(tip_radius_cv**2))
-        heights = self.heights + height_std * cut_normal(n, seed, stream=0)
-        radii = self.tip_radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
+        n, seed, heights, radii = len(self), checked_seed(seed), self.heights, self.tip_radii
+        if height_std > 0:
+            heights = heights + height_std * cut_normal(n, seed, stream=0)
+        if tip_radius_cv > 0:
+            width = np.sqrt(np.log1p(tip_radius_cv**2))
+            radii = radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
         return self.with_tips(radii, heights)
 
     @classmethod
@@ -187,12 +189,7 @@ def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
 
 
 def _points(positions: ArrayLike) -> Array:
-    try:
-        if np.asarray(positions).dtype.kind in "USV":  # text stands for no number
-            raise TypeError("no numbers")
-        points = np.array(positions, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError("positions", found=repr(positions)[:60], expected="numbers") from error
+    points = checks.numbers("positions", positions)
     if points.size == 0:
         raise InputError("positions", found="no asperity", expected="at least one")
     if points.ndim != 2 or points.shape[1] != 2:

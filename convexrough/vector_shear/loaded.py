@@ -19,7 +19,6 @@ from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
 from convexrough.convex.newton_step import correct
 from convexrough.friction.levels import FrictionLevels
-from convexrough.friction.shear import limited
 from convexrough.influence import Influence, couple
 from convexrough.influence.shells import shells
 from convexrough.normal.boxes import Scope
@@ -125,11 +124,6 @@ class Loaded:
     def most(self) -> Array:
         """(n,) upper bounds on P."""
         return (self.loads + self.errors) * (1 + SAFETY)
-
-    def height(self, force: float) -> Fraction:
-        """T = Q / f [force]; P where it is that to rounding: gross sliding."""
-        f = Fraction(float(self.levels.coefficient.value))
-        return limited(self.levels.load, Fraction(force) / f)
 
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
         """(n,) u and eta of the scalar law under T [force]."""

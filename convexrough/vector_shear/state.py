@@ -118,7 +118,7 @@ def shear_vector(
     scalar = problem.scalar
     exact = Ball.exact(Q) / friction / scalar.units.force
     total = exact.value
-    height = scalar.height(size)
+    height = scalar.levels.height(size)
     if size == 0.0:
         state = _at_rest(problem)
     elif height == scalar.levels.load:

@@ -18,7 +18,7 @@ from convexrough.contact import levels_of
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.loss import shared
-from convexrough.friction.path import follow
+from convexrough.friction.walk import follow
 from convexrough.normal import stack
 from convexrough.normal.level import Level
 from convexrough.numbers.balls import Ball

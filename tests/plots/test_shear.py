@@ -49,7 +49,7 @@ def steady(name: str, maximum: Any, minimum: Any = None) -> list[cr.Cycle]:
     return cr.cycles(contact(name), np.multiply(maximum, limit(name)), lower)
 
 
-def past(name: str, shares: Any) -> cr.History:
+def past(name: str, shares: Any) -> cr.LoadPath:
     return cr.history(contact(name), forces=np.multiply(shares, limit(name)))
 
 

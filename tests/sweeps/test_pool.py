@@ -47,6 +47,7 @@ class Shuffled(Executor):
         return self._given[-1][0]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("workers", [1, 2, 3])
 def test_processes(workers: int) -> None:
     assert same(cr.sweep(MANY, workers=workers), WHOLE)
@@ -63,6 +64,7 @@ def test_executors(executor: Any) -> None:
     given.shutdown()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("most", [1, 3, 7, 1000])
 def test_batches(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan, "MOST_SCENES", most)
@@ -129,7 +131,7 @@ np.savez(sys.argv[1], **rows)
 
 def test_threads_of_linear_algebra_do_not_matter(tmp_path: Path) -> None:
     found = []
-    for threads in ("1", "2", "7"):
+    for threads in ("1", "7"):
         names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
         environment = {**os.environ, **dict.fromkeys(names, threads)}
         environment["PYTHONPATH"] = os.pathsep.join(sys.path)
@@ -138,7 +140,6 @@ def test_threads_of_linear_algebra_do_not_matter(tmp_path: Path) -> None:
         found.append(np.load(out))
     for name in found[0].files:
         assert found[0][name].tobytes() == found[1][name].tobytes(), name
-        assert found[0][name].tobytes() == found[2][name].tobytes(), name
 
 
 def test_the_threads_are_given_back() -> None:

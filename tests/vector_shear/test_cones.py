@@ -24,7 +24,7 @@ from convexrough import FrictionConic, shear_vector
 from convexrough.vector_shear.problem import VectorProblem
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("fraction", [1e-40, *VECTOR_FRACTIONS, 0.9999])
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_cones_and_newton_agree(nu: float, fraction: float) -> None:
@@ -53,6 +53,7 @@ def blunt(tip_radius: float) -> cr.Contact:
     return cr.press(scene, approach=PAPER_APPROACH)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("fraction", [1e-6, 0.2, 0.5, 0.9])
 @pytest.mark.parametrize("tip_radius", [0.3, 0.5])
 def test_five_cones(tip_radius: float, fraction: float) -> None:

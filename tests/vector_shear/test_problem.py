@@ -70,7 +70,7 @@ def test_the_residual_sees_every_fault() -> None:
     assert problem.residual(short) > 1e-4  # total
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(random_scenes(crowding=0.9), st.floats(1e-3, 0.999), st.floats(0, 0.5))
 def test_the_duality_gap_bounds_what_forces_cost_too_much(
     drawn: tuple[cr.Scene, float], fraction: float, nu: float
@@ -94,7 +94,7 @@ def test_the_duality_gap_bounds_what_forces_cost_too_much(
         assert duality_gap(problem, moved) >= excess * (1 - 1e-9) - 1e-11 * least
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(random_scenes(crowding=0.9), st.floats(1e-3, 0.99), st.floats(0, 0.5), st.floats(0, 6.3))
 def test_the_duality_gap_counts_its_rounding(
     drawn: tuple[cr.Scene, float], fraction: float, nu: float, angle: float

@@ -5,6 +5,7 @@ import io
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -369,7 +370,8 @@ def test_units_of_summits_in_a_sweep(tmp_path: Path, case: Case) -> None:
     text = (tmp_path / "scene.toml").read_text()
     sweep = '[sweep]\nmeasure = ["load"]\n[sweep.over]\n"normal.approach" = [2e-7, 4e-7]\n'
     (tmp_path / "sweep.toml").write_text(text + sweep)
-    table = cr.sweep(tmp_path / "sweep.toml")
+    with ThreadPoolExecutor(1) as here:
+        table = cr.sweep(tmp_path / "sweep.toml", executor=here)
     np.testing.assert_allclose(table.read()["load"][1], case.contact.load, rtol=1e-12)
 
 

@@ -1,0 +1,130 @@
+"""A path of (P, T = Q / f) through the levels of a contact: all of friction are views of it.
+
+The memory curve names the levels, states are sums over them, and each piece of the front costs what
+it costs. Where order is seen to fail general steps answer, of which nothing is proved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices, frozen
+from convexrough.friction.curve import MemoryCurve, Piece
+from convexrough.friction.general_step import SteppedPath, Stepper, followed
+from convexrough.friction.levels import FrictionLevels, rounded
+from convexrough.friction.loss import losses
+from convexrough.friction.order import Order
+from convexrough.friction.state import States, states_of, statuses_of, used_by
+from convexrough.numbers.balls import TINY, UP, Ball
+from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
+from convexrough.roundoff import SAFETY
+
+#: (P, T = Q / f), exactly.
+Point: TypeAlias = tuple[Fraction, Fraction]
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """From a memory curve straight through m points.
+
+    steps, stepper : take general steps, so many per segment; None where order fails alone
+    """
+
+    levels: FrictionLevels
+    start: MemoryCurve
+    points: Sequence[Point]
+    steps: int | None = None
+    stepper: type[Stepper] = Stepper
+
+    @cached_property
+    def _followed(self) -> tuple[list[MemoryCurve], list[list[Piece]]]:
+        return follow(self.start, self.points)
+
+    @property
+    def curves(self) -> list[MemoryCurve]:
+        """The memory curve after each point."""
+        return self._followed[0]
+
+    @property
+    def pieces(self) -> list[list[Piece]]:
+        """What each segment costs."""
+        return self._followed[1]
+
+    @cached_property
+    def needed(self) -> set[Fraction]:
+        """The loads of all levels that states and losses rest on."""
+        return levels_needed(self.curves, self.pieces)
+
+    @cached_property
+    def order(self) -> Order:
+        """Between these levels and that of P."""
+        return self.levels.order(self.needed)
+
+    @cached_property
+    def general(self) -> SteppedPath | None:
+        """What general steps find, where they are asked for or order fails."""
+        if self.steps is None and (self.order != "fails" or not self.levels.proved):
+            return None
+        return followed(self.levels, self.start, self.points, self.steps, self.stepper)
+
+    def states(self, which: Indices | None = None) -> States:
+        """After each point, of some asperities or of all."""
+        if self.general is None:
+            found = states_of(self.levels, self.curves, which)
+            return found.unproved() if self.order == "fails" else found
+        return self.general.states.among(which)
+
+    def status(self) -> NDArray[np.str_]:
+        """(m, N)"""
+        if self.general is not None:
+            return self.general.status
+        return frozen(
+            np.array([statuses_of(self.levels, each, self.order) for each in self.curves])
+        )
+
+    def losses(self) -> tuple[Array, Array]:
+        """(m,) energy lost since the beginning [force length], and proved bounds."""
+        unknown = frozen(np.full(len(self.points), np.inf))
+        if self.general is not None:
+            return self.general.losses, unknown
+        each = losses(self.levels, self.pieces)
+        spent, errors = rounded(_cumulated(each) * self.levels.loss_unit)
+        return spent, errors if self.order == "proved" else unknown
+
+
+def follow(
+    curve: MemoryCurve, points: Iterable[Point]
+) -> tuple[list[MemoryCurve], list[list[Piece]]]:
+    """The memory curve after each point, and the pieces that each segment costs."""
+    curves: list[MemoryCurve] = []
+    costs: list[list[Piece]] = []
+    for load, height in points:
+        curve, pieces = curve.go(load, height)
+        curves.append(curve)
+        costs.append(pieces)
+    return curves, costs
+
+
+def levels_needed(curves: Sequence[MemoryCurve], costs: Iterable[Iterable[Piece]]) -> set[Fraction]:
+    """The loads of all levels that these states and losses rest on."""
+    return used_by(curves) | {load for pieces in costs for piece in pieces for load in piece[2:]}
+
+
+def _cumulated(each: Ball) -> Ball:
+    """(m,) the sums of the first, the first two, ..."""
+    total, error, sums = Pair(0.0, 0.0), 0.0, []
+    for high, low, radius in zip(
+        *(part.tolist() for part in (*each.mid, each.radius)), strict=True
+    ):
+        total = total + Pair(high, low)
+        error += radius + PAIR_ROUNDOFF * abs(total.high) + TINY
+        sums.append((*total, error * UP))
+    found = np.array(sums).reshape(-1, 3).T
+    return Ball(Pair(found[0], found[1]), found[2] * (1 + SAFETY))
