@@ -98,7 +98,7 @@ def numbers_of(found: Any, names: Sequence[str]) -> Summary:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(Table, Plottable):
-    """What a stage found: the summary, tables, figures and words are all read off `rows`.
+    """What a stage found: the summary, tables, figures and printed lines are all read off `rows`.
 
     found : results of the package, one for each row, or one with arrays along steps
     """
