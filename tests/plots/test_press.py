@@ -90,7 +90,7 @@ def contact(request: pytest.FixtureRequest) -> cr.Contact:
 def test_fit_to_print(contact: cr.Contact) -> None:
     for figure in press_figures(contact, length_unit="µm", force_unit="mN").values():
         fits(figure)
-        for axes in figure.axes[:2]:
+        for axes in figure.axes[:2] if contact.loads.any() else ():
             assert axes.get_xlabel()
             assert axes.get_ylabel()
 
