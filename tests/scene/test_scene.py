@@ -5,11 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, paper
-from scipy.optimize import minimize
 
 import convexrough as cr
 from convexrough.scene.asperities import largest_tip_radius
@@ -107,21 +104,6 @@ def test_random_heights_and_radii() -> None:
     assert both.tip_radii.std() / both.tip_radii.mean() == pytest.approx(0.3, rel=0.05)
     assert both.tip_radii.max() <= largest_tip_radius(2.0, 0.3)
     assert np.abs(both.heights).max() <= CUT_DEVIATIONS * 0.1
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.floats(0.1, 10), st.floats(0.01, 10), st.floats(-2, 2), st.floats(-2, 2))
-def test_closest_points_by_minimisation(radius: float, tip: float, x: float, y: float) -> None:
-    """The closest geometry's contact point and drop minimise the gap of two paraboloids."""
-    scene = cr.Scene(radius, cr.Asperities([[x, y]], tip), MATERIAL, geometry="closest")
-
-    def gap(point: Any) -> float:
-        u, v = point
-        return (u * u + v * v) / (2 * radius) + ((u - x) ** 2 + (v - y) ** 2) / (2 * tip)
-
-    best = minimize(gap, [x, y], tol=1e-14)
-    assert_allclose(scene.contact_points[0], best.x, atol=1e-5)
-    assert scene.drops[0] == pytest.approx(best.fun, rel=1e-8, abs=1e-12)
 
 
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
