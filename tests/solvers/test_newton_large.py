@@ -339,5 +339,5 @@ def test_progress_of_the_steps(approach: float, caplog: pytest.LogCaptureFixture
     )
     news = caplog.messages
     assert news[-1] == "certifying"
-    assert news[0].startswith("step 1, residual ")
-    assert " touching" in news[0]
+    assert news[0].startswith("newton: step 1, objective ")
+    assert ", residual " in news[0]
