@@ -135,13 +135,8 @@ class ShearState(Table, Plottable):
         """
         from convexrough.gradients.states import state_gradient  # a floor above: when asked
 
-        return state_gradient(
-            self,
-            displacement=displacement,
-            forces=forces,
-            slips=slips,
-            holding=holding,
-        )
+        weights = {"displacement": displacement, "forces": forces, "slips": slips}
+        return state_gradient(self, holding, **weights)
 
     def change(self, direction: Direction) -> ShearChange:
         """How forces, slips and the displacement change, to first order, when the scene does.
