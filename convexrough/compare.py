@@ -8,14 +8,14 @@ contradict each other: each box may contain a solution of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import combinations
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from convexrough.influence import Kind
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
 from convexrough.plottable import Plottable
-from convexrough.progress import LOGGER
+from convexrough.progress import LOGGER, logged_steps
 from convexrough.record import LINE, Record, Table, in_words
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
@@ -50,6 +50,8 @@ class Entry(Record):
     contact : the certified solution, or None
     disagreement : max |load - reference| over the largest load of the reference; nan without both
     different_words : asperities whose status differs from the reference; None without both
+    steps : the log of its iterations, where `compare` was asked for it: by step a mapping of
+        solver, step, objective and residual; those of OSQP and CVXPY are not known
     memory : [bytes] largest increase of the resident memory of the process during the solution,
         without memory that the allocator reused; None if the system is not Linux
     """
@@ -61,6 +63,7 @@ class Entry(Record):
     disagreement: float = np.nan
     different_words: int | None = None
     memory: int | None = None
+    steps: tuple[Mapping[str, Any], ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,6 +124,7 @@ def compare(
     load: float | None = None,
     solvers: Sequence[solvers.Solver] | None = None,
     influence: Kind | None = None,
+    log: bool = False,
 ) -> Comparison:
     """Press on the scene with every solver.
 
@@ -128,6 +132,7 @@ def compare(
     solvers  : settings objects; the default is `every_solver()`. Newton's method is the reference
         and always the first
     influence : compliance operator, as for `press`
+    log : keep the steps of each solver in its entry
 
     Raises InputError where the reference refuses the input. Errors of the other solvers are in
     their entries.
@@ -139,7 +144,11 @@ def compare(
         LOGGER.info(solver.name)
         known = entries[0].contact if entries else None
         pressed = partial(press, scene, approach=approach, load=load, influence=influence)
-        entries.append(_enter(solver, pressed, known))
+        _load_code_of(solver)
+        kept: AbstractContextManager[Sequence[Any]] = logged_steps() if log else nullcontext(())
+        with kept as steps:
+            entry = _enter(solver, pressed, known)
+        entries.append(replace(entry, steps=tuple(steps)))
     answers = [entry.contact for entry in entries if entry.contact is not None]
     pairs = combinations([Answer.of(contact) for contact in answers], 2)
     return Comparison(
@@ -192,7 +201,6 @@ _REFERENCE = solvers.Newton()
 def _enter(
     solver: solvers.Solver, press_with: Callable[..., Contact], reference: Contact | None
 ) -> Entry:
-    _load_code_of(solver)
     memory = MemoryRise()
     try:
         contact = press_with(solver=solver)

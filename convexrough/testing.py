@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from convexrough.arrays import Indices
 from convexrough.compare import Answer, contradictions, joined
 from convexrough.contact import Contact
 from convexrough.errors import InputError
@@ -20,6 +19,7 @@ from convexrough.normal.certificate import Certificate, certify
 from convexrough.normal.claims import Claim
 from convexrough.scene.scene import Scene
 from convexrough.verdict import Verdict, verify
+from convexrough.verdict.report import describe_claim, reason
 
 
 def assert_certified(
@@ -45,7 +45,7 @@ def assert_certified(
     verdict = verify(scene, loads, approach=approach, load=load, within=within, floor=floor)
     if len(verdict.undecided) == len(scene):
         _check_proof(verdict.certificate)
-    _check(verdict, "load", scene)
+    _check(verdict, scene)
     return verdict.certificate
 
 
@@ -68,7 +68,7 @@ def assert_shear_certified(
     """
     __tracebackhide__ = True
     verdict = verify_shear(contact, forces, force=force, within=within, sliding=sliding)
-    _check(verdict, "force", contact.scene)
+    _check(verdict, contact.scene)
     return verdict.certificate
 
 
@@ -147,47 +147,10 @@ def _check_proof(certificate: Certificate, whose: str = "") -> None:
         )
 
 
-def _check(claim: Claim, name: str, scene: Scene) -> None:
-    """Raise AssertionError unless the claim holds; `name` is what its numbers are called."""
+def _check(claim: Claim, scene: Scene) -> None:
+    """Raise AssertionError with the report of `verify` unless the claim holds."""
     __tracebackhide__ = True
-    if claim.holds:
-        return
-    hints = claim.hints() if isinstance(claim, Verdict) else ()
-    raise AssertionError("\n".join([_wrong(claim, name, scene), *(f"hint: {h}" for h in hints)]))
-
-
-def _wrong(claim: Claim, name: str, scene: Scene) -> str:
-    """What keeps a claim from holding."""
-
-    def described(which: Indices) -> str:
-        return _described(claim, name, scene, which)
-
-    if len(wrong := claim.wrongly_claimed):
-        first = claim.suspects[np.isin(claim.suspects, wrong)]
-        named = np.append(first, np.setdiff1d(wrong, first))
-        counts = {what: len(which) for what, which in claim.wrong.items() if len(which)}
-        kinds = ", ".join(f"{count} {what}" for what, count in counts.items())
-        return f"{kinds}: {described(named)}"
-    if len(doubtful := claim.undecided):
-        count = f"{len(doubtful)} of {len(scene)} asperities are undecided"
-        return f"{count}: {described(doubtful)}"
-    if not claim.near_enough:
-        worst = claim.suspects if len(claim.suspects) else claim.off
-        bound = f"{name}s are proved to {claim.error:.2g} of the largest"
-        needed = "enough for all statuses" if claim.within is None else f"{claim.within:g}"
-        return f"{bound}, expected {needed}: {described(worst)}"
-    return f"{name}s add up to {claim.total_given:.17g}, expected {claim.total_prescribed:.17g}"
-
-
-def _described(claim: Claim, name: str, scene: Scene, which: Indices) -> str:
-    """The asperities with the claimed value, its error bound, and the proved status."""
-    points, nearby = scene.asperities.positions, claim.nearby()
-
-    def solved(i: int) -> str:
-        return "" if nearby is None else f", solved {nearby[0][i]:.6g}"
-
-    return joined(
-        f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g}) has {name} {claim.values[i]:.6g} +- "
-        f"{claim.errors[i]:.2g}{solved(i)}, {claim.status[i]}"
-        for i in which
-    )
+    if not claim.holds:
+        hints = claim.hints() if isinstance(claim, Verdict) else ()
+        lines = [reason(claim), *describe_claim(claim, scene), *(f"hint: {h}" for h in hints)]
+        raise AssertionError("\n".join(lines))

@@ -1,7 +1,6 @@
 """Sweeps that several tests compute, and what it means that two tables are the same."""
 
 import json
-import logging
 import os
 import signal
 import subprocess
@@ -15,9 +14,8 @@ from typing import Any
 import numpy as np
 
 import convexrough as cr
-from convexrough.progress import LOGGER
-from convexrough.sweeps.measures import Stages
-from convexrough.sweeps.scenes import Press, Tables
+from convexrough.progress import logged
+from convexrough.sweeps.scenes import Ask, Asked, Tables
 
 SMALL: dict[str, Any] = {
     "sphere": {"radius": 1.0},
@@ -88,19 +86,8 @@ def _equal(one: Any, other: Any) -> bool:
 @contextmanager
 def reported_to(call: Callable[[str], None]) -> Iterator[None]:
     """Call with all that is said while work goes on, as it is said."""
-
-    class Handler(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            call(record.getMessage())
-
-    handler, level = Handler(), LOGGER.level
-    LOGGER.addHandler(handler)
-    LOGGER.setLevel(logging.INFO)
-    try:
+    with logged(lambda record: call(record.getMessage())):
         yield
-    finally:
-        LOGGER.removeHandler(handler)
-        LOGGER.setLevel(level)
 
 
 def started(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
@@ -123,12 +110,12 @@ class Deadly(Tables):
 
     worst: int = 0
 
-    def opened(self) -> Press:
-        press = super().opened()
+    def opened(self) -> Ask:
+        ask = super().opened()
 
-        def press_one(number: int) -> tuple[cr.Contact, Stages]:
+        def ask_one(number: int) -> Asked:
             if number == self.worst:
                 os.kill(os.getpid(), signal.SIGKILL)
-            return press(number)
+            return ask(number)
 
-        return press_one
+        return ask_one

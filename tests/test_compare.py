@@ -18,6 +18,7 @@ import convexrough as cr
 from convexrough import compare as comparing
 from convexrough.compare import Answer, compare, contradictions, every_solver
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import LOGGER
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton, Solution
 
 NAMES = [
@@ -154,6 +155,31 @@ def test_without_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     assert comparison.certified
 
 
+def test_steps_are_kept_where_they_are_asked_for() -> None:
+    chosen = [Conic(), BristleQP()]
+    newton, conic, bristles = compare(paper(), approach=5e-5, solvers=chosen, log=True).entries
+    assert bristles.steps == ()
+    for entry, solver, first in ((newton, "newton", 1), (conic, "clarabel", 0)):
+        assert [step["step"] for step in entry.steps] == [*range(first, first + len(entry.steps))]
+        assert {step["solver"] for step in entry.steps} == {solver}
+        assert entry.steps[-1]["residual"] < 1e-8 < entry.steps[0]["residual"]
+    energies = [step["objective"] for step in newton.steps]
+    assert energies == sorted(energies, reverse=True)
+    assert conic.steps[-1]["objective"] == pytest.approx(energies[-1], rel=1e-7)
+    assert not LOGGER.handlers
+    plain = compare(paper(), approach=5e-5, solvers=chosen)
+    assert not any(entry.steps for entry in plain.entries)
+
+
+@pytest.mark.parametrize(
+    ("solver", "said"), [(BristleQP, "OSQP"), (ConicCVXPY, "CVXPY"), (ConicCVXPY, "Clarabel")]
+)
+def test_libraries_print_their_iterations(capfd: Any, solver: Any, said: str) -> None:
+    for verbose in (False, True):
+        cr.press(paper(), approach=5e-5, solver=solver(verbose=verbose))
+        assert (said in capfd.readouterr().out) is verbose
+
+
 def test_wrong_input_is_raised() -> None:
     with pytest.raises(cr.InputError, match="approach, load: found neither"):
         compare(paper())
@@ -256,6 +282,19 @@ def test_command(command: Any, tmp_path: Path) -> None:
     for name, line in zip(NAMES, table[1:], strict=True):
         assert re.match(rf"{re.escape(name)} +\S+ +\S+ +\S+ +global +same +\d+ +\S+ +\S+$", line)
     assert list(tmp_path.iterdir()) == [tmp_path / "a.toml"]
+
+
+def test_command_with_a_log(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    assert command("compare", "a.toml", "--solver", "conic", "--log", "log.csv").status == 0
+    first, *rows = (tmp_path / "log.csv").read_text().splitlines()
+    assert first == "solver,step,objective,residual"
+    steps = [row.split(",") for row in rows]
+    assert list(dict.fromkeys(name for name, *_ in steps)) == ["newton", "conic + Newton step"]
+    assert all(np.isfinite([float(number) for number in row]).all() for _, *row in steps)
+    again = command("compare", "a.toml", "--log", "log.csv")
+    assert (again.status, again.out) == (2, "")
+    assert "log.csv: is there already" in again.err
 
 
 def fail(*_: Any, **__: Any) -> None:

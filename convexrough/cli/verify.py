@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from convexrough.run.scene_file import SceneFile
     from convexrough.tabular.units import UnitNames
     from convexrough.verdict.claims import Manner
-    from convexrough.verdict.files import Verified
+    from convexrough.verdict.report import Verified
 
 
 def claim_options(command: Command) -> Command:
@@ -97,7 +96,6 @@ def verify(
     loads: Path,
     *,
     within: float | None,
-    floor: float,
     shear: Path | None,
     shear_force: float | None,
     explain: bool,
@@ -124,7 +122,8 @@ def verify(
     from convexrough.run.stages.normal import describe, judged_loads
     from convexrough.run.summary import headed
     from convexrough.verdict import report
-    from convexrough.verdict.files import Question, read_files, verify_files
+    from convexrough.verdict.claims import read_loads, read_shear_forces
+    from convexrough.verdict.files import verify_files
 
     if (shear is None) != (shear_force is None):
         raise click.UsageError("--shear and --shear-force go together.")
@@ -132,13 +131,11 @@ def verify(
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not force:
             raise FileError(f"{each}: is there already; --force replaces it")
-    question = Question(
-        within=within, floor=floor, how=_manner(**how), shear=shear, force=shear_force
-    )
     file = read_scene(scene)
-    question = replace(question, how=replace(question.how, units=file.units, convert=file.convert))
+    manner = _manner(units=file.units, convert=file.convert, **how)
     if explain:
-        read = [each for each in read_files(file.scene, loads, question) if each is not None]
+        read = [read_loads(loads, file.scene, manner)]
+        read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
         lines = [line for each in read for line in (each.note, *each.explained, "")]
         lines += report.describe_scene(file.scene, file.units)
         echo({"read": lines}, lines, as_json)
@@ -148,7 +145,9 @@ def verify(
         with progress(f"judging the loads of {len(file.scene):,} asperities"):
             with blamed_on(scene):
                 problem = file.problem()
-            found = verify_files(problem, loads, question)
+            found = verify_files(
+                problem, loads, manner, within=within, shear=shear, force=shear_force
+            )
         normal = judged_loads(found.verdict.certificate, found.verdict.loads)
         summary = headed(normal=normal) | report.verdict_summary(found)
         evidence = proved(partial(_proof, file, found, scene)) if proof else None
@@ -164,7 +163,8 @@ def verify(
     for hint in found.verdict.hints(file.units.force or "N"):
         say_aside("hint", hint)
     if not found.holds:
-        say_aside("warning", f"not certified: {report.reason(found)}")
+        reasons = filter(None, map(report.reason, found.claims))
+        say_aside("warning", f"not certified: {', '.join(reasons)}")
     if evidence is not None:
         place = (out or Path()) / "proof.json"
         click.echo(f"{evidence.proved}\nwritten  {place}", err=as_json)

@@ -138,16 +138,18 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     left = span.unsettled(rates, rising)
     if len(left) > most:
         return False
-    rates[left] = np.maximum(rates[left], inverse.elsewhere(span, left, m))
+    both = np.concatenate((span.support, left))
+    entries = found.problem.influence.submatrix(both)[
+        None, len(span.support) :, : len(span.support)
+    ]
+    change = span.delta(upper_ends) * upper_ends
+    rates[left] = np.maximum(rates[left], inverse.elsewhere(entries, change[None])[0])
     return not len(span.unsettled(rates, rising))
 
 
 @np.errstate(all="ignore")
 def proved_in_rows(rows: Stack, boxes: Boxes, high: Rows, low: Rows) -> NDArray[np.bool_]:
-    """(m,) `proved_between` of rows of levels, all of whose upper ones are the highest of a path.
-
-    False, too, where more has to be known of open asperities than row sums say.
-    """
+    """(m,) `proved_between` of rows of levels of which the upper are the highest of a path."""
     k, support = rows.coefficients, ~high.open
     c = np.where(support, 1.5 * np.cbrt(high.loads.upper) / k.lower * (1 + SAFETY), 0.0)
     least = np.minimum(LEAST * c.max(axis=1, keepdims=True), 1.0 / boxes.stiffness)
@@ -168,13 +170,31 @@ def proved_in_rows(rows: Stack, boxes: Boxes, high: Rows, low: Rows) -> NDArray[
     )
     inverse = _Inverse.of(entries, c_in, mu, entry_error)
     below, m = inverse.bounds(lambda m: _delta(c_in, depth, steep, m * drop))
+    positive = (~inside | (below > 0)).all(axis=1) & (mu[:, 0] > 0)
     most = np.zeros(c.shape)
     np.put_along_axis(most, order, c_in * m, axis=1)
     coupled = rows.apply(most) * (1.0 + 1.01 * (entry_error + (c.shape[1] + 2) * ROUNDOFF))
     rates = 1.0 - coupled * (1 + SAFETY) - SAFETY
-    stays = (rates > 0) | (-high.indentation.upper > drop * -rates * (1 + SAFETY))
-    rising = (~inside | (below > 0)).all(axis=1) & (support | stays).all(axis=1)
-    return np.asarray(rising & (mu[:, 0] > 0))
+
+    def stays(which: Indices) -> NDArray[np.bool_]:
+        fallen = drop[which] * -rates[which] * (1 + SAFETY)
+        gap = -high.indentation.upper[which]
+        return np.asarray(support[which] | (rates[which] > 0) | (gap > fallen))
+
+    left = np.flatnonzero(positive & ~stays(np.arange(len(c))).all(axis=1))
+    if len(left):
+        change = (_delta(c_in, depth, steep, m * drop) * m)[left]
+        better = inverse.at(left).elsewhere(_columns(rows.only(left), order[left]), change)
+        rates[left] = np.maximum(rates[left], better)
+    return np.asarray(positive & stays(np.arange(len(c))).all(axis=1))
+
+
+def _columns(rows: Stack, which: Indices) -> Array:
+    """(m, n, s) columns (m, s) of the coupling of each row."""
+    entries = np.empty((*which.shape, len(rows.coupled[0][1])))
+    for some, problem in rows.coupled:
+        entries[some] = problem.influence.matrix[which[some]]
+    return entries.swapaxes(1, 2)
 
 
 def _delta(c: Array, depth: Array, steep: Array, fallen: Array) -> Array:
@@ -275,6 +295,10 @@ class _Inverse(NamedTuple):
         errors = error(np.eye(c.shape[1]) - B @ X, X)
         return cls(w, X, errors, v[:, :, 0], error(w[:, :, None] - B @ v, v), lost)
 
+    def at(self, which: Indices) -> _Inverse:
+        """Of some of the rows."""
+        return _Inverse._make(each[which] for each in self)
+
     def bounds(self, delta: Callable[[Array], Array]) -> tuple[Array, Array]:
         """(m, s) lower bounds on the rates of the supports, and m, upper ones; by (1).
 
@@ -293,21 +317,19 @@ class _Inverse(NamedTuple):
         falls = (self.error + (high @ change[:, :, None])[:, :, 0]) * (1 + SAFETY)
         return (self.v - falls) / w - SAFETY * np.abs(self.v / w), m
 
-    def elsewhere(self, span: _Span, which: Indices, m: Array) -> Array:
-        """Lower bounds on the rates of others, that are open; by (1), of the one row."""
-        if len(which) == 0:
-            return np.zeros(0)
-        both = np.concatenate((span.support, which))
-        rows = span.upper.problem.influence.submatrix(both)[len(span.support) :]
-        weighted = rows[:, : len(span.support)] * self.w[0]
-        sizes = np.linalg.norm(weighted, axis=1)
-        lost = self.errors[0] + self.lost[0] * np.linalg.norm(self.matrix[0], axis=0)
-        falls = np.maximum(np.outer(sizes, lost) - weighted @ self.matrix[0], 0.0)
-        m = m[span.support]
-        by_change = falls @ (span.delta(m) * m / self.w[0])
-        off = sizes * (self.error[0] + self.lost[0] * float(np.linalg.norm(self.v[0])))
-        coupled = weighted @ self.v[0]
-        return np.asarray(1.0 - coupled - (by_change + off) * (1 + SAFETY) - SAFETY * (1 + coupled))
+    def elsewhere(self, entries: Array, change: Array) -> Array:
+        """(m, e) lower bounds on the rates of others, that are open; by (1).
+
+        entries : (m, e, s) of A from the supports to the others;  change : (m, s) delta m
+        """
+        weighted, change = entries * self.w[:, None, :], change / np.where(self.w > 0, self.w, 1.0)
+        sizes = np.linalg.norm(weighted, axis=2)
+        lost = self.errors + self.lost * np.linalg.norm(self.matrix, axis=1)
+        falls = np.maximum(sizes[:, :, None] * lost[:, None, :] - weighted @ self.matrix, 0.0)
+        off = self.error + self.lost * np.linalg.norm(self.v, axis=1, keepdims=True)
+        least = (falls @ change[:, :, None])[:, :, 0] + sizes * off
+        coupled = (weighted @ self.v[:, :, None])[:, :, 0]
+        return np.asarray(1.0 - coupled - least * (1 + SAFETY) - SAFETY * (1 + coupled))
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:

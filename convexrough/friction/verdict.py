@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,6 +34,15 @@ class ShearVerdict(Claim, Record):
     solution : the friction state, with its own certificate
     """
 
+    one = "force"
+    many = "shear forces"
+    proved = "statuses"
+    kinds: ClassVar[Mapping[str, str]] = {
+        "wrongly_sliding": "claimed to slide, proved not to",
+        "wrongly_sticking": "claimed to stick, proved to slide",
+    }
+    claims = ("sliding", "sticking")
+
     contact: Contact
     forces: Array
     total_prescribed: float | None
@@ -54,14 +65,6 @@ class ShearVerdict(Claim, Record):
     def wrongly_sticking(self) -> Indices:
         """(m,) not claimed to slide, and proved to."""
         return frozen(np.flatnonzero(~self.claimed & (self.status == "sliding")))
-
-    @property
-    def wrong(self) -> dict[str, Indices]:
-        """The claims of sliding and sticking where they are wrong."""
-        return {
-            "claimed to slide, proved not to": self.wrongly_sliding,
-            "claimed to stick, proved to slide": self.wrongly_sticking,
-        }
 
     @property
     def errors_alone(self) -> Array:

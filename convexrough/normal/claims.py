@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ SUSPICIOUS = 1e-3
 class Claim(ABC):
     """Claimed forces, one per asperity, and the statuses that they imply.
 
+    one, many : what the forces are called;  proved : what is proved right, and
+    kinds     : how it can be wrong: attributes with the indices, and the same in words
+    claims    : what is claimed where `claimed` is true, and where not
     within : largest error allowed, as a fraction of the largest force; None: as accurate as needed
         to prove every status from the forces alone
     total_prescribed : [force] None where it is not prescribed
@@ -29,6 +33,13 @@ class Claim(ABC):
     solution    : a solution with its own statuses; None where it is not needed or not found
     """
 
+    one: ClassVar[str]
+    many: ClassVar[str]
+    proved: ClassVar[str]
+    kinds: ClassVar[Mapping[str, str]]
+    claims: ClassVar[tuple[str, str]]
+
+    claimed: Any
     within: float | None
     total_prescribed: float | None
     certificate: Any
@@ -45,9 +56,9 @@ class Claim(ABC):
         """(n,) [force] what the forces alone prove of |force - solution|; infinite for nothing."""
 
     @property
-    @abstractmethod
     def wrong(self) -> dict[str, Indices]:
         """Indices of asperities whose claimed status is proved wrong, by kind of claim."""
+        return {said: getattr(self, name) for name, said in self.kinds.items()}
 
     @abstractmethod
     def nearby(self) -> tuple[Array, Array] | None:

@@ -16,6 +16,7 @@ import convexrough as cr
 from convexrough.paper.states import lettered
 from convexrough.run.stage import Result
 from convexrough.run.stages import Cycle, Normal, Shear
+from convexrough.tabular.columns import aligned
 
 APPROACH = 5e-5
 
@@ -90,7 +91,8 @@ def _pair(paper: Any, computed: Any) -> dict[str, Any]:
 
 def table(comparison: dict[str, Any]) -> list[str]:
     """Aligned lines: quantity, what the paper says, what is computed."""
-    rows = [("asperities in contact", comparison["contacts"], "")]
+    rows = [("quantity", {"paper": "paper says", "computed": "computed"}, "")]
+    rows.append(("asperities in contact", comparison["contacts"], ""))
     for name, ring in comparison["rings"].items():
         more = f"load of each {ring['load']:.6e}, slides from Q/(fP) = {ring['first_slide']:.4f}"
         rows.append((f"  ring {name}", ring, more))
@@ -102,14 +104,5 @@ def table(comparison: dict[str, Any]) -> list[str]:
         ("loss W/W0 at 0.5, rough", comparison["loss_at_half"], ""),
         ("loss W/W0 at 0.5, smooth", comparison["smooth_loss_at_half"], ""),
     ]
-    lines = [f"{'quantity':<26}{'paper says':>12}{'computed':>12}"]
-    for name, row, more in rows:
-        said, found = _shown(row["paper"]), _shown(row["computed"])
-        lines.append(f"{name:<26}{said:>12}{found:>12}  {more}".rstrip())
-    return lines
-
-
-def _shown(value: Any) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    lines = aligned([(name, row["paper"], row["computed"]) for name, row, _ in rows], left=1)
+    return [f"{line}  {more}".rstrip() for line, (*_, more) in zip(lines, rows, strict=True)]

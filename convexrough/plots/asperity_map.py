@@ -7,15 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection
-from matplotlib.colors import to_rgba, to_rgba_array
+from matplotlib.colors import Normalize, to_rgba, to_rgba_array
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.plots.measure import Measure, Scale
-from convexrough.plots.style import DASHED, DOTTED, FAINT, SMOOTH, label, round_ticks
+from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH, bar, label, round_ticks
 
 #: From these numbers of discs on, they are pixels inside a vector file, and too small to be drawn.
 DENSE, CROWDED = 200, 3000
@@ -107,6 +108,21 @@ def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> Window:
     """`draw_map` of a contact, with the outline of its smooth reference."""
     points = scale.contact.scene.contact_points
     return draw_map(axes, points, layers, scale.length, smooth=scale.axes)
+
+
+def draw_values(
+    axes: Axes, scale: Scale, values: Array, name: str, *, signed: bool = False
+) -> None:
+    """The discs of a contact in the colours of their values, and a bar of this name.
+
+    signed : from dark, below 0, to light, above it
+    """
+    most = float(np.abs(values).max()) or 1.0
+    spread = Normalize(-most if signed else 0.0, most)
+    colours = ScalarMappable(spread, "viridis" if signed else COLOURS)
+    radii = scale.contact.contact_radii
+    draw_contact(axes, scale, [Layer("contact discs", radii, colours.to_rgba(values))])
+    bar(axes, colours, name, above=not signed)
 
 
 def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:

@@ -30,7 +30,7 @@ from convexrough.plots.style import (
     SMOOTH,
     TICK,
     legend_outside,
-    no_contact_figure,
+    no_contact,
     not_proved,
     round_ticks,
 )
@@ -54,8 +54,7 @@ def shear_figures(
         return Figures()
     scale = Scale(states[0].contact, length_unit, force_unit)
     if not states[0].contact.loads.any():
-        labels = scale.length.label("x"), scale.length.short("y")
-        return Figures({"stick_slip": no_contact_figure(labels, width=SINGLE)})
+        return no_contact("stick_slip")
     shown = evenly_chosen(states, MOST_PANELS)
     columns = len(shown) if len(shown) <= 4 else 3 if len(shown) in (5, 6, 9) else 4
     rows = -(-len(shown) // columns)

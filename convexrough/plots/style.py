@@ -16,7 +16,7 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, 
 
 from convexrough.arrays import Array
 from convexrough.plots.measure import literal as literal
-from convexrough.plots.notebook import Figure
+from convexrough.plots.notebook import Figure, Figures
 
 LABEL, TICK = 9, 8  # points
 SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal
@@ -83,13 +83,12 @@ def legend_outside(figure: Any, handles: Sequence[Any], place: str, ncols: int) 
                   frameon=False, handletextpad=0.5, columnspacing=1.4, borderpad=0.2)  # fmt: skip
 
 
-def no_contact_figure(*labels: tuple[str, str], width: float = DOUBLE) -> Figure:
-    """A panel for each pair of axis labels, and the text "no contact" in each."""
-    figure = Figure(figsize=(width, 2.6), layout="constrained")
-    for axes, (x, y) in zip(figure.subplots(1, len(labels), squeeze=False)[0], labels, strict=True):
-        label(axes, x, y)
-        say_nothing(axes)
-    return figure
+def no_contact(*stems: str) -> Figures:
+    """Figures of these names that say that nothing touches."""
+    figures = {stem: Figure(figsize=(SINGLE, 2.6), layout="constrained") for stem in stems}
+    for figure in figures.values():
+        say_nothing(figure.subplots())
+    return Figures(figures)
 
 
 def say_nothing(axes: Axes, why: str = "no contact") -> None:

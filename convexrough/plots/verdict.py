@@ -66,8 +66,7 @@ def draw_claim(axes: Axes, claim: Claim, points: Array, length_unit: str = "") -
             handles.append(_mark(axes, length.of(points[those]), mark, f"{what} ({len(those):,})"))
     _number(axes, points, claim.suspects[:NUMBERED], length)
     verdict = "holds" if claim.holds else "does not hold"
-    kind = "shear forces" if isinstance(claim, ShearVerdict) else "loads"
-    title(axes, f"{kind}: the claim {verdict}")
+    title(axes, f"{claim.many}: the claim {verdict}")
     legend_below(axes, handles=handles)
 
 

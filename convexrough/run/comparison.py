@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 from convexrough.compare import Comparison, Entry
 from convexrough.run.stage import Summary, unit_of
@@ -34,6 +35,17 @@ def _entry(entry: Entry) -> Summary:
         names = ("iterations", "seconds", "influence")
         row |= {name: getattr(contact, name) for name in names}
     return row
+
+
+def steps(comparison: Comparison) -> list[list[Any]]:
+    """The logged iterations: a row for each, below a heading."""
+    names = ["step", "objective", "residual"]
+    rows = [
+        [entry.solver, *(step[name] for name in names)]
+        for entry in comparison.entries
+        for step in entry.steps
+    ]
+    return [["solver", *names], *rows]
 
 
 def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:

@@ -162,7 +162,7 @@ class Result(Tabular, Plottable):
         said = [titled(self.title or self.name, printed, units)]
         said += [many] if len(cut) < len(self.known) else []
         rows = [[row[key] for key in printed] for row in cut]
-        return [*said, *numbers(list(printed.values()), rows, self.digits)]
+        return [*said, *aligned([list(printed.values()), *rows], digits=self.digits)]
 
     def headings(self) -> Mapping[str, str]:
         """Of the printed columns, by their keys in the rows."""
@@ -259,9 +259,3 @@ def titled(title: str, printed: Mapping[str, str], units: UnitNames) -> str:
     """A heading, with the units of quantities where the scene names them."""
     named = [f"{it} {unit}" for key, it in printed.items() if (unit := unit_of(key, units))]
     return f"{title}  ({', '.join(named)})" if named else title
-
-
-def numbers(heading: Sequence[str], rows: Sequence[Sequence[Any]], digits: int = 7) -> list[str]:
-    """An aligned table."""
-    cells = [[f"{x:d}" if isinstance(x, int) else f"{x:.{digits}g}" for x in row] for row in rows]
-    return aligned([heading, *cells])

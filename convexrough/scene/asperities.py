@@ -85,10 +85,12 @@ class Asperities(Record):
         tip_radius_cv = checks.non_negative("tip_radius_cv", tip_radius_cv)
         if height_std == 0 and tip_radius_cv == 0:
             return self
-        n, seed = len(self), checked_seed(seed)
-        width = np.sqrt(np.log1p(tip_radius_cv**2))
-        heights = self.heights + height_std * cut_normal(n, seed, stream=0)
-        radii = self.tip_radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
+        n, seed, heights, radii = len(self), checked_seed(seed), self.heights, self.tip_radii
+        if height_std > 0:
+            heights = heights + height_std * cut_normal(n, seed, stream=0)
+        if tip_radius_cv > 0:
+            width = np.sqrt(np.log1p(tip_radius_cv**2))
+            radii = radii * np.exp(width * cut_normal(n, seed, stream=1) - width**2 / 2)
         return self.with_tips(radii, heights)
 
     @classmethod

@@ -70,6 +70,7 @@ class BristleQP:
     newton_step : end with one Newton step, which squares the error and costs little
     tolerance   : OSQP's, absolute and relative, in the problem's units; polishing then solves the
         equations of the bristles in contact to rounding, where OSQP has found these
+    verbose     : print OSQP's own table of iterations
 
     Raises TooDenseError where the contact leaves the convex range, and SolverError where OSQP is
     missing or does not solve the program.
@@ -79,6 +80,7 @@ class BristleQP:
     newton_step: bool = True
     tolerance: float = 1e-6
     max_iterations: int = 20_000
+    verbose: bool = False
 
     def __post_init__(self) -> None:
         for name in ("bristles", "max_iterations"):
@@ -106,7 +108,7 @@ class BristleQP:
         return Solution.of(problem, loads, approach, iterations, refine=self.newton_step)
 
     def _run(self, program: QuadraticProgram) -> RawAnswer:
-        return run_osqp(program, self.name, self.tolerance, self.max_iterations)
+        return run_osqp(program, self.name, self.tolerance, self.max_iterations, self.verbose)
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,10 +62,12 @@ class ConicCVXPY(ConeSolver):
         units; a solver not named in `OPTIONS` keeps its own
     max_iterations : of the solver; None for 200 of an interior-point method, 20,000 of SCS
     solver         : its name in CVXPY, in any case: `cvxpy.installed_solvers()`
+    verbose        : print what CVXPY and the solver say, with a table of iterations
     """
 
     max_iterations: int | None = None
     solver: str = "CLARABEL"
+    verbose: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -97,7 +99,7 @@ class ConicCVXPY(ConeSolver):
         try:
             with warnings.catch_warnings():  # whether it is accurate is judged by the contact law
                 warnings.filterwarnings("ignore", message="Solution may be inaccurate")
-                program.solve(solver=self.solver, **options)
+                program.solve(solver=self.solver, verbose=self.verbose, **options)
         except cp.error.SolverError as error:
             what, advice = _missing(cp, self.solver) or (str(error), advice)
             raise SolverError(what, solver=self.name, advice=advice) from error

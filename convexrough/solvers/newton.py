@@ -23,7 +23,6 @@ from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import refined_loads
-from convexrough.progress import LOGGER
 from convexrough.solvers.pressing import Pressed, Pressing, negligible, on_constraint
 from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
@@ -112,16 +111,12 @@ class Newton:
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
 
-        def report(step: int, state: Pressed) -> None:
-            residual, touching = state.residual / state.scale, np.count_nonzero(state.forces)
-            LOGGER.info(f"step {step}, residual {residual:.1e}, {touching:,} touching")
-
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
             state = law.evaluate(indentation)
             if self._refines(problem):  # what is left then is linear
                 stopping = replace(stopping, linear=negligible(indentation))
-            return newton.solve(law, state, stopping, report=report)
+            return newton.solve(law, state, stopping)
         except SolverError as error:
             if error.iterate is not None:
                 error.iterate = among_zeros(error.iterate, near, len(problem))

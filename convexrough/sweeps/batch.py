@@ -11,8 +11,9 @@ import scipy
 from numpy.typing import NDArray
 
 from convexrough.errors import ConvexroughError
-from convexrough.sweeps.measures import Column, measured
-from convexrough.sweeps.scenes import Press, Source
+from convexrough.sweeps.measures import Column, Numbers, measured
+from convexrough.sweeps.scenes import Asked, Source
+from convexrough.sweeps.together import measured_together
 from convexrough.threads import one_thread
 from convexrough.version import __version__
 
@@ -57,21 +58,34 @@ def different(versions: Mapping[str, str]) -> str:
 def compute(batch: Batch) -> Rows:
     """The rows of a batch: each depends on its scene alone, and says why where that fails."""
     with one_thread:
-        press = batch.source.opened()
-        rows = [_row(press, number, batch.columns) for number in batch.numbers]
-    return Rows(table(batch, rows), VERSIONS)
+        ask, asked, rows = batch.source.opened(), dict[int, Asked](), dict[int, Row]()
+        for number in batch.numbers:
+            try:
+                asked[number] = ask(number)
+            except FAILURES as error:
+                rows[number] = _failed(error, batch.columns)
+        known = measured_together(asked, batch.columns)
+        for number, each in asked.items():
+            rows[number] = _row(each, known.get(number), batch.columns)
+    return Rows(table(batch, [rows[number] for number in batch.numbers]), VERSIONS)
 
 
-def _row(press: Press, number: int, columns: tuple[Column, ...]) -> Row:
+def _row(asked: Asked, known: tuple[Numbers, str] | None, columns: tuple[Column, ...]) -> Row:
+    """known : what was measured of it together with others; None where it was not"""
     try:
-        found, unsure = measured(*press(number), {column.stage for column in columns})
+        wanted = {column.stage for column in columns}
+        found, unsure = known or measured(asked.pressed(), asked.stages, wanted)
         values = [found[column.number, column.row] for column in columns]
     except FAILURES as error:
-        said = "; ".join(str(error).splitlines()) or type(error).__name__
-        return "failed", said, [np.nan] * len(columns)
+        return _failed(error, columns)
     except KeyError as error:  # a swept list may be shorter than the first
         return "failed", f"has no number {error}", [np.nan] * len(columns)
     return ("undecided" if unsure else "certified"), unsure, values
+
+
+def _failed(error: Exception, columns: tuple[Column, ...]) -> Row:
+    said = "; ".join(str(error).splitlines()) or type(error).__name__
+    return "failed", said, [np.nan] * len(columns)
 
 
 def table(batch: Batch, rows: list[Row]) -> Columns:

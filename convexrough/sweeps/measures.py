@@ -71,16 +71,17 @@ def _numbers(
             yield from _numbers(each, f"{name}.{key}", row, labels)
     elif isinstance(value, list):
         for i, each in enumerate(value):
-            label = _label(each, labels) if isinstance(each, dict) and labels else str(i)
-            yield from _numbers(each, name, f"{row}_{label}" if row else label, labels)
+            many = isinstance(each, dict) and labels
+            own = row_label([each[label] for label in reversed(labels)]) if many else str(i)
+            yield from _numbers(each, name, f"{row}_{own}" if row else own, labels)
     elif isinstance(value, (int, float)):
         yield (name, row), float(value)
 
 
-def _label(row: Mapping[str, Any], labels: Sequence[str]) -> str:
+def row_label(ends: Sequence[float]) -> str:
     """What tells a row apart: a force; or the ends of a cycle, the maximum alone if symmetric."""
-    last, *first = (row[label] for label in labels)
-    return "_".join(f"{it!r}" for it in (*(it for it in first if it != -last), last))
+    *first, last = ends
+    return "_".join(f"{float(it)!r}" for it in (*(it for it in first if it != -last), last))
 
 
 def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:

@@ -88,10 +88,11 @@ def planned(
 
     Raises InputError where a measure is not there, and what the first scenes raise if all fail.
     """
-    press = source.part(range(tried := min(source.count, TRIED))).opened()
+    ask = source.part(range(tried := min(source.count, TRIED))).opened()
     for number in range(tried):
         try:
-            contact, stages = press(number)
+            asked = ask(number)
+            contact, stages = asked.pressed(), asked.stages
             columns = chosen(contact, stages, measures)
             break
         except FAILURES as error:

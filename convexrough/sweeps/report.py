@@ -15,7 +15,7 @@ from convexrough.sweeps.folder import MANIFEST
 from convexrough.sweeps.plan import Plan
 from convexrough.sweeps.sweep import Done
 from convexrough.sweeps.table import SweepTable, open_sweep
-from convexrough.tabular.columns import aligned
+from convexrough.tabular.columns import aligned, listed
 
 #: Quantiles in print, rows of a table in print, failed scenes that are named, and figures drawn.
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
@@ -48,18 +48,14 @@ def describe(summary: Summary) -> list[str]:
     if left_out := it["not_measured"]:
         lines.append(("left out", f"{', '.join(map('[{}]'.format, left_out))}: nothing measured"))
     lines.append(("folder", it["folder"]))
-    return [f"{name:<12}{text}" for name, text in lines]
+    return listed(lines, 12)
 
 
 def describe_quantiles(found: Columns) -> list[str]:
     """A table of the first rows."""
     heads = [f"{float(name):.0%}" if name[0] in "01" else name for name in found]
     rows = list(zip(*(values.tolist() for values in found.values()), strict=True))
-    cells = [
-        [f"{value:.6g}" if isinstance(value, float) else str(value) for value in row]
-        for row in rows[:MOST_ROWS]
-    ]
-    lines = aligned([heads, *cells], left=heads.index("quantity") + 1)
+    lines = aligned([heads, *rows[:MOST_ROWS]], left=heads.index("quantity") + 1)
     if len(rows) > MOST_ROWS:
         lines.append(f"and {len(rows) - MOST_ROWS:,} rows more: --out DIR writes all of them")
     return lines

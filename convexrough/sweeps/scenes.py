@@ -1,4 +1,4 @@
-"""Where the scenes of a sweep come from, and how each is pressed: tables of a file, or objects."""
+"""The scenes of a sweep, from tables of a file or objects, and what is asked of each."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.contact import Contact, press, solve
+from convexrough.contact import Contact, solve
 from convexrough.errors import SceneFileError
+from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
 from convexrough.run.scene_file import READ, Layouts, build_scene
 from convexrough.scene.scene import Scene
@@ -27,8 +28,41 @@ if TYPE_CHECKING:
 #: Layouts of asperities that are kept for the scenes to come.
 KEPT = 8
 
-#: From the number of a scene to its contact, and what is asked of it.
-Press = Callable[[int], tuple[Contact, Stages]]
+
+@dataclass(frozen=True)
+class Asked:
+    """A scene, what presses it, and what is asked of the contact.
+
+    approach [length] or load [force], solver, influence, highest : as of a `SceneFile`
+    """
+
+    scene: Scene
+    approach: float | None
+    load: float | None
+    stages: Stages
+    solver: str = "newton"
+    influence: Kind | None = None
+    highest: float | None = None
+
+    @property
+    def plain(self) -> bool:
+        """It is pressed as `press` does unless told otherwise."""
+        return self.solver == "newton" and self.influence in (None, "dense")
+
+    def pressed(self) -> Contact:
+        """Raises what `press` raises."""
+        problem = NormalProblem.assemble(
+            self.scene,
+            approach=self.approach,
+            load=self.load,
+            influence=self.influence,
+            highest=self.highest,
+        )
+        return solve(problem, named(self.solver))
+
+
+#: From the number of a scene to what is asked of it.
+Ask = Callable[[int], Asked]
 
 #: What stands in the column of seeds where nothing is random.
 NO_SEED = -1
@@ -66,24 +100,26 @@ class Tables:
         """What a worker needs to know for these numbers, which stay the same."""
         return self
 
-    def opened(self) -> Press:
-        """How to press scenes; those one after the other share what they have in common."""
+    def opened(self) -> Ask:
+        """How to make scenes; those one after the other share what they have in common."""
         layouts = Layouts(*map(lru_cache(KEPT), READ))
         last: dict[str, Any] = {}
 
-        def press_one(number: int) -> tuple[Contact, Stages]:
+        def ask(number: int) -> Asked:
             study = self._study(number, last)
             scene, highest = build_scene(self.path, study, layouts)
-            problem = NormalProblem.assemble(
+            normal, solver = study.normal, study.solver
+            return Asked(
                 scene,
-                approach=study.normal.approach,
-                load=study.normal.load,
-                influence=study.solver.influence,
-                highest=highest,
+                normal.approach,
+                normal.load,
+                study.stages,
+                solver.name,
+                solver.influence,
+                highest,
             )
-            return solve(problem, named(study.solver.name)), study.stages
 
-        return press_one
+        return ask
 
     def _study(self, number: int, last: dict[str, Any]) -> Study:
         """The tables of a scene; of those that differ by a seed alone, checked once."""
@@ -130,14 +166,14 @@ class Objects:
         scenes, controls = self.scenes[places], self.controls[places]
         return replace(self, scenes=scenes, controls=controls, first=numbers.start)
 
-    def opened(self) -> Press:
-        def press_one(number: int) -> tuple[Contact, Stages]:
-            place = number - self.first
-            scene, control = self.scenes[place], float(self.controls[place])
-            pressed = press(scene, load=control) if self.by_load else press(scene, approach=control)
-            return pressed, self.stages
+    def opened(self) -> Ask:
+        def ask(number: int) -> Asked:
+            scene = self.scenes[number - self.first]
+            control = float(self.controls[number - self.first])
+            approach, load = (None, control) if self.by_load else (control, None)
+            return Asked(scene, approach, load, self.stages)
 
-        return press_one
+        return ask
 
 
 #: The scenes of a sweep, by their numbers from 0.

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 #: A table: a heading, and rows of as many cells.
-Table = Sequence[Sequence[str]]
+Table = Sequence[Sequence[Any]]
 
 
-def aligned(table: Table, *, left: int = 0) -> list[str]:
-    """Lines of a table, the first `left` columns aligned to the left."""
-    return ["  ".join(row).rstrip() for row in _padded(table, left)]
+def listed(lines: Iterable[tuple[str, str]], width: int = 18) -> list[str]:
+    """Lines of a name and a text, the texts below each other."""
+    return [f"{name:<{width}}{text}" for name, text in lines]
+
+
+def aligned(table: Table, *, left: int = 0, digits: int = 6) -> list[str]:
+    """Lines of a table, numbers to so many digits, the first `left` columns aligned to the left."""
+    return ["  ".join(row).rstrip() for row in _padded(table, left, digits)]
 
 
 def markdown(table: Table, *, left: int) -> list[str]:
     """The same as a table in Markdown."""
-    rows = _padded(table, left)
+    rows = _padded(table, left, digits=6)
     rule = ["-" * max(3, len(cell)) for cell in rows[0]]
     rule = [each if column < left else f"{each[:-1]}:" for column, each in enumerate(rule)]
     return [f"| {' | '.join(row)} |" for row in [rows[0], rule, *rows[1:]]]
@@ -27,12 +33,19 @@ def bound(value: float) -> str:
     return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
 
 
-def _padded(table: Table, left: int) -> list[list[str]]:
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+def _padded(table: Table, left: int, digits: int) -> list[list[str]]:
+    cells = [[_cell(value, digits) for value in row] for row in table]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     return [
         [
             f"{cell:{'<' if column < left else '>'}{width}}"
             for column, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
-        for row in table
+        for row in cells
     ]
+
+
+def _cell(value: Any, digits: int) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)

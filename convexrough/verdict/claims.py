@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError, TableError
 from convexrough.scene.neighbours import nearest_distances
@@ -34,7 +35,7 @@ SURELY_INDEX = ("index", "asperity")
 class Manner(Reading):
     """How a file of forces is read.
 
-    sign      : -1 where compression is negative
+    sign      : -1 where compression is negative;  floor : [force] loads up to this are noise
     tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
     missing_open : asperities without a row are open
     nodes     : rows are nodes or pixels, which add up at their nearest asperity
@@ -44,10 +45,13 @@ class Manner(Reading):
     tolerance: float | None = None
     missing_open: bool = False
     nodes: bool = False
+    floor: float = 0.0
     scalable: bool = True
 
-
-PLAIN = Manner()
+    def __post_init__(self) -> None:
+        if self.tolerance is not None:
+            checks.positive("--tolerance", self.tolerance)
+        checks.non_negative("--floor", self.floor)
 
 
 class Claimed(NamedTuple):
@@ -63,7 +67,7 @@ class Claimed(NamedTuple):
     explained: list[str]
 
 
-def read_loads(path: Path, scene: Scene, how: Manner, floor: float = 0.0) -> Claimed:
+def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
     """Loads [force] from a file; negative ones only as far as noise up to the floor.
 
     Rows with positions are matched by them, then by an index; others are in the scene's order. A
@@ -71,7 +75,7 @@ def read_loads(path: Path, scene: Scene, how: Manner, floor: float = 0.0) -> Cla
 
     Raises TableError with every mistake, and FileError.
     """
-    return _read(path, scene, "load", how, floor)
+    return _read(path, scene, "load", how, how.floor)
 
 
 def read_shear_forces(path: Path, scene: Scene, how: Manner) -> Claimed:

@@ -1,9 +1,9 @@
-"""What `verify` says of a claim: for people, for programs, and in files."""
+"""What `verify` and failed assertions say of a claim: for people, for programs, and in files."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,15 +15,35 @@ from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plausibility import described_modulus
 from convexrough.scene.scene import Scene
-from convexrough.tabular.columns import aligned, bound
-from convexrough.tabular.units import UnitNames
-from convexrough.verdict.files import Verified
+from convexrough.tabular.columns import aligned, bound, listed
+from convexrough.tabular.units import NAMELESS, UnitNames
+from convexrough.verdict.verdict import Verdict
 
 #: From this part on errors are said in per cent.
 PERCENT = 1e-4
 
 #: Asperities that a list on the terminal names before it says how many more there are.
 MOST_LISTED = 10
+
+
+class Verified(NamedTuple):
+    """The verdicts on the claims of files; `notes` say how these were read.
+
+    sheared : on shear forces, None without these
+    """
+
+    verdict: Verdict
+    sheared: ShearVerdict | None
+    notes: list[str]
+
+    @property
+    def claims(self) -> list[Claim]:
+        """One or both."""
+        return [self.verdict, *([] if self.sheared is None else [self.sheared])]
+
+    @property
+    def holds(self) -> bool:
+        return all(claim.holds for claim in self.claims)
 
 
 def verdict_summary(found: Verified) -> dict[str, Any]:
@@ -37,40 +57,27 @@ def verdict_summary(found: Verified) -> dict[str, Any]:
 
 
 def _claim_summary(claim: Claim) -> dict[str, Any]:
-    names = ("wrongly_open", "wrongly_loaded")
-    if isinstance(claim, ShearVerdict):
-        names = ("wrongly_sliding", "wrongly_sticking")
-    return {
-        "holds": claim.holds,
-        **{name: getattr(claim, name).tolist() for name in names},
-        "undecided": claim.undecided.tolist(),
-        "off": claim.off.tolist(),
-        "suspects": claim.suspects.tolist(),
-        "error": claim.error,
-        "total_given": claim.total_given,
-        "total_prescribed": claim.total_prescribed,
-        "within": claim.within,
-    }
+    names = ("holds", *claim.kinds, "undecided", "off", "suspects", "error", "total_given",
+             "total_prescribed", "within")  # fmt: skip
+    found = {name: getattr(claim, name) for name in names}
+    return {name: it.tolist() if isinstance(it, np.ndarray) else it for name, it in found.items()}
 
 
 def asperity_columns(found: Verified) -> dict[str, NDArray[Any]]:
     """One row per asperity: what is claimed of it and what is proved."""
-    verdict, sheared = found.verdict, found.sheared
-    x, y = verdict.scene.asperities.positions.T
-    claimed = np.where(verdict.claimed, "contact", "open")
-    columns = {"index": np.arange(len(x)), "x": x, "y": y, **_columns(verdict, "load", claimed)}
-    if sheared is not None:
-        claimed = np.where(sheared.claimed, "sliding", "sticking")
-        for name, values in _columns(sheared, "force", claimed).items():
+    x, y = found.verdict.scene.asperities.positions.T
+    columns = {"index": np.arange(len(x)), "x": x, "y": y, **_columns(found.verdict)}
+    if found.sheared is not None:
+        for name, values in _columns(found.sheared).items():
             columns[name if name.startswith("force") else f"shear_{name}"] = values
     return columns
 
 
-def _columns(claim: Claim, name: str, claimed: NDArray[np.str_]) -> dict[str, NDArray[Any]]:
-    rank = np.zeros(len(claimed), dtype=np.intp)
+def _columns(claim: Claim) -> dict[str, NDArray[Any]]:
+    rank = np.zeros(len(claim.values), dtype=np.intp)
     rank[claim.suspects] = np.arange(len(claim.suspects)) + 1
-    columns = {name: claim.values, "claimed": claimed, "status": claim.status}
-    columns |= {f"{name}_error": claim.errors, "suspect": rank}
+    columns = {claim.one: claim.values, "claimed": np.where(claim.claimed, *claim.claims)}
+    columns |= {"status": claim.status, f"{claim.one}_error": claim.errors, "suspect": rank}
     if (nearby := claim.nearby()) is not None:
         columns["solution"] = nearby[0]
     return columns
@@ -79,33 +86,29 @@ def _columns(claim: Claim, name: str, claimed: NDArray[np.str_]) -> dict[str, ND
 def describe_verdict(found: Verified, units: UnitNames) -> list[str]:
     """Aligned lines: of each claim the wrong set, undecided, off, and the total, in this order."""
     lines = [*found.notes, *describe_scene(found.verdict.scene, units)]
-    for name, claim in found.claims:
-        lines += ["", *_describe(claim, found.verdict.scene, name, units)]
+    for claim in found.claims:
+        others = ": --json and --out have all"
+        lines += ["", *describe_claim(claim, found.verdict.scene, units, others)]
     return lines
 
 
 def describe_scene(scene: Scene, units: UnitNames) -> list[str]:
     """Lines about the scene: geometry and contact modulus."""
     modulus = described_modulus(scene.material.contact_modulus, units)
-    return [_line("geometry", scene.geometry), _line("contact modulus", modulus)]
-
-
-def _kind(claim: Claim) -> str:
-    return "shear forces" if isinstance(claim, ShearVerdict) else "loads"
+    return listed([("geometry", scene.geometry), ("contact modulus", modulus)])
 
 
 def _proved(claim: Claim) -> str:
     """What is proved of a claim, in a line."""
-    what = "statuses" if isinstance(claim, ShearVerdict) else "contact set"
     if len(claim.wrongly_claimed):
-        return f"{what} wrong"
+        return f"{claim.proved} wrong"
     if len(claim.undecided):
-        return f"{what} not proved"
+        return f"{claim.proved} not proved"
     asked = "" if claim.within is not None else " (no tolerance given)"
-    near = f"{_kind(claim)} known to {_size(claim)}{asked}"
+    near = f"{claim.many} known to {_size(claim)}{asked}"
     if not claim.near_enough:
         near += ", not near enough"
-    return f"{what} proved; {near}{'' if claim.total_holds else '; total load differs'}"
+    return f"{claim.proved} proved; {near}{'' if claim.total_holds else '; total load differs'}"
 
 
 def _size(claim: Claim) -> str:
@@ -113,36 +116,42 @@ def _size(claim: Claim) -> str:
     return f"{f'{bound(100 * claim.error)} %' if per_cent else bound(claim.error)} of the largest"
 
 
-def _describe(claim: Claim, scene: Scene, name: str, units: UnitNames) -> list[str]:
-    table = _Listing(claim, scene, name, units)
-    what = "result" if name == "load" else _kind(claim)
-    lines = [_line(what, _proved(claim))]
-    lines.append(_line("wrong statuses", str(len(claim.wrongly_claimed) or "none")))
+def describe_claim(
+    claim: Claim, scene: Scene, units: UnitNames = NAMELESS, others: str = ""
+) -> list[str]:
+    """Aligned lines of one claim; `others` says where those are that a table leaves out."""
+
+    def table(which: Indices) -> list[str]:
+        lines = _table(claim, scene, units, which[:MOST_LISTED])
+        more = len(which) - MOST_LISTED
+        return [*lines, f"    and {more:,} more{others}"] if more > 0 else lines
+
+    worst = np.argsort(-claim.errors, kind="stable")
+    lines = listed([
+        ("result" if claim.one == "load" else claim.many, _proved(claim)),
+        ("wrong statuses", str(len(claim.wrongly_claimed) or "none")),
+    ])  # fmt: skip
     for what, which in claim.wrong.items():
         if len(which):
-            lines += [f"  {what}: {len(which):,}", *table.of(_worst_first(claim, which))]
-    lines.append(_line("undecided", str(len(claim.undecided) or "none")))
-    lines += table.of(claim.undecided)
-    lines += [_line(f"{name} error", _off(claim, name)), *table.of(claim.off)]
-    lines.append(_line(f"total {name}", _total(claim, units.force)))
+            lines += [f"  {what}: {len(which):,}", *table(worst[np.isin(worst, which)])]
+    lines += listed([("undecided", str(len(claim.undecided) or "none"))])
+    lines += table(claim.undecided)
+    lines += [*listed([(f"{claim.one} error", _off(claim))]), *table(claim.off)]
+    lines += listed([(f"total {claim.one}", _total(claim, units.force))])
     if len(claim.suspects):
-        lines += [_line("suspects", "likeliest first"), *table.of(claim.suspects)]
+        lines += [*listed([("suspects", "likeliest first")]), *table(claim.suspects)]
     return lines
 
 
-def reason(found: Verified) -> str:
-    """One line: what keeps the claims from holding; "" where they do."""
-    parts = []
-    for kind, claim in found.claims:
-        if claim.holds:
-            continue
-        counts = {"wrongly claimed": len(claim.wrongly_claimed), "undecided": len(claim.undecided)}
-        counts[f"{kind}s off"] = len(claim.off)
-        parts += [f"{count:,} {what}" for what, count in counts.items() if count]
-        if not claim.near_enough and claim.within is None:
-            parts.append(f"{kind}s too inaccurate to prove all statuses")
-        if not claim.total_holds:
-            parts.append(f"total of the {kind}s off")
+def reason(claim: Claim) -> str:
+    """One line: what keeps a claim from holding; "" where it does."""
+    counts = {"wrongly claimed": len(claim.wrongly_claimed), "undecided": len(claim.undecided)}
+    counts[f"{claim.one}s off"] = len(claim.off)
+    parts = [f"{count:,} {what}" for what, count in counts.items() if count]
+    if not claim.near_enough and claim.within is None:
+        parts.append(f"{claim.one}s too inaccurate to prove all statuses")
+    if not claim.total_holds:
+        parts.append(f"total of the {claim.one}s off")
     return ", ".join(parts)
 
 
@@ -150,24 +159,23 @@ def junit(found: Verified) -> bytes:
     """The findings as a suite of JUnit's, a case for each question."""
     suite = ElementTree.Element("testsuite", name="convexrough verify")
     failures = 0
-    for kind, claim in found.claims:
-        set_wrong = {what: which for what, which in claim.wrong.items() if len(which)}
-        asked: dict[str, str] = {
-            "contact set" if claim is found.verdict else "statuses": "; ".join(
-                f"{what}: {_named(claim, found.verdict.scene, which)}"
-                for what, which in set_wrong.items()
+    for claim in found.claims:
+        wrong = {what: which for what, which in claim.wrong.items() if len(which)}
+        asked = {
+            claim.proved: "; ".join(
+                f"{what}: {_named(found.verdict.scene, which)}" for what, which in wrong.items()
             ),
-            "undecided": _named(claim, found.verdict.scene, claim.undecided),
-            "off": "" if claim.near_enough else _off(claim, kind),
+            "undecided": _named(found.verdict.scene, claim.undecided),
+            "off": "" if claim.near_enough else _off(claim),
             "total": "" if claim.total_holds else _total(claim, ""),
         }
-        for name, wrong in asked.items():
+        for name, text in asked.items():
             case = ElementTree.SubElement(
-                suite, "testcase", classname="convexrough.verify", name=f"{_kind(claim)}: {name}"
+                suite, "testcase", classname="convexrough.verify", name=f"{claim.many}: {name}"
             )
-            if wrong:
+            if text:
                 failures += 1
-                ElementTree.SubElement(case, "failure", message=name).text = wrong
+                ElementTree.SubElement(case, "failure", message=name).text = text
     suite.set("tests", str(len(suite)))
     suite.set("failures", str(failures))
     root = ElementTree.Element("testsuites")
@@ -176,55 +184,34 @@ def junit(found: Verified) -> bytes:
     return written
 
 
-def _named(claim: Claim, scene: Scene, which: Indices) -> str:
+def _named(scene: Scene, which: Indices) -> str:
     points = scene.asperities.positions
     return joined(f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g})" for i in which)
 
 
-class _Listing:
-    """Tables of some asperities, cut with a count."""
-
-    def __init__(self, claim: Claim, scene: Scene, name: str, units: UnitNames) -> None:
-        self.claim, self.points = claim, scene.asperities.positions
-        x, y, force = (
-            f"{each} [{unit}]" if unit else each
-            for each, unit in (("x", units.length), ("y", units.length), (name, units.force))
-        )
-        self.heading = ["index", x, y, force, "solution", "bound", "status"]
-
-    def of(self, which: Indices) -> list[str]:
-        if len(which) == 0:
-            return []
-        claim, nearby = self.claim, self.claim.nearby()
-        rows = [
-            [
-                str(i),
-                f"{self.points[i, 0]:.6g}",
-                f"{self.points[i, 1]:.6g}",
-                f"{claim.values[i]:.6g}",
-                "-" if nearby is None else f"{nearby[0][i]:.6g}",
-                bound(float(claim.errors[i])),
-                str(claim.status[i]),
-            ]
-            for i in which[:MOST_LISTED]
-        ]
-        lines = [f"    {line}" for line in aligned([self.heading, *rows])]
-        if (more := len(which) - MOST_LISTED) > 0:
-            lines.append(f"    and {more:,} more: --json and --out have all")
-        return lines
+def _table(claim: Claim, scene: Scene, units: UnitNames, which: Indices) -> list[str]:
+    """A row for each of these asperities; none of none."""
+    if len(which) == 0:
+        return []
+    names = {"x": units.length, "y": units.length, claim.one: units.force}
+    named = [f"{each} [{unit}]" if unit else each for each, unit in names.items()]
+    nearby, points = claim.nearby(), scene.asperities.positions.tolist()
+    rows = [
+        (i, *points[i], float(claim.values[i]), None if nearby is None else float(nearby[0][i]),
+         bound(float(claim.errors[i])), claim.status[i])
+        for i in which
+    ]  # fmt: skip
+    table = aligned([["index", *named, "solution", "bound", "status"], *rows])
+    return [f"    {line}" for line in table]
 
 
-def _worst_first(claim: Claim, which: Indices) -> Indices:
-    return which[np.argsort(-claim.errors[which], kind="stable")]
-
-
-def _off(claim: Claim, name: str) -> str:
+def _off(claim: Claim) -> str:
     if claim.within is None:
         if claim.near_enough:
-            return f"at most {_size(claim)} {name}"
-        return f"up to {_size(claim)} {name}: too large to prove every status"
+            return f"at most {_size(claim)} {claim.one}"
+        return f"up to {_size(claim)} {claim.one}: too large to prove every status"
     beyond = f"; beyond that: {len(claim.off):,}" if len(claim.off) else ""
-    return f"at most {_size(claim)} {name} ({claim.within:g} allowed{beyond})"
+    return f"at most {_size(claim)} {claim.one} ({claim.within:g} allowed{beyond})"
 
 
 def _total(claim: Claim, unit: str) -> str:
@@ -236,7 +223,3 @@ def _total(claim: Claim, unit: str) -> str:
     expected = f"{claim.total_prescribed:.10g} {unit}".rstrip()
     ratio = claim.total_given / claim.total_prescribed if claim.total_prescribed else math.inf
     return f"{given}, prescribed {expected}: ratio {ratio:.7g}"
-
-
-def _line(name: str, text: str) -> str:
-    return f"{name:<18}{text}"

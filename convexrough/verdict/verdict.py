@@ -10,7 +10,7 @@ asperities are wrong. `friction.verdict` does the same for shear forces.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -57,6 +57,14 @@ class Verdict(Claim, Table, Plottable):
     (True, True)
     """
 
+    one = "load"
+    many = "loads"
+    proved = "contact set"
+    kinds: ClassVar[Mapping[str, str]] = {
+        "wrongly_open": "claimed open, proved to touch",
+        "wrongly_loaded": "claimed to touch, proved open",
+    }
+    claims = ("contact", "open")
     _shown = ("holds", "wrongly_open", "wrongly_loaded", "undecided", "suspects")
     _along: ClassVar[Along] = {("asperity",): ("status", "claimed", "loads", "errors")}
 
@@ -87,14 +95,6 @@ class Verdict(Claim, Table, Plottable):
     def wrongly_loaded(self) -> Indices:
         """(m,) claimed to touch, and proved to be open."""
         return frozen(np.flatnonzero(self.claimed & (self.status == "open")))
-
-    @property
-    def wrong(self) -> dict[str, Indices]:
-        """Indices of the wrong claims, by kind."""
-        return {
-            "claimed open, proved to touch": self.wrongly_open,
-            "claimed to touch, proved open": self.wrongly_loaded,
-        }
 
     @property
     def errors_alone(self) -> Array:

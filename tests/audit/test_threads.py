@@ -15,7 +15,7 @@ import numpy as np
 import convexrough as cr
 
 a = cr.Asperities.hexagonal(
-    spacing=0.0006, tip_radius=0.005, within=0.0102, height_std=1e-6, seed=3
+    spacing=0.001, tip_radius=0.008, within=0.0102, height_std=1e-6, seed=3
 )
 contact = cr.press(
     cr.Scene(1.0, a, cr.Material(1.0, 0.3), 0.5), approach=5e-5, influence=sys.argv[1]

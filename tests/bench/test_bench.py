@@ -20,7 +20,7 @@ from convexrough.bench.measure import Attempt
 from convexrough.bench.profile import Profile, profile_of
 from convexrough.bench.reference import reference
 from convexrough.bench.rows import Bench, Row, better_than_default, exponent, frontier
-from convexrough.bench.scenes import APPROACH, REFINEMENTS, scene
+from convexrough.bench.scenes import APPROACH, scene
 from convexrough.solvers import BristleQP, Conic, Newton
 
 ROOT = Path(__file__).parent.parent.parent
@@ -60,12 +60,6 @@ def test_reference_against_50_digits(family: Any) -> None:
     assert found.error(found.loads * 1.001) == pytest.approx(1e-3, rel=1e-6)
 
 
-def test_loads_that_are_not_proved_are_no_reference(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("convexrough.bench.reference.ACCURATE", 1e-20)
-    with pytest.raises(cr.SolverError, match=r"reference: loads proved to .* only"):
-        reference(scene("lattice", 1.0), APPROACH)
-
-
 # What is measured, and what is said of it.
 
 
@@ -80,19 +74,6 @@ def test_rows_of_those_that_do_not_answer() -> None:
     ):
         row = measure.measure_attempt("lattice", each, attempt, None, 0.0)
         assert (row.outcome, message in row.message) == (outcome, True)
-
-
-@pytest.mark.parametrize("quick", [True, False])
-def test_attempts(quick: bool) -> None:
-    found = suite.attempts(quick)
-    assert len({(each.solver, each.setting) for each in found}) == len(found)
-    names = {type(each.settings).__name__ for each in found}
-    assert names == {"Newton", "Conic", "ConicCVXPY", "BristleQP"}
-
-
-@pytest.mark.parametrize("size", [61, 700, 8_400])
-def test_sizes_are_what_they_say(size: int) -> None:
-    assert len(scene("lattice", REFINEMENTS[size])) == pytest.approx(size, rel=0.05)
 
 
 def row(name: str, seconds: float, error: float, setting: str = "default") -> Row:

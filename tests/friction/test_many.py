@@ -13,7 +13,7 @@ from path_scenes import shaded
 from scenes import MATERIAL, NAMED, random_scenes
 
 import convexrough as cr
-from convexrough import many
+from convexrough import rows
 
 F = 0.5
 PAPER = replace(NAMED["paper"][0], friction=F)
@@ -127,14 +127,14 @@ def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPat
     for k in range(3):
         assert ends.losses[k] == ends[k].loss
         assert_array_equal(ends.status[k], ends[k].status)
-    monkeypatch.setattr(many, "MOST", 60)
+    monkeypatch.setattr(rows, "MOST", 60)
     assert cr.press_many(scenes, approach=5e-5).alone.tolist() == [0, 1, 2]
 
 
 def test_batches_may_be_cut_anywhere(monkeypatch: pytest.MonkeyPatch) -> None:
     scenes = rough(5)
     whole = cr.press_many(scenes, approach=5e-5)
-    monkeypatch.setattr(many, "MATRICES", 2 * 61**2)
+    monkeypatch.setattr(rows, "MATRICES", 2 * 61**2)
     parts = cr.press_many(scenes, approach=5e-5)
     assert_array_equal(whole.asperity_loads, parts.asperity_loads)
     assert_array_equal(whole.cycles(1e-8).losses, parts.cycles(1e-8).losses)

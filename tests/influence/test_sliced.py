@@ -7,8 +7,6 @@ import multiprecision
 import numpy as np
 import pytest
 from flint import arb, ctx
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import convexrough as cr
@@ -18,7 +16,7 @@ from convexrough.influence.sliced import Distances, Sliced, cut
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
 from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair, two_sum
+from convexrough.numbers.pairs import Pair
 from convexrough.scene.lattice import Lattice
 
 Array = NDArray[np.float64]
@@ -75,26 +73,6 @@ def test_values_of_the_kernel(name: str, size: str, largest: int) -> None:
                 continue
             exact = 1 / distance(basis, unit, int(i[m]), int(j[n]))
             assert abs(value - exact) <= arb(distances.error) * exact
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.integers(-5, 40), st.integers(1, 30), st.integers(2, 5))
-def test_slices(seed: int, bits: int, more: int, count: int) -> None:
-    """Whole numbers of few bits, which with the rest are the pair but for one rounding."""
-    high, low = two_sum(*np.random.default_rng(seed).uniform(-1, 1, (2, 9)) * [[1.0], [2.0**-54]])
-    slices = cut(Pair(high, low), bits, more, count)
-    for each in slices[:-1]:
-        assert (each == np.rint(each)).all()
-    for each in slices[1:]:
-        assert (np.abs(each) <= 2.0 ** (more - 1)).all()
-    for m in range(9):
-        total = sum(
-            Fraction(float(each[m])) / Fraction(2) ** (bits + s * more)
-            for s, each in enumerate(slices)
-        )
-        off = abs(total - Fraction(float(high[m])) - Fraction(float(low[m])))
-        last = Fraction(float(abs(slices[-1][m]))) / Fraction(2) ** (bits + (count - 1) * more)
-        assert off <= Fraction(2.0**-53) * last
 
 
 @pytest.mark.sample(8)
@@ -170,16 +148,6 @@ def test_sums_against_ball_arithmetic(name: str, size: str, kind: str, count: in
                     exact += (arb(float(loads.high[k])) + arb(float(loads.low[k]))) / r
             assert among(found, 23 * m + n).contains(exact)
     assert found.radius.max() < good * float(np.abs(loads.high).sum()) / unit
-
-
-def test_nothing_to_add_up() -> None:
-    basis, unit = taken("turned", "one")
-    distances = Distances.of(exactly(basis, unit), 4)
-    sliced = Sliced.of(Box((3, 4), basis), distances, 3.0, unit)
-    nothing = Pair.exact(np.zeros(12))
-    found = sliced.sums(nothing, np.arange(12), np.zeros(12), 0.0)
-    assert not found.value.any()
-    assert not found.radius.any()
 
 
 def perturbed(seed: int, count: int) -> Array:

@@ -94,12 +94,6 @@ def test_states_are_those_of_shear_and_cycle(contact: cr.Contact) -> None:
         assert codes[part] / 1000 == pytest.approx(stuck[part], abs=6e-4)
 
 
-def test_the_certificate_is_the_one_of_the_run(contact: cr.Contact) -> None:
-    lines = data_of(contact)["certificate"]
-    assert lines == said(contact)
-    assert any("global" in line for line in lines)
-
-
 def test_names_of_units_end_no_script(contact: cr.Contact) -> None:
     text = page_of(contact, UnitNames("</script>", "<b>"))
     assert text.count("</script>") == 2

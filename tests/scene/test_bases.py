@@ -42,15 +42,7 @@ def test_two_equal_radii_are_a_sphere() -> None:
     )  # type: ignore[arg-type]
 
 
-@each_geometry
-def test_nearly_equal_radii_are_nearly_a_sphere(geometry: Any) -> None:
-    """Only what is summed by axes differs."""
-    sphere, other = (cr.press(on(R, geometry), load=3e-7) for R in (1.0, (1.0, 1.0 + 1e-12)))
-    assert_allclose(other.loads, sphere.loads, rtol=1e-9)
-    assert other.approach == pytest.approx(sphere.approach, rel=1e-11)
-
-
-@pytest.mark.parametrize("base", [(0.7, 3.0), (INF, 0.4), INF])
+@pytest.mark.parametrize("base", [0.9, (0.7, 3.0), (INF, 0.4), INF])
 def test_closest_points_by_minimisation(base: Any) -> None:
     """The contact point and drop of "closest" minimise the gap of the two paraboloids."""
     x, y, tip = 1.3, -0.8, 0.6
@@ -66,6 +58,7 @@ def test_closest_points_by_minimisation(base: Any) -> None:
     assert 1 / scene.relative_radii[0] == pytest.approx(bend.mean() + 1 / tip, rel=1e-15)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("base", [1.0, *BASES.values()])
 @each_geometry
 def test_offsets_to_twice_the_digits(base: Any, geometry: Any) -> None:
@@ -96,6 +89,7 @@ def test_one_asperity_under_a_flat_base_is_hertz() -> None:
     assert contact.certificate.scope == "global"
 
 
+@pytest.mark.sample(4)
 @each_base
 @each_geometry
 @pytest.mark.parametrize("control", [{"approach": 4e-5}, {"load": 3e-7}])
@@ -112,6 +106,7 @@ def test_loads_are_those_to_50_digits(base: Any, geometry: Any, control: Any) ->
     )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("within", [0.03, 0.12])  # by one start of Newton's method and the other
 @pytest.mark.parametrize("control", [{"load": 2e-6}, {"approach": 2e-6}, {"approach": -5e-7}])
 def test_many_under_a_flat_base(within: float, control: Any) -> None:
@@ -155,6 +150,7 @@ def test_reach(geometry: Any) -> None:
     assert reach(-1e-4, sphere_radius=(1.0, INF), **given) == 0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("base", [(1.0, 2.5), INF, (0.8, INF)])
 @each_geometry
 def test_proof_files(base: Any, geometry: Any) -> None:
@@ -173,6 +169,7 @@ def test_proof_files(base: Any, geometry: Any) -> None:
             checker.prove(spoiled, lambda line: None)
 
 
+@pytest.mark.sample(2)
 @each_base
 @each_geometry
 def test_gradients(base: Any, geometry: Any) -> None:
@@ -199,6 +196,7 @@ def test_gradients(base: Any, geometry: Any) -> None:
     assert np.isfinite(gradient.height_errors).all()
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("base", [1.0, *BASES.values()])
 @each_geometry
 def test_law_and_contact_points_to_twice_the_digits(base: Any, geometry: Any) -> None:
@@ -235,6 +233,7 @@ def test_no_gradient_by_the_radius_of_what_is_no_sphere() -> None:
     assert objective(objective.start)[0] == pytest.approx(cr.press(scene, approach=4e-5).load)
 
 
+@pytest.mark.sample(2)
 @each_base
 def test_change_to_closest(base: Any) -> None:
     """The estimate of what the geometry does, against what it does."""

@@ -5,11 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, paper
-from scipy.optimize import minimize
 
 import convexrough as cr
 from convexrough.scene.asperities import largest_tip_radius
@@ -37,12 +34,6 @@ def test_hexagonal_lattice() -> None:
     assert ((apart < 0.5001).sum(axis=0)[:7] == 6).all()
 
 
-def test_square_lattice() -> None:
-    lattice = cr.Asperities.square(spacing=2.0, tip_radius=1, within=4.0)
-    assert len(lattice) == 13
-    assert {tuple(p) for p in lattice.positions} >= {(0, 0), (4, 0), (-2, 2), (0, -4)}
-
-
 @pytest.mark.parametrize("pattern", [cr.Asperities.hexagonal, cr.Asperities.square])
 @pytest.mark.parametrize("within", [1.0, 3.0, 20.0])
 def test_what_is_made_on_a_lattice_need_not_be_looked_for(pattern: Any, within: float) -> None:
@@ -60,25 +51,6 @@ def test_what_is_made_on_a_lattice_need_not_be_looked_for(pattern: Any, within: 
     assert (made.order == np.lexsort(sites.T[::-1])).all()
     found = Layout(made.points)
     assert len(made.points) < 7 or (found.order is not None and found.sites is not None)
-
-
-def test_scenes_on_one_array_share_what_follows_from_positions() -> None:
-    array = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    heights = 1e-6 * np.random.default_rng(2).standard_normal(len(array))
-    rough = array.with_tips(0.03, heights)
-    assert rough.layout is array.layout
-    assert (rough.tip_radii == 0.03).all()
-    assert (rough.heights == heights).all()
-    assert (array.heights == 0).all()
-    alone = cr.Asperities(array.positions, 0.03, heights)
-    shared, own = (
-        cr.press(cr.Scene(1.0, each, MATERIAL, geometry="summit"), approach=5e-5)
-        for each in (rough, alone)
-    )
-    assert (shared.loads == own.loads).all()
-    assert (shared.certificate.load_errors == own.certificate.load_errors).all()
-    with pytest.raises(cr.InputError, match="tip_radii"):
-        array.with_tips([1.0, 2.0])
 
 
 def test_a_larger_region_keeps_what_was_there() -> None:
@@ -107,21 +79,6 @@ def test_random_heights_and_radii() -> None:
     assert both.tip_radii.std() / both.tip_radii.mean() == pytest.approx(0.3, rel=0.05)
     assert both.tip_radii.max() <= largest_tip_radius(2.0, 0.3)
     assert np.abs(both.heights).max() <= CUT_DEVIATIONS * 0.1
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.floats(0.1, 10), st.floats(0.01, 10), st.floats(-2, 2), st.floats(-2, 2))
-def test_closest_points_by_minimisation(radius: float, tip: float, x: float, y: float) -> None:
-    """The closest geometry's contact point and drop minimise the gap of two paraboloids."""
-    scene = cr.Scene(radius, cr.Asperities([[x, y]], tip), MATERIAL, geometry="closest")
-
-    def gap(point: Any) -> float:
-        u, v = point
-        return (u * u + v * v) / (2 * radius) + ((u - x) ** 2 + (v - y) ** 2) / (2 * tip)
-
-    best = minimize(gap, [x, y], tol=1e-14)
-    assert_allclose(scene.contact_points[0], best.x, atol=1e-5)
-    assert scene.drops[0] == pytest.approx(best.fun, rel=1e-8, abs=1e-12)
 
 
 @pytest.mark.parametrize("geometry", ["summit", "closest"])

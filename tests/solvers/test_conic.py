@@ -105,35 +105,6 @@ def test_gaps_and_approach_from_the_multipliers(name: str, control: str) -> None
     assert_allclose(y2, area, atol=1e-6)
 
 
-@pytest.mark.parametrize("five", [False, True])
-@pytest.mark.parametrize("control", CONTROLS)
-def test_the_model_is_convex_by_the_rules(five: bool, control: str) -> None:
-    model = ConicCVXPY().model(problem_of(paper(), PAPER_APPROACH, control), five=five)
-    assert model.program.is_dcp()
-    assert model.program.is_dpp()
-    names = ["p", *(f"y{power}" for power in range(1 if five else 2, 6)), "z"]
-    assert sorted(model.variables) == names
-    expected = Newton().solve(model.normal)
-    assert disagreement(model.solve(), expected) < 1e-12
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("solver", [ConicCVXPY(), *OTHERS], ids=by_name)
-def test_a_model_is_solved_again_at_another_approach(solver: ConicCVXPY) -> None:
-    problem = problem_of(paper(), PAPER_APPROACH)
-    model = solver.model(problem)
-    for part in (1.0, 0.9, 0.2, 0.7):
-        expected = cr.press(paper(), approach=part * PAPER_APPROACH)
-        found = model.solve(part * problem.approach_bound)
-        assert_allclose(
-            problem.to_scene(found.loads) * problem.units.force,
-            expected.loads,
-            atol=1e-12 * expected.loads.max(),
-        )
-    with pytest.raises(cr.InputError, match="approach: found"):
-        model.solve(1.01 * problem.approach_bound)
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("solver", [*SOLVERS, OTHERS[1]], ids=by_name)  # SCS takes many steps
 @pytest.mark.parametrize("control", CONTROLS)
@@ -154,15 +125,6 @@ def test_five_cones_where_four_do_not_reach(solver: Any, control: str) -> None:
     contact = cr.press(scene, approach=PAPER_APPROACH, solver=solver)
     assert contact.certificate.scope == "local"
     assert contact.certificate.holds
-
-
-@pytest.mark.parametrize("control", CONTROLS)
-def test_cut_boxes_that_stop_nobody(control: str) -> None:
-    """A priori up to S = 1.4, at the solution 0.6: four cones suffice, and that is checked."""
-    problem = problem_of(hexagonal(1, tip_radius=0.12), PAPER_APPROACH, control)
-    boxes = Boxes.choose(problem)
-    assert boxes.cut.any()
-    assert disagreement(solve_in(Conic(), problem, boxes), Newton().solve(problem)) < 1e-12
 
 
 @pytest.mark.sample(2)
@@ -205,21 +167,6 @@ def test_any_scene_is_solved_or_refused(drawn: tuple[cr.Scene, float], control: 
     else:
         assert theta < 1 + 1e-6
         assert disagreement(found, expected) < 1e-11
-
-
-@pytest.mark.parametrize("solver", SOLVERS + RAW, ids=by_name)
-@pytest.mark.parametrize("control", CONTROLS)
-def test_a_single_asperity(solver: Any, control: str) -> None:
-    """No neighbour: S = 0, and no bound on its box but its own."""
-    scene = cr.Scene(2.0, cr.Asperities([[0.0, 0.0]], 0.5), MATERIAL, geometry="summit")
-    approach = 1e-3
-    load = 4 / 3 * np.sqrt(0.4) * approach**1.5
-    contact = cr.press(
-        scene, **{control: {"approach": approach, "load": load}[control]}, solver=solver
-    )
-    rel = 1e-14 if solver.newton_step else 1e-4
-    assert contact.loads[0] == pytest.approx(load, rel=rel)
-    assert contact.approach == pytest.approx(approach, rel=rel)
 
 
 @pytest.mark.parametrize(
@@ -319,3 +266,32 @@ def test_an_approach_that_is_not_a_number_is_not_returned(step: bool) -> None:
 def test_settings_are_checked(solver: Any) -> None:
     with pytest.raises(cr.InputError, match="tolerance"):
         solver(tolerance=0.0)
+
+
+@pytest.mark.parametrize("five", [False, True])
+@pytest.mark.parametrize("control", CONTROLS)
+def test_the_model_is_convex_by_the_rules(five: bool, control: str) -> None:
+    model = ConicCVXPY().model(problem_of(paper(), PAPER_APPROACH, control), five=five)
+    assert model.program.is_dcp()
+    assert model.program.is_dpp()
+    names = ["p", *(f"y{power}" for power in range(1 if five else 2, 6)), "z"]
+    assert sorted(model.variables) == names
+    expected = Newton().solve(model.normal)
+    assert disagreement(model.solve(), expected) < 1e-12
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("solver", [ConicCVXPY(), *OTHERS], ids=by_name)
+def test_a_model_is_solved_again_at_another_approach(solver: ConicCVXPY) -> None:
+    problem = problem_of(paper(), PAPER_APPROACH)
+    model = solver.model(problem)
+    for part in (1.0, 0.9, 0.2, 0.7):
+        expected = cr.press(paper(), approach=part * PAPER_APPROACH)
+        found = model.solve(part * problem.approach_bound)
+        assert_allclose(
+            problem.to_scene(found.loads) * problem.units.force,
+            expected.loads,
+            atol=1e-12 * expected.loads.max(),
+        )
+    with pytest.raises(cr.InputError, match="approach: found"):
+        model.solve(1.01 * problem.approach_bound)

@@ -34,6 +34,7 @@ def one_asperity(nu: float = NU) -> cr.Contact:
     )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_one_asperity_is_a_smooth_sphere_under_shear(nu: float, sign: int) -> None:
@@ -115,6 +116,7 @@ def exact(t: Any, nu: Any) -> dict[str, Any]:
         }
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 @pytest.mark.parametrize("t", [1e-15, 1e-9, 1e-3, 0.05, 0.3, 0.49, 0.51, 0.8, 1 - 1e-6])
 def test_sixty_digits(t: float, nu: float) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from numpy.testing import assert_allclose, assert_array_equal
-from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper
+from scenes import NAMED, PAPER_APPROACH, paper
 
 import convexrough as cr
 from convexrough import fields
@@ -47,7 +47,7 @@ def cerruti(r: float, angle: float, nu: float, a: float, q0: float) -> float:
     return float(weights @ (lines * (1 - nu + nu * np.cos(w) ** 2)) / (np.pi * G))
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("nu", RATIOS)
 @pytest.mark.parametrize("ratio", [0.0, 0.3, 0.6, 0.95, 1.05, 1.5, 4.0, 30.0])
 def test_displacement_is_cerrutis_integral(ratio: float, nu: float) -> None:
@@ -82,6 +82,7 @@ def exact(x: Any, y: Any, nu: Any, share: float) -> tuple[float, float]:
         return float(whole[0] - stuck[0]), float(2 * (whole[1] - stuck[1]))
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("nu", [0.0, 0.3])
 @pytest.mark.parametrize("share", [1e-15, 1e-9, 1e-3, 0.2, 0.7, 1 - 1e-9, 1.0])
 def test_sixty_digits(share: float, nu: float) -> None:
@@ -107,6 +108,7 @@ def sheared(name: str, fraction: float, nu: float = 0.3) -> cr.ShearState:
     return cr.shear(contact, force=fraction * 0.5 * contact.load)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("fraction", [0.01, 0.5, -0.5, 0.95, 1.0])
 @pytest.mark.parametrize("name", ["paper", "rough, closest", "steel"])
 def test_the_traction_of_each_asperity_integrates_to_its_force(name: str, fraction: float) -> None:
@@ -171,17 +173,6 @@ def test_normal_displacement_closes_every_contact() -> None:
     assert_allclose(moved, prescribed, rtol=1.1 * contact.model_error)
     far = fields.normal_displacement(contact, [[30.0, 40.0]])
     assert_allclose(far, contact.load / (np.pi * 50.0), rtol=1e-5)
-
-
-def test_nothing_sheared_nothing_moved() -> None:
-    points = np.random.default_rng(8).uniform(-0.008, 0.008, (2, 9, 2))
-    scene = cr.Scene(1.0, paper().asperities, MATERIAL, friction=0.5, geometry="summit")
-    for approach in (PAPER_APPROACH, -1e-6):
-        contact = cr.press(scene, approach=approach)
-        state = cr.shear(contact, force=0.0)
-        assert_array_equal(fields.traction(state, points), np.zeros((2, 9)))
-        assert_array_equal(fields.shear_displacement(state, points), np.zeros((2, 9)))
-    assert_array_equal(fields.normal_displacement(contact, points), np.zeros((2, 9)))
 
 
 @pytest.mark.parametrize("bad", [0.0, [1.0, 2.0, 3.0], [[0.0, np.nan]]])

@@ -23,11 +23,11 @@ from convexrough.run.stage import (
     Stage,
     Steps,
     Summary,
-    numbers,
     plain,
     titled,
 )
 from convexrough.run.values import Finite, Mistake, NonNegative, Positive, Table, expected
+from convexrough.tabular.columns import aligned
 from convexrough.tabular.units import UnitNames
 
 COUNTS = tuple(word for word in WORDS if word != "contact")
@@ -224,7 +224,7 @@ class Settled(Single):
             said += ["", titled("loss against phase", printed, units)]
             if len(rows) > 20:
                 said.append(f"(the last 20 of {len(rows)} ellipses; all are in phase_losses.csv)")
-            said += numbers(list(printed.values()), rows[-20:])
+            said += aligned([list(printed.values()), *rows[-20:]], digits=self.digits)
         return said
 
     def figures(self, **units: Any) -> Mapping[str, Any]:

@@ -1,0 +1,216 @@
+"""Scenes with as many asperities each, pressed and cycled in rows of one stack.
+
+Scenes with the same positions and tip radii are a family: they share one matrix, so that a product
+for all of them is one product of matrices. Scenes that rows do not prove are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import groupby
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough import threads
+from convexrough.arrays import Array, Indices
+from convexrough.friction.levels import AT_THE_END
+from convexrough.friction.loss import asperity_losses
+from convexrough.friction.order import proved_in_rows
+from convexrough.normal import stack
+from convexrough.normal.problem import NormalProblem
+from convexrough.normal.stack import Boxes, Rows, Stack, joined
+from convexrough.numbers.balls import Ball, where
+from convexrough.numbers.pairs import Pair
+from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz
+
+#: Scenes with more asperities are solved one by one: stacking them saves nothing.
+MOST = 512
+
+#: Largest total size of the matrices of all rows processed at once.
+MATRICES = 2**20
+
+#: What is one number for each contact, and for each cycle.
+TOTALS = ("loads", "load_errors", "approaches", "approach_errors")
+CYCLE = ("losses", "loss_errors", "displacement_amplitudes", "displacement_errors")
+
+
+class PressedRows(NamedTuple):
+    """Some scenes that were proved in rows.
+
+    places : which of all;  problem : in whose units;  high : their levels
+    squares : (m, n) r^2 [length^2]
+    """
+
+    places: Indices
+    problem: NormalProblem
+    stack: Stack
+    boxes: Boxes
+    high: Rows
+    squares: Array
+
+    def contacts(self) -> dict[str, NDArray[Any]]:
+        """Arrays along the rows, by the names of `Contacts`."""
+        found, force, length = self.high, self.problem.units.force, self.problem.units.length
+        loads = found.loads.value * force
+        off = np.abs(loads.sum(axis=1) - found.load.value * force)
+        words = np.where(found.touching, "contact", np.where(found.open, "open", "undecided"))
+        return {
+            "loads": loads.sum(axis=1),
+            "load_errors": (off + found.load.error * force) * (1 + SAFETY),
+            "approaches": found.approach.value * length,
+            "approach_errors": found.approach.error * length,
+            "asperity_loads": loads,
+            "asperity_load_errors": found.loads.error * force,
+            "status": words,
+        }
+
+    def cycles(
+        self, upper: Array, lower: Array, friction: Array
+    ) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
+        """Which cycles rows prove, and arrays along the rows by the names of `Cycles`.
+
+        upper, lower : (m,) Q [force];  friction : (m,) f
+        """
+        problem, high, units = self.problem, self.high, self.problem.units
+        f, nu = Ball.exact(friction), Ball.exact(problem.scene.material.poisson_ratio)
+        half = (Ball.exact(upper) - Ball.exact(lower)) * 0.5
+        drop = (half / f).scaled(1.0 / units.force)
+        total = high.load - drop
+        inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
+        total = where(inside, total, high.load)[:, None]  # others are done one by one
+        rows = replace(self.stack, total=total, depth=None)
+        guess = stack.guessed(rows, rows.offsets.value, self.squares, _reach(problem, total.value))
+        state = stack.refined(rows, stack.pressed(rows, guess))
+        found = stack.proved(rows, state, self.boxes.closed)
+        low = found.rows._replace(load=total[:, 0])
+        ordered = proved_in_rows(rows, self.boxes, high, low)
+        slip, slide = asperity_losses(high, low)
+        travel = f * ((2.0 - nu) / ((1.0 - nu) * 2.0)) * units.length
+        loss = (slip + slide).sum() * 4.0 * (f * units.force) * travel
+        moved = (high.approach - low.approach) * travel
+        words = np.where(high.open, "open", np.full(high.open.shape, "undecided", dtype="<U12"))
+        words[high.touching & low.touching] = "partial"
+        words[high.touching & low.open] = "sliding"
+        return found.good & ordered & inside, {
+            "losses": loss.value,
+            "loss_errors": loss.error,
+            "displacement_amplitudes": moved.value,
+            "displacement_errors": moved.error,
+            "status": words,
+        }
+
+
+def in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> list[PressedRows]:
+    """Those of the scenes that rows prove.
+
+    controls : (m,) loads [force] or approaches [length]
+    """
+    if not scenes or len(scenes[0]) > MOST:
+        return []
+    with threads.one_where(MATRICES):
+        return list(_in_rows(scenes, controls, by_load))
+
+
+def _in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> Iterator[PressedRows]:
+    families: dict[tuple[Any, ...], list[int]] = {}
+    for k, scene in enumerate(scenes):
+        families.setdefault(_family(scene), []).append(k)
+    alike: dict[tuple[Any, ...], list[tuple[NormalProblem, list[int]]]] = {}
+    for places in families.values():
+        highest = [controls[k] + (0.0 if by_load else scenes[k].offsets.max()) for k in places]
+        first = places[int(np.argmax(highest))]
+        problem = _leader(scenes[first], float(controls[first]), by_load)
+        if problem is not None:
+            key = problem.units, *_family(problem.scene)[2:5]
+            alike.setdefault(key, []).append((problem, places))
+    some = max(1, min(MATRICES // len(scenes[0]) ** 2, stack.NUMBERS // len(scenes[0])))
+    for group in alike.values():
+        every = [(problem, k) for problem, places in group for k in places]
+        for start in range(0, len(every), some):
+            yield from _proved(every[start : start + some], scenes, controls, by_load)
+
+
+def _family(scene: Scene) -> tuple[Any, ...]:
+    """Scenes where this is equal differ in heights and friction alone."""
+    asperities = scene.asperities
+    shape = asperities.positions.tobytes(), asperities.tip_radii.tobytes()
+    elastic = scene.material.contact_modulus, scene.material.poisson_ratio
+    return *shape, scene.sphere_radius, *elastic, scene.geometry
+
+
+def _leader(scene: Scene, control: float, by_load: bool) -> NormalProblem | None:
+    """Of a family: its problem with all asperities as candidates; None where none can touch."""
+    approach, load = (None, control) if by_load else (control, None)
+    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
+    return problem.widened(np.arange(len(scene))) if len(problem) else None
+
+
+def _proved(
+    every: Sequence[tuple[NormalProblem, int]],
+    scenes: Sequence[Scene],
+    controls: Array,
+    by_load: bool,
+) -> Iterator[PressedRows]:
+    """Of one stack, in units of the first."""
+    first, places = every[0][0], np.array([k for _, k in every])
+    n, units = len(first), first.units
+    coupled, offsets, known = list[tuple[slice, NormalProblem]](), list[Ball](), list[Ball]()
+    wells, start = list[Array](), 0
+    for _, group in groupby(every, key=lambda each: id(each[0])):
+        family = list(group)
+        problem, m = family[0][0], len(family)
+        coupled.append((slice(start, start + m), problem))
+        offsets.append(_offsets(problem, [scenes[k] for _, k in family]))
+        known.append(stack.of_rows(partial(_repeated, shape=(m, n)), problem.exact.coefficients))
+        wells.append(_repeated(problem.shells, shape=(m, n)))
+        start += m
+    unit = units.force if by_load else units.length
+    given = Ball.exact(controls[places][:, None]).scaled(1.0 / unit)
+    total, depth = (given, None) if by_load else (None, given)
+    shelled = np.concatenate(wells)
+    rows = Stack(coupled, joined(known), joined(offsets), shelled, total, depth)
+    squares = np.array([scenes[k].asperities.distances for k in places]) ** 2
+    if by_load:
+        prescribed, reach = rows.offsets.value, _reach(first, given.value)
+    else:
+        prescribed = rows.offsets.value + given.value
+        reach = first.scene.mean_radius * np.maximum(given.value, 0.0) * units.length
+    guess = stack.guessed(rows, prescribed, squares, reach)
+    state = stack.refined(rows, stack.pressed(rows, guess))
+    boxes = stack.widest(rows, state)
+    found = stack.proved(rows, state, boxes)
+    good = np.flatnonzero(found.good)
+    if len(good):
+        high = found.rows if total is None else found.rows._replace(load=total[:, 0])
+        chosen = rows.only(good), Boxes._make(each[good] for each in boxes), high.at(good)
+        yield PressedRows(places[good], first, *chosen, squares[good])
+
+
+def _repeated(values: Array, shape: tuple[int, int]) -> Array:
+    return np.array(np.broadcast_to(values, shape))
+
+
+def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
+    """(m, n) d of scenes that differ in heights, as `NormalProblem.exact` has them."""
+    scene, length = problem.scene, problem.units.length
+    if len(rows) == 1 and rows[0] is scene:
+        return problem.exact.offsets[None, :]
+    bare = replace(scene, asperities=scene.asperities.with_tips(scene.asperities.tip_radii, 0.0))
+    drops = replace(problem, scene=bare).twofold_offsets()  # below 0
+    heights = np.array([each.asperities.heights for each in rows]) / length
+    offsets = Pair.exact(heights) + Pair(*(part[None, :] for part in drops))
+    sizes = np.abs(offsets.high) + 6.0 * (np.abs(heights) + np.abs(drops.high))
+    return Ball.around(offsets, 2.0**-98 * sizes)
+
+
+def _reach(problem: NormalProblem, loads: Array) -> Array:
+    """a^2 of smooth contacts [length^2]."""
+    scene, force = problem.scene, loads * problem.units.force
+    a = hertz.contact_radius(force, scene.material.contact_modulus, scene.mean_radius)
+    return np.asarray(a**2)

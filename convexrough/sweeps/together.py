@@ -1,0 +1,121 @@
+"""Scenes of a batch that are pressed and cycled together, in rows of one stack.
+
+Only where all that is measured is known of rows: the numbers of `NORMAL` and `CYCLE`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.errors import ConvexroughError
+from convexrough.rows import PressedRows, in_rows
+from convexrough.run.stages import Cycle
+from convexrough.sphere import mindlin
+from convexrough.sphere.smooth import smooth_reference
+from convexrough.sweeps.measures import Column, Numbers, row_label
+from convexrough.sweeps.scenes import Asked
+
+#: Arrays along the rows, by the names of `Contacts` or `Cycles`.
+Found = Mapping[str, Array]
+
+
+def _count(status: str) -> Callable[[Found], Array]:
+    return lambda found: (found["status"] == status).sum(axis=1)
+
+
+#: Numbers of summaries, from what rows find. Beside the names of `Contacts` and `Cycles`: force
+#: amplitudes, displacement amplitudes where proved, and losses and scales of smooth spheres.
+NORMAL: dict[str, Callable[[Found], Array]] = {
+    **{name: _count(name) for name in ("contact", "open", "undecided")},
+    "approach": lambda found: found["approaches"],
+    "approach_error": lambda found: found["approach_errors"],
+    "load": lambda found: found["loads"],
+    "largest_load": lambda found: found["asperity_loads"].max(axis=1),
+    "certificate.load_error": lambda found: found["asperity_load_errors"].max(axis=1),
+}
+CYCLE: dict[str, Callable[[Found], Array]] = {
+    **{name: _count(name) for name in ("sliding", "partial", "undecided")},
+    "loss": lambda found: found["losses"],
+    "loss_error": lambda found: found["loss_errors"],
+    "force_amplitude": lambda found: found["amplitudes"],
+    "displacement_amplitude": lambda found: found["displacement_amplitudes"],
+    "displacement_error": lambda found: found["displacement_errors"],
+    "secant_stiffness": lambda found: found["amplitudes"] / found["moved"],
+    "loss_factor": lambda found: found["losses"] / (np.pi * found["amplitudes"] * found["moved"]),
+    "loss_normalised": lambda found: found["losses"] / found["scales"],
+    "smooth_normalised": lambda found: found["smooth"],
+    "loss_over_smooth": lambda found: found["losses"] / found["scales"] / found["smooth"],
+}
+KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYCLE}
+
+
+def measured_together(
+    asked: Mapping[int, Asked], columns: Sequence[Column]
+) -> dict[int, tuple[Numbers, str]]:
+    """`measured` of the scenes that rows prove, by their numbers."""
+    if not {column.number for column in columns} <= KNOWN:
+        return {}
+    groups: dict[tuple[int, bool, int], list[int]] = {}
+    for number, each in asked.items():
+        cycle = _cycle(each, columns)
+        if each.plain and not (cycle and each.scene.friction is None):
+            key = len(each.scene), each.load is not None, len(cycle.maximum) if cycle else 0
+            groups.setdefault(key, []).append(number)
+    found: dict[int, tuple[Numbers, str]] = {}
+    for (_, by_load, _), numbers in groups.items():
+        some = [asked[number] for number in numbers]
+        controls = np.array([each.load if by_load else each.approach for each in some])
+        try:
+            for rows in in_rows([each.scene for each in some], controls, by_load):
+                mine = [some[k] for k in rows.places.tolist()]
+                for k, known in _known(rows, mine, columns).items():
+                    found[numbers[rows.places[k]]] = known, ""
+        except ConvexroughError:  # it is some scene's: one by one they say whose
+            continue
+    return found
+
+
+def _cycle(asked: Asked, columns: Sequence[Column]) -> Cycle | None:
+    """The cycles of a scene, if any is measured."""
+    stage = asked.stages.get("cycle")
+    wanted = any(column.stage == "cycle" for column in columns)
+    return stage if wanted and isinstance(stage, Cycle) else None
+
+
+def _known(
+    rows: PressedRows, asked: Sequence[Asked], columns: Sequence[Column]
+) -> dict[int, Numbers]:
+    """The numbers of those rows that are certified."""
+    contacts = rows.contacts()
+    good = ~(contacts["status"] == "undecided").any(axis=1)
+    normal = {name: number(contacts) for name, number in NORMAL.items()}
+    numbers: list[Numbers] = [
+        {(f"normal.{name}", ""): float(values[k]) for name, values in normal.items()}
+        for k in range(len(asked))
+    ]
+    stages = [stage for each in asked if (stage := _cycle(each, columns))]
+    if stages:
+        friction = np.array([each.scene.friction for each in asked], dtype=np.float64)
+        limits = friction * contacts["loads"]
+        smooth = [
+            smooth_reference(each.scene, float(load))
+            for each, load in zip(asked, contacts["loads"], strict=True)
+        ]
+        scales = np.array([np.nan if each is None else each.energy_scale for each in smooth])
+        highs = np.array([stage.maximum for stage in stages]).T
+        lows = np.array([stage.lowest for stage in stages]).T
+        for high, low in zip(highs, lows, strict=True):
+            proved, fields = rows.cycles(high * limits, low * limits, friction)
+            good &= proved
+            half = (high - low) / 2.0
+            moved = np.where(proved, fields["displacement_amplitudes"], np.nan)  # never 0
+            fields |= {"amplitudes": half * limits, "scales": scales, "moved": moved}
+            fields["smooth"] = np.where(np.isnan(scales), np.nan, mindlin.loss(half))
+            cycle = {name: number(fields) for name, number in CYCLE.items()}
+            for k, known in enumerate(numbers):
+                label = row_label((low[k], high[k]))
+                known |= {(f"cycle.{name}", label): float(it[k]) for name, it in cycle.items()}
+    return {int(k): numbers[k] for k in np.flatnonzero(good)}

@@ -1,0 +1,86 @@
+"""Rows of a sweep that are computed together, against the same scenes measured one by one."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from convexrough.sweeps import batch, together
+from convexrough.sweeps.batch import Columns, compute
+from convexrough.sweeps.file import plan_of
+
+#: Numbers that rows know, but for errors, which are bounds of their own.
+KNOWN = [f"normal.{name}" for name in together.NORMAL if "error" not in name]
+CYCLES = [f"cycle.{name}" for name in together.CYCLE if "error" not in name]
+
+SCENES: dict[str, dict[str, Any]] = {
+    "load": {"sweep.over": {"normal.load": [1e-7, 3e-7], "asperities.height_std": [1e-7, 1e-6]}},
+    "approach": {"normal": {"approach": 5e-5}},
+    "tips": {"asperities": {"tip_radius_cv": 0.2, "geometry": "summit"}},
+    "one end": {"cycle": {"maximum": [0.3, 0.4], "minimum": [0.1, -0.2]}},
+    "gross sliding": {"cycle": {"maximum": [1.0, 0.2]}},
+    "friction": {"sweep.draw": {"friction.coefficient": {"uniform": [0.3, 0.6]}}},
+    "crowded": {"asperities": {"spacing": 0.0006, "within": 0.0012}},
+}
+
+
+def tables(changes: dict[str, Any], measure: list[str]) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "sphere": {"radius": 1.0},
+        "material": {"contact_modulus": 1.0, "poisson_ratio": 0.3},
+        "asperities": {"pattern": "hexagonal", "spacing": 0.0025, "tip_radius": 0.02,
+                       "within": 0.0102, "height_std": 1e-6},
+        "normal": {"load": 3e-7},
+        "friction": {"coefficient": 0.5},
+        "cycle": {"maximum": [0.2, 0.7]},
+        "sweep": {"seeds": 3, "measure": measure},
+    }  # fmt: skip
+    for name, table in changes.items():
+        table_name, _, inner = name.partition(".")
+        if inner:
+            found[table_name][inner] = table
+        elif name == "normal":
+            found[name] = table
+        else:
+            found[name] = found[name] | table
+    return found
+
+
+def rows(changes: dict[str, Any], measure: list[str]) -> Columns:
+    plan = plan_of(tables(changes, measure), Path("sweep"), None)
+    return compute(plan.batch(range(plan.source.count))).columns
+
+
+@pytest.mark.parametrize("changes", SCENES.values(), ids=SCENES)
+def test_rows_together_are_those_of_scenes_one_by_one(
+    changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measure = KNOWN + CYCLES + ["normal.certificate.load_error", "cycle.loss_error"]
+    found = rows(changes, measure)
+    monkeypatch.setattr(batch, "measured_together", lambda *_: {})
+    alone = rows(changes, measure)
+    assert found.keys() == alone.keys()
+    for name in ("scene", "status", "message"):
+        assert_array_equal(found[name], alone[name])
+    for name in list(found)[-len(measure) :]:
+        if "error" in name:
+            assert np.all(found[name] <= 1e3 * alone[name] + 1e-25), name
+        elif not name.endswith("message"):
+            assert_allclose(found[name], alone[name], rtol=1e-12, atol=1e-30, err_msg=name)
+
+
+def test_what_rows_do_not_know_is_measured_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    one_by_one = batch.measured
+
+    def counted(*given: Any) -> Any:
+        asked.append(1)
+        return one_by_one(*given)
+
+    monkeypatch.setattr(batch, "measured", counted)
+    rows({}, ["load", "loss"])
+    assert len(asked) == 0
+    rows({}, ["load", "duality_gap"])
+    assert len(asked) == 3
