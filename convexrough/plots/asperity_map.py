@@ -42,7 +42,7 @@ class Layer(NamedTuple):
     rim    : colour of their outline, None of none where discs are many or stacked
     """
 
-    word: str
+    status: str
     radii: Array
     shades: Any
     rim: str | None = SMOOTH
@@ -131,7 +131,7 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
     if not there.any():
         return
     shades = to_rgba_array(layer.shades)
-    few = int(there.sum()) < DENSE or layer.word == "undecided"
+    few = int(there.sum()) < DENSE or layer.status == "undecided"
     axes.add_collection(
         EllipseCollection(
             *(2.0 * layer.radii[there],) * 2,
@@ -143,7 +143,7 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
             edgecolors=layer.rim or "none",
             linewidths=0.4 if few and layer.rim else 0.0,
             rasterized=int(there.sum()) >= DENSE,
-            label=layer.word,
+            label=layer.status,
         ),
         autolim=False,
     )
@@ -163,8 +163,8 @@ def status_layers(
 ) -> list[Layer]:
     """A layer for each status, and the stick discs inside those that slip in part."""
     layers = [
-        Layer(word, np.where(status == word, radii, 0.0), colour)
-        for word, (colour, _) in LOOKS.items()
+        Layer(name, np.where(status == name, radii, 0.0), colour)
+        for name, (colour, _) in LOOKS.items()
     ]
     if stick_radii is not None:
         stick = np.where((status == "partial") & (radii > 0), stick_radii, 0.0)
@@ -172,10 +172,10 @@ def status_layers(
     return layers
 
 
-def status_handles(words: Iterable[str], *, stick: bool = False) -> list[Line2D]:
+def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line2D]:
     """The entries of a legend: each status that occurs, and stick discs."""
-    entries = [each for word, each in LOOKS.items() if word in words]
-    if stick and "partial" in words:
+    entries = [each for status, each in LOOKS.items() if status in statuses]
+    if stick and "partial" in statuses:
         entries.insert(0, (STICK, "stick disc"))
     return [_handle(colour, text) for colour, text in entries]
 

@@ -123,7 +123,7 @@ def _draw_cycle(cycle: Cycle, axes: Axes, *units: str) -> None:
 
 
 def _draw_path(path: LoadPath, axes: Axes, *units: str) -> None:
-    if path.held:
+    if path.load_constant:
         draw_path_loop(axes, path, Scale(path.contact, *units), between(path))
     else:
         draw_path(axes, path, units[1])

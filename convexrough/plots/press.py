@@ -137,20 +137,20 @@ def distances(scale: Scale) -> Array:
     return away / scale.length.size
 
 
-def _draw_points(axes: Axes, x: Array, y: Array, top: float, word: str) -> bool:
+def _draw_points(axes: Axes, x: Array, y: Array, top: float, label: str) -> bool:
     """A dot for each, or how many there are where and their median; whether these are many."""
     if len(x) >= CROWDED:
-        draw_density(axes, x, y, top, word)
+        draw_density(axes, x, y, top, label)
         return True
     size = float(np.clip(40.0 / np.sqrt(len(x)), 1.2, 4.0))
-    axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=word, clip_on=False, zorder=3)
+    axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=label, clip_on=False, zorder=3)
     return False
 
 
 def census(contact: Contact) -> str:
     """How many touch, and how sure that is."""
-    words = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
-    return words + not_proved(contact.certificate.scope, contact.status)
+    text = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
+    return text + not_proved(contact.certificate.scope, contact.status)
 
 
 def _loads_figure(scale: Scale) -> Figure:

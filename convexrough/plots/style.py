@@ -147,7 +147,7 @@ def _inches(axes: Axes) -> Array:
     return np.array([0.75 * place.width * width, 0.75 * place.height * height])
 
 
-def draw_density(axes: Axes, x: Array, y: Array, top: float, word: str) -> None:
+def draw_density(axes: Axes, x: Array, y: Array, top: float, label: str) -> None:
     """How many points lie where, the darker the more, and the median of y along x.
 
     top : of y
@@ -163,7 +163,7 @@ def draw_density(axes: Axes, x: Array, y: Array, top: float, word: str) -> None:
     column = np.clip(np.searchsorted(across, x, side="right") - 1, 0, columns - 1)
     held = np.unique(column)
     middle = [np.median(y[column == each]) for each in held]
-    axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=word)
+    axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=label)
     axes.plot((across[held] + across[held + 1]) / 2, middle, color=ROUGH, lw=1.3,
               label="their median")  # fmt: skip
 

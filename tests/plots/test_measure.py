@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figure_checks import fits, words
+from figure_checks import fits, texts
 from matplotlib.figure import Figure
 
 import convexrough as cr
@@ -86,7 +86,7 @@ def test_fretting_is_drawn_with_units() -> None:
     worn = cr.fretting(cycle)
     figure = plots.fretting_figures(worn, length_unit="mm", force_unit="N")["fretting"]
     fits(figure)
-    said = " ".join(text.get_text() for text in words(figure))
+    said = " ".join(text.get_text() for text in texts(figure))
     for unit in ("nm]", "nJ]", "GPa]"):
         assert unit in said, said
     assert worn.plot().get_title(loc="left") == "slip amplitude at the rim"
