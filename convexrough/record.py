@@ -132,6 +132,12 @@ class Table(Record):
         return {name: it for name, it in values.items() if isinstance(it, (str, int, float))}
 
 
+def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
+    """A mapping for each row of columns, in the numbers of Python."""
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
+
+
 def singular(name: str) -> str:
     """What one value of an array is called: load of loads, radius of radii, loss of losses."""
     for ending, one in (("radii", "radius"), ("losses", "loss"), ("approaches", "approach")):

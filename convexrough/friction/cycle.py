@@ -30,7 +30,6 @@ from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
 from convexrough.friction.path import points_of, pressed_for
-from convexrough.friction.shear import level_at
 from convexrough.friction.state import by_status, displacements_of, stick_radii
 from convexrough.friction.walk import Point, Walk, levels_needed
 from convexrough.influence import Kind
@@ -305,7 +304,7 @@ def cycles(
             expected = "none beside a displacement, whose cycles are symmetric"
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
-        heights = [levels.load - level_at("displacement", levels, x) for x in amplitudes]
+        heights = [levels.load - levels.displaced(x) for x in amplitudes]
         ends = [(height, -height) for height in heights]
         return _at_the_load(contact, ends, [(float(f * h), -float(f * h)) for h in heights])
     assert maximum is not None  # exactly_one
