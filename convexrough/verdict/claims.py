@@ -288,9 +288,10 @@ class _Placing:
             tried = [positions.mean(axis=0) - points.mean(axis=0)]
         for shift in tried:
             if fits(points[:20] + shift) and fits(points + shift):
-                rounded = np.round(-shift / allowed) * allowed
-                there = ", ".join(f"{each:.4g}" for each in rounded + 0.0)
-                return f"all are shifted by [{there}], expected them from the axis of the sphere"
+                digit = 0.1 * allowed
+                there = ", ".join(f"{each:.4g}" for each in np.round(-shift / digit) * digit + 0.0)
+                expected = f"expected them from the axis of the sphere, to {allowed:.3g}"
+                return f"all are shifted by [{there}], {expected}"
         return ""
 
 

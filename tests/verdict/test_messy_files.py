@@ -290,7 +290,7 @@ def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
     name = text()(tmp_path, {"x": x + 1e-3, "y": y, "load": np.ones(len(x))})
     with pytest.raises(TableError) as refused:
         read_loads(tmp_path / name, scene, Manner())
-    cause = "all are shifted by [0.001, 0], expected them from the axis of the sphere"
+    cause = "all are shifted by [0.001, 0], expected them from the axis of the sphere, to 1e-05"
     assert str(refused.value) == f"{tmp_path / name}: positions: {cause}"
 
 
