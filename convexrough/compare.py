@@ -29,7 +29,7 @@ from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER, logged_steps
-from convexrough.record import LINE, Record, Table, in_words
+from convexrough.record import LINE, Record, Table, in_text
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
@@ -49,7 +49,7 @@ class Entry(Record):
     message : the reason where there is no solution, else ""
     contact : the certified solution, or None
     disagreement : max |load - reference| over the largest load of the reference; nan without both
-    different_words : asperities whose status differs from the reference; None without both
+    different_statuses : asperities whose status differs from the reference; None without both
     steps : the log of its iterations, where `compare` was asked for it: by step a mapping of
         solver, step, objective and residual; those of OSQP and CVXPY are not known
     memory : [bytes] largest increase of the resident memory of the process during the solution,
@@ -61,7 +61,7 @@ class Entry(Record):
     message: str = ""
     contact: Contact | None = None
     disagreement: float = np.nan
-    different_words: int | None = None
+    different_statuses: int | None = None
     memory: int | None = None
     steps: tuple[Mapping[str, Any], ...] = ()
 
@@ -92,7 +92,7 @@ class Comparison(Table, Plottable):
             if (found := entry.contact) is None:
                 yield entry.solver, f"{entry.outcome}: {entry.message}"[:LINE]
             else:
-                proved = f"{found.certificate.scope}; {in_words(found.status)}"
+                proved = f"{found.certificate.scope}; {in_text(found.status)}"
                 yield entry.solver, f"{proved}; {found.seconds:.2g} s"
         yield "contradictions", "; ".join(self.contradictions) or "none"
 
@@ -100,7 +100,7 @@ class Comparison(Table, Plottable):
         """A row for each entry; nan and "" where there is no answer."""
         none = np.full(len(self.contacts[0].scene), np.nan) if self.contacts else np.empty(0)
         answers = [entry.contact for entry in self.entries]
-        words = [entry.different_words for entry in self.entries]
+        statuses = [entry.different_statuses for entry in self.entries]
         columns = {
             "solver": [entry.solver for entry in self.entries],
             "outcome": [entry.outcome for entry in self.entries],
@@ -109,7 +109,7 @@ class Comparison(Table, Plottable):
             "seconds": [np.nan if each is None else each.seconds for each in answers],
             "iterations": [np.nan if each is None else each.iterations for each in answers],
             "disagreement": [entry.disagreement for entry in self.entries],
-            "different_words": [np.nan if each is None else each for each in words],
+            "different_statuses": [np.nan if each is None else each for each in statuses],
         }
         loads = np.array([none if each is None else each.loads for each in answers])
         return {name: (("entry",), np.array(column)) for name, column in columns.items()} | {
@@ -220,7 +220,7 @@ def _enter(
         outcome="answered",
         contact=contact,
         disagreement=_relative(contact.loads - reference.loads, reference.loads),
-        different_words=int(np.sum(contact.status != reference.status)),
+        different_statuses=int(np.sum(contact.status != reference.status)),
         memory=risen,
     )
 
@@ -281,7 +281,7 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
     proved = (one.status != "undecided") & (other.status != "undecided")
     if len(where := np.flatnonzero(proved & (one.status != other.status))):
         each = (f"{i}: {one.status[i]} and {other.status[i]}" for i in where)
-        lines.append(f"words of asperities {joined(each)}")
+        lines.append(f"statuses of asperities {joined(each)}")
     return [f"{first.name} and {second.name}: {line}" for line in lines]
 
 

@@ -69,7 +69,7 @@ def test_all_agree(name: str, control: str) -> None:
     for entry in comparison.entries:
         assert (entry.outcome, entry.message) == ("answered", "")
         assert entry.disagreement <= limits[entry.solver], entry.solver
-        assert entry.different_words == 0
+        assert entry.different_statuses == 0
         assert entry.contact is not None
         assert entry.contact.certificate.holds
         assert entry.contact.certificate.duality_gap >= 0
@@ -99,8 +99,8 @@ def test_a_poor_answer_is_measured_and_contradicts_nothing() -> None:
     assert poor.disagreement == pytest.approx(apart / reference.contact.loads.max())
     assert 1e-4 < poor.disagreement < 1e-3
     different = int(np.sum(poor.contact.status != reference.contact.status))
-    # Poor loads are near enough to prove every word of the solution near them.
-    assert poor.different_words == different == 0
+    # Poor loads are near enough to prove every status of the solution near them.
+    assert poor.different_statuses == different == 0
     assert comparison.contradictions == ()
     assert comparison.certified  # by the reference
 
@@ -135,7 +135,7 @@ def test_solvers_that_do_not_answer() -> None:
     assert (refused.outcome, refused.message) == ("refused", "scene: found this, expected another")
     for entry in (failed, refused):
         assert np.isnan(entry.disagreement)
-        assert (entry.contact, entry.different_words, entry.memory) == (None, None, None)
+        assert (entry.contact, entry.different_statuses, entry.memory) == (None, None, None)
     assert answered.outcome == "answered"
 
 
@@ -151,7 +151,7 @@ def test_without_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     comparison = compare(paper(), approach=5e-5, solvers=[BristleQP(16), Newton(tolerance=1e-3)])
     assert [entry.outcome for entry in comparison.entries] == ["failed", "answered", "answered"]
     assert all(np.isnan(entry.disagreement) for entry in comparison.entries)
-    assert all(entry.different_words is None for entry in comparison.entries)
+    assert all(entry.different_statuses is None for entry in comparison.entries)
     assert comparison.certified
 
 
@@ -226,13 +226,13 @@ def test_each_kind_of_contradiction(contact: cr.Contact) -> None:
     assert "approach 5.0000000000000002e-05 +- 0 and 6" in line
     assert contradictions(true, forged(contact, approach=6e-5, approach_error=2e-5)) == []
 
-    words = np.where(proof.status == "open", "contact", "open")
-    (line,) = contradictions(true, forged(contact, status=words))
-    assert "words of asperities 0: contact and open; 1: " in line
+    statuses = np.where(proof.status == "open", "contact", "open")
+    (line,) = contradictions(true, forged(contact, status=statuses))
+    assert "statuses of asperities 0: contact and open; 1: " in line
     assert line.endswith("; and 56 more")
-    undecided = np.full(len(words), "undecided")
+    undecided = np.full(len(statuses), "undecided")
     assert contradictions(true, forged(contact, status=undecided)) == []
-    assert contradictions(true, forged(contact, status=words, scope="none")) == []
+    assert contradictions(true, forged(contact, status=statuses, scope="none")) == []
 
 
 @pytest.fixture
@@ -275,7 +275,7 @@ def test_command(command: Any, tmp_path: Path) -> None:
     assert "duality gap        in N mm, " in ran.out
     table = ran.out.splitlines()[-len(NAMES) - 1 :]
     assert table[0].split() == [
-        *("solver", "disagreement", "load", "error", "duality", "gap", "certificate", "words"),
+        *("solver", "disagreement", "load", "error", "duality", "gap", "certificate", "statuses"),
         *("iterations", "seconds", "MB"),
     ]
     assert len({len(line) for line in table}) == 1

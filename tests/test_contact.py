@@ -97,7 +97,7 @@ def total(name: str) -> float:
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("name", NAMED)
-def test_words_do_not_depend_on_the_operator(name: str) -> None:
+def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
     """Nor do loads, to within what is proved of each."""
     scene, approach = NAMED[name]
     first, *others = (
@@ -160,7 +160,7 @@ def test_two_equal_asperities_by_hand() -> None:
 @settings(max_examples=15, deadline=None)
 @given(random_cases(), st.floats(-3, 3), st.floats(-3, 3))
 def test_units_do_not_matter(drawn: Case, length: float, force: float) -> None:
-    """Lengths times lambda and moduli times mu: loads times lambda^2 mu, the same words."""
+    """Lengths times lambda and moduli times mu: loads times lambda^2 mu, the same statuses."""
     scene, approach, kind = drawn
     lam, mu = 10**length, 10**force
     a = scene.asperities

@@ -73,7 +73,7 @@ def test_single_corruptions(kind: str, seeds: range, control: str) -> None:
 
 
 def test_a_small_load_that_is_missing_does_not_pass() -> None:
-    """Where the loads are good enough for every word, the set still has to be that of the words."""
+    """Loads may be good enough for every status; the given set still has to be the proved one."""
     passed = 0
     for seed in range(40):
         contact, given = solved(seed, "approach")
@@ -86,7 +86,7 @@ def test_a_small_load_that_is_missing_does_not_pass() -> None:
             assert verdict.wrongly_open.tolist() == [i]
             assert not verdict.holds
             passed += verdict.certificate.holds
-    assert passed > 5  # whose words alone say that all is well
+    assert passed > 5  # whose statuses alone say that all is well
 
 
 def test_what_is_right_holds() -> None:

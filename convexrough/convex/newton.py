@@ -37,7 +37,7 @@ PROMISED = 1e-4
 SHORTEST = 1e-12
 
 
-class State(Protocol):
+class Iterate(Protocol):
     """A point of the iteration.
 
     unknown  : eta;  forces : p(eta), as far as the constraints let them;  defect : F
@@ -58,7 +58,7 @@ class State(Protocol):
     def scale(self) -> float: ...
 
 
-Point = TypeVar("Point", bound=State)
+Point = TypeVar("Point", bound=Iterate)
 
 
 class Law(Protocol[Point]):
@@ -156,7 +156,7 @@ def solve(
     )
 
 
-def _relative(state: State) -> float:
+def _relative(state: Iterate) -> float:
     """The residual over its scale."""
     return state.residual / state.scale if state.scale != 0 else np.inf
 

@@ -395,7 +395,7 @@ def _completed(stack: Stack, loads: Pair) -> Pair:
 def proved(stack: Stack, state: Trials, boxes: Boxes) -> Solved:
     """The solutions in these boxes: as `proved.proved`, of the rows where one box is enough.
 
-    Rows with a residual above rounding, or a word that is not decided, are not `good`, either.
+    Rows with a residual above rounding, or a status that is undecided, are not `good`, either.
     """
     loads, missing = state.loads.high, state.missing.size
     rows, j = np.arange(len(loads)), np.argmax(loads, axis=1)

@@ -44,7 +44,13 @@ from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.newton import newton_step
-from convexrough.solvers.programs import Answer, QuadraticProgram, RawAnswer, Reduction, run_osqp
+from convexrough.solvers.programs import (
+    ProgramAnswer,
+    QuadraticProgram,
+    RawAnswer,
+    Reduction,
+    run_osqp,
+)
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
@@ -112,7 +118,7 @@ class BristleQP:
 
 
 @dataclass(frozen=True, eq=False)
-class BristleProgram(Reduction[QuadraticProgram, RawAnswer, Answer]):
+class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
     """The contact law as rows of bristles, in the variables P and e, row by row.
 
     m       : bristles of each row
@@ -161,7 +167,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, Answer]):
             upper=upper,
         )
 
-    def invert(self, raw: RawAnswer) -> Answer:
+    def invert(self, raw: RawAnswer) -> ProgramAnswer:
         """A bristle is in contact where h phi exceeds its multiplier.
 
         The sign of their difference is decided, where phi itself is 0 to the solver's accuracy
@@ -177,7 +183,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, Answer]):
         if len(beyond := np.flatnonzero(self.cut & (loads >= self.box))):
             ratios = problem.shells[beyond] / problem.stiffness(loads[beyond], beyond)
             raise TooDenseError(self.solver, problem.candidates[beyond], ratios, LARGEST_S)
-        return Answer(loads, approach, raw.iterations)
+        return ProgramAnswer(loads, approach, raw.iterations)
 
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:

@@ -116,10 +116,10 @@ class RawAnswer(NamedTuple):
     x: Array
     multipliers: Array  # of the rows of A
     iterations: int
-    word: str  # on how it ended
+    status: str  # on how it ended
 
 
-class Answer(NamedTuple):
+class ProgramAnswer(NamedTuple):
     """What a program says of a normal problem, not yet judged."""
 
     loads: Array  # of its members, in the problem's order and units
@@ -205,7 +205,7 @@ def run_osqp(
 def _of_numbers(raw: RawAnswer, library: str, solver: str) -> RawAnswer:
     if not (np.isfinite(raw.x).all() and np.isfinite(raw.multipliers).all()):
         raise SolverError(
-            f"the answer of {library} is not a number, after {raw.iterations} steps ({raw.word})",
+            f"the answer of {library} is not a number, after {raw.iterations} steps ({raw.status})",
             solver=solver,
             advice="try a larger tolerance, or Newton's method",
         )

@@ -23,8 +23,8 @@ contact = cr.press(
 state = cr.shear(contact, force=0.25 * contact.load)
 np.savez(
     sys.argv[2], loads=contact.loads, load_errors=contact.certificate.load_errors,
-    words=contact.status, forces=state.forces, force_errors=state.certificate.force_errors,
-    shear_words=state.status,
+    statuses=contact.status, forces=state.forces, force_errors=state.certificate.force_errors,
+    shear_statuses=state.status,
 )
 """
 
@@ -46,5 +46,5 @@ def test_one_thread_and_two(tmp_path: Path, influence: str) -> None:
     for name in ("load", "force"):
         apart = np.abs(one[f"{name}s"] - two[f"{name}s"])
         assert (apart <= one[f"{name}_errors"] + two[f"{name}_errors"]).all()
-    assert (one["words"] == two["words"]).all()
-    assert (one["shear_words"] == two["shear_words"]).all()
+    assert (one["statuses"] == two["statuses"]).all()
+    assert (one["shear_statuses"] == two["shear_statuses"]).all()

@@ -10,7 +10,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from figure_checks import words
+from figure_checks import texts
 from matplotlib.text import Text
 
 import convexrough as cr
@@ -236,7 +236,7 @@ def test_figures() -> None:
             assert figure.bbox.padded(1).contains(box.x0, box.y0), text
             assert figure.bbox.padded(1).contains(box.x1, box.y1), text
     work = bench_figures(tiny())["work-precision"]
-    labels = {text.get_text() for text in words(work)}
+    labels = {text.get_text() for text in texts(work)}
     assert {"newton (default)", "conic", "bristles", "frontier", "seconds"} <= labels
     assert bench_figures(replace(tiny(), rows=()))
 
@@ -244,8 +244,8 @@ def test_figures() -> None:
 def test_a_performance_profile() -> None:
     """Parts of the cases by time over the least; nothing that is not right counts."""
     seconds = np.array([[1.0, 2.0, np.inf, np.inf], [4.0, 1.0, 3.0, np.inf]])
-    words = (("right", "right", "wrong", "failed"), ("right", "right", "right", "refused"))
-    found = Profile(("a", "b"), ("1", "2", "3", "4"), seconds, words)
+    texts = (("right", "right", "wrong", "failed"), ("right", "right", "right", "refused"))
+    found = Profile(("a", "b"), ("1", "2", "3", "4"), seconds, texts)
     assert found.part(1.0).tolist() == [0.25, 0.5]
     assert found.part(2.0).tolist() == [0.5, 0.5]
     assert found.part(4.0).tolist() == [0.5, 0.75]

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from scenes import rough
 
-from convexrough.influence.convolution import Box
+from convexrough.influence.convolution import SiteBox
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
@@ -299,7 +299,7 @@ def test_fitted_shells_do_not_overlap(
 def test_convolutions(shape: tuple[int, int], power: int) -> None:
     """Also on a box of one row, or one site; and what they lose stays below the bounds."""
     basis = turned(BASES["hexagonal"], 0.4)
-    box = Box(shape, basis)
+    box = SiteBox(shape, basis)
     assert all(p >= 2 * n - 1 for p, n in zip(box.padded, shape, strict=True))
     sites = np.stack(np.unravel_index(np.arange(shape[0] * shape[1]), shape), axis=1) @ basis
     inverse = inverse_distances(sites, sites) ** power

@@ -10,7 +10,7 @@ from flint import arb, ctx
 from numpy.typing import NDArray
 
 import convexrough as cr
-from convexrough.influence.convolution import Box, through_waves
+from convexrough.influence.convolution import SiteBox, through_waves
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.sliced import Distances, Sliced, cut
 from convexrough.normal.problem import NormalProblem
@@ -82,7 +82,7 @@ def test_values_of_the_kernel(name: str, size: str, largest: int) -> None:
 def test_levels_are_exact(name: str, count: int, shape: tuple[int, int]) -> None:
     """Against long integers, bit for bit, with so much to spare that rounding is sure."""
     basis, unit = taken(name, "one")
-    box = Box(shape, basis / np.hypot(*basis[0]))
+    box = SiteBox(shape, basis / np.hypot(*basis[0]))
     distances = Distances.of(exactly(basis, unit), max(shape))
     sliced = Sliced.of(box, distances, box.kernel(1, np.float64).norm, unit, count)
     loads = Pair.exact(np.random.default_rng(1).random(shape[0] * shape[1]) ** 3)
@@ -132,7 +132,7 @@ def test_sums_against_ball_arithmetic(name: str, size: str, kind: str, count: in
     basis, unit = taken(name, size)
     shape = (17, 23)
     loads = loadings(kind, shape)
-    box = Box(shape, basis / np.hypot(*basis[0]))
+    box = SiteBox(shape, basis / np.hypot(*basis[0]))
     distances = Distances.of(exactly(basis, unit), max(shape))
     norm = box.kernel(1, np.float64).norm * unit / float(np.hypot(*basis[0]))
     sliced = Sliced.of(box, distances, norm, unit, count)

@@ -1,4 +1,4 @@
-"""The certificate under attack: whatever it is given, no word and no bound may be wrong."""
+"""The certificate under attack: whatever it is given, no status and no bound may be wrong."""
 
 from typing import Any
 
@@ -100,7 +100,7 @@ def test_attacks_on_random_scenes(
 
 @pytest.mark.parametrize("steps", [-2, -1, 0, 1, 2])
 def test_touching_to_rounding(steps: int) -> None:
-    """A gap or a load of a roundoff: the word is that of exact arithmetic."""
+    """A gap or a load of a roundoff: the status is that of exact arithmetic."""
     r, load = 1e-3, 1e-7
     k = (9 / (16 * (1 / (1 + 100)))) ** (1 / 3)
     approach = k * load ** (2 / 3)

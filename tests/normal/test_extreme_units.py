@@ -1,4 +1,4 @@
-"""Numbers whose products float64 cannot hold: refused, and never a wrong word."""
+"""Numbers whose products float64 cannot hold: refused, and never a wrong status."""
 
 import itertools
 
@@ -29,7 +29,7 @@ def test_tip_radii_and_heights_too_small(size: float) -> None:
 
 @pytest.mark.parametrize("exponent", [-59, -70, -82, -100, -140])
 def test_contact_points_too_near_to_each_other(exponent: int) -> None:
-    """Reached by "closest" from positions of a good size: no word, and no search without end."""
+    """Reached by "closest" from positions of a good size: no status, and no search without end."""
     points = HEXAGON * 10.0**exponent
     lattice = Lattice.through(points)
     assert (lattice is None) == (exponent < -59)

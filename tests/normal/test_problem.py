@@ -163,9 +163,9 @@ def test_manufactured_contacts(
     top = largest.max()
     assert_allclose(contact.loads, loads, rtol=1e-10, atol=1e-12 * top)
     assert_allclose(contact.gaps, gaps, rtol=1e-10, atol=1e-12 * approach)
-    words = contact.status
-    assert (words[touching] != "open").all()
-    assert (words[~touching] != "contact").all()
+    statuses = contact.status
+    assert (statuses[touching] != "open").all()
+    assert (statuses[~touching] != "contact").all()
 
 
 @settings(max_examples=15, deadline=None)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figure_checks import discs, fits, words
+from figure_checks import discs, fits, texts
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, ONE, PAPER, TWO, follow
 
@@ -78,8 +78,8 @@ def test_what_a_closed_path_settles_to() -> None:
     dot = plane.lines[-1].get_xydata()
     expected = [[found.level / pico, found.force_level / (0.5 * pico)]]
     assert_allclose(dot, expected, rtol=1e-12, atol=1e-9)
-    for word in LOOKS:
-        assert discs(place, word) == int((found.status == word).sum())
+    for status in LOOKS:
+        assert discs(place, status) == int((found.status == status).sum())
 
 
 def test_losses_against_phase_are_drawn() -> None:
@@ -100,7 +100,7 @@ def test_limits_are_drawn(name: str) -> None:
     assert set(figures) == {"shakedown"} | ({"shakedown_map"} if found.kind == "exact" else set())
     for figure in figures.values():
         fits(figure)
-    (said,) = [text for text in words(figures["shakedown"]) if ":" in text.get_text()][:1]
+    (said,) = [text for text in texts(figures["shakedown"]) if ":" in text.get_text()][:1]
     assert f"{found.kind}: {found.factor:.5g}" in said.get_text()
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figure_checks import discs, fits, words
+from figure_checks import discs, fits, texts
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
@@ -94,7 +94,7 @@ def test_figures_of_the_paper_fit_to_print(name: str) -> None:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["paper", "rough"])
-def test_a_disc_for_every_word(name: str) -> None:
+def test_a_disc_for_every_status(name: str) -> None:
     shown = states(name, [0.1, 0.37, 0.5, 0.7])
     figure = plots.shear_figures(shown)["stick_slip"]
     for axes, state in zip(figure.axes, shown, strict=True):
@@ -238,5 +238,5 @@ def test_no_contact_is_said() -> None:
     )
     assert len(figures) == 10
     for figure in figures.values():
-        assert "no contact" in {text.get_text() for text in words(figure)}
+        assert "no contact" in {text.get_text() for text in texts(figure)}
         fits(figure)

@@ -44,8 +44,8 @@ def test_a_run(command: Any) -> None:
         rows = list(csv.DictReader(file))
     assert [float(row["loss"]) for row in rows] == summary["path"]["loss"]
     with Path("out/path_asperities.csv").open() as file:
-        words = [row["status"] for row in csv.DictReader(file)]
-    assert (len(words), words.count("sliding")) == (4 * 61, 18)
+        statuses = [row["status"] for row in csv.DictReader(file)]
+    assert (len(statuses), statuses.count("sliding")) == (4 * 61, 18)
     for name in ("steady", "shakedown"):
         with Path(f"out/{name}.csv").open() as file:
             assert len(list(csv.DictReader(file))) == 61

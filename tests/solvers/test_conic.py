@@ -15,8 +15,8 @@ from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, refere
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Conic, ConicCVXPY, Newton, Solution, TooDenseError
-from convexrough.solvers.cone_boxes import Boxes, judged, solve_in
-from convexrough.solvers.programs import Answer
+from convexrough.solvers.cone_boxes import ConeBoxes, judged, solve_in
+from convexrough.solvers.programs import ProgramAnswer
 
 SOLVERS = [Conic(), ConicCVXPY()]
 RAW = [Conic(newton_step=False), ConicCVXPY(newton_step=False)]
@@ -114,7 +114,7 @@ def test_five_cones_where_four_do_not_reach(solver: Any, control: str) -> None:
     problem = problem_of(scene, PAPER_APPROACH, control)
     expected = Newton().solve(problem)
     assert 0.84 < problem.convexity_number(expected.loads) < 1
-    four = Boxes.choose(problem)
+    four = ConeBoxes.choose(problem)
     assert four.S.max() == pytest.approx(21 / 25)
     with pytest.raises(TooDenseError, match=r"asperity: 0 \(0\.9.*less than 0.84"):
         solve_in(solver, problem, four)
@@ -190,7 +190,7 @@ def test_a_solver_that_stops_early(solver: Any) -> None:
         few.solve(problem)
     assert stopped.value.solver == few.name
     if isinstance(few, Conic):  # CVXPY keeps its last iterate to itself
-        boxes = Boxes.choose(problem)
+        boxes = ConeBoxes.choose(problem)
         assert stopped.value.iterate is not None
         assert stopped.value.iterate.max() > 0
         assert (stopped.value.iterate <= boxes.to_candidates(problem, boxes.loads)).all()
@@ -240,7 +240,7 @@ class Wrong(Conic):
 
     factor: float = 1.0
 
-    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
+    def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
         true = super().answer(problem, boxes)
         return true._replace(loads=self.factor * true.loads)
 
@@ -256,7 +256,7 @@ def test_wrong_loads_are_not_returned(factor: float) -> None:
 @pytest.mark.parametrize("step", [False, True])
 def test_an_approach_that_is_not_a_number_is_not_returned(step: bool) -> None:
     problem = problem_of(paper(), PAPER_APPROACH, "load")
-    solver, boxes = Conic(newton_step=step), Boxes.choose(problem)
+    solver, boxes = Conic(newton_step=step), ConeBoxes.choose(problem)
     answer = solver.answer(problem, boxes)._replace(approach=np.nan)
     with pytest.raises(cr.SolverError, match=r"^conic.*an approach that are not numbers; try"):
         judged(solver, problem, boxes, answer)

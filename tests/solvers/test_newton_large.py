@@ -105,7 +105,7 @@ def residual(problem: NormalProblem, contact: cr.Contact) -> float:
 @pytest.mark.parametrize("kind", ["lattice", "scattered"])
 @pytest.mark.parametrize("name", SCENES)
 def test_as_through_the_matrix(name: str, kind: Kind, control: str) -> None:
-    """Loads agree within what is proved of each, and to 1e-12; words are the same."""
+    """Loads agree within what is proved of each, and to 1e-12; statuses are the same."""
     pressed, approach = SCENES[name]
     if kind == "lattice" and pressed.lattice is None:
         with pytest.raises(cr.InputError, match="lattice"):
@@ -258,7 +258,7 @@ def test_those_left_out_at_first_are_found(control: str) -> None:
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", sorted({*ATTACKS} - {"zero"}))
 def test_the_certificate_under_attack(kind: str) -> None:
-    """Its bounds hold and its words stay right for thousands of wrong loads, too."""
+    """Its bounds hold and its statuses stay right for thousands of wrong loads, too."""
     pressed, approach = SCENES["rough"]
     known = dense_answer("rough")
     for seed in range(3):
