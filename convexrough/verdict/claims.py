@@ -246,8 +246,10 @@ class _Placing:
         distances, owners = _nearest(positions, points)
         far = distances > allowed
         self.how = f"matched by position, to {distances.max():.2g}"
-        if far.mean() > 0.5 and (moved := self._moved(points, allowed)):
+        doubtful = far.any() if len(points) == len(positions) else far.mean() > 0.5
+        if doubtful and (moved := self._moved(points, allowed)):
             self.mistakes.append(f"positions: {moved}")
+            return owners
         for i in np.flatnonzero(far):
             found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"
             self._refuse(i, found, f"a position of the scene to {allowed:.3g}")
