@@ -64,7 +64,7 @@ class Record:
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         """The name of each line, and what stands there."""
-        for name in (*self._shown, *(each.name for each in self._fields())):
+        for name in (*self._shown, *(each.name for each in self._fields() if each.repr)):
             if text := in_text(getattr(self, name)):  # nothing is said where there is nothing
                 yield name, text
 
