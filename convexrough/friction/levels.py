@@ -23,7 +23,7 @@ from convexrough.contact import Contact, levels_of
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level
-from convexrough.normal.stack import Rows
+from convexrough.normal.together import Rows
 from convexrough.numbers.balls import TINY, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
