@@ -509,17 +509,17 @@ def prove_shear(
     held = prove_state(scene, box, place, pressed.total - fall, tell)
     drop, mean = pressed.approach - held.approach, pressed.approach + held.approach
     in_order, travel = drop.high < ordered, f * (2 - scene.ratio) / (2 * (1 - scene.ratio))
-    words, slips = list[str](), list[Interval]()
+    statuses, slips = list[str](), list[Interval]()
     for i, (at, after) in enumerate(zip(pressed.depths, held.depths, strict=True)):
         if not in_order and after.high > 0 and held.loads[i].high > pressed.loads[i].low:
             raise Refused(f"asperity {i} may be dragged along by the others, against the theorem")
-        touches, slip = word(at, "contact", "open"), gap_of(after) * travel
-        words.append(word(after, "partial", "sliding") if touches == "contact" else touches)
+        touches, slip = status(at, "contact", "open"), gap_of(after) * travel
+        statuses.append(status(after, "partial", "sliding") if touches == "contact" else touches)
         slips.append(Interval(slip.low if at.low > 0 else 0, slip.high if at.high > 0 else 0))
     excess = pressed.energy - held.energy - mean * (fall / 2)
     return {
         "order": "proved" if in_order else "proved for one step",
-        "status": words,
+        "status": statuses,
         "forces": [(pressed.loads[i] - rest) * unit for i, rest in enumerate(held.loads)],
         "slips": slips,
         "displacement": drop * travel,
@@ -534,7 +534,7 @@ WEAKER = {"global": "local", "local": "local", "proved": "proved for one step"}
 
 
 def prove(document: Any, tell: Tell) -> dict[str, Any]:
-    """All that is proved: words, and intervals of what can be claimed within bounds."""
+    """All that is proved: statuses, and intervals of what can be claimed within bounds."""
     form, given, prescribed, named, argument, pressed, sheared, _ = table(document, *KEYS)
     if form != FORMAT:
         raise Unreadable(f"expected the format {FORMAT!r}")
@@ -555,7 +555,7 @@ def prove(document: Any, tell: Tell) -> dict[str, Any]:
         "scope": scope(scene, box, state, top),
         "approach": state.approach,
         "load": state.total * scene.modulus,
-        "status": [word(depth, "contact", "open") for depth in state.depths],
+        "status": [status(depth, "contact", "open") for depth in state.depths],
         "loads": [load * scene.modulus for load in state.loads],
         "gaps": [gap_of(depth) for depth in state.depths],
         "shear": [prove_shear(scene, box, state, ordered, entry, tell) for entry in sheared],
@@ -566,7 +566,7 @@ def gap_of(depth: Interval) -> Interval:
     return (depth * -1).positive_part()
 
 
-def word(depth: Interval, positive: str, negative: str) -> str:
+def status(depth: Interval, positive: str, negative: str) -> str:
     return positive if depth.low > 0 else negative if depth.high < 0 else "undecided"
 
 
@@ -611,8 +611,9 @@ def sentence(document: Any) -> str:
     return "\n  ".join([*lines, f"scene {document['sha256'][:12]}"])
 
 
-def counted(claims: Any, *words: str) -> str:
-    return ", ".join(f"{claims['status'].count(word)} {word}" for word in (*words, "undecided"))
+def counted(claims: Any, *statuses: str) -> str:
+    every = (*statuses, "undecided")
+    return ", ".join(f"{claims['status'].count(status)} {status}" for status in every)
 
 
 def check(document: Any, tell: Tell) -> str:

@@ -8,14 +8,14 @@ contradict each other: each box may contain a solution of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import combinations
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,8 @@ from convexrough.influence import Kind
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
 from convexrough.plottable import Plottable
-from convexrough.progress import LOGGER
-from convexrough.record import LINE, Record, Table, in_words
+from convexrough.progress import LOGGER, logged_steps
+from convexrough.record import LINE, Record, Table, in_text
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
@@ -49,7 +49,9 @@ class Entry(Record):
     message : the reason where there is no solution, else ""
     contact : the certified solution, or None
     disagreement : max |load - reference| over the largest load of the reference; nan without both
-    different_words : asperities whose status differs from the reference; None without both
+    different_statuses : asperities whose status differs from the reference; None without both
+    steps : the log of its iterations, where `compare` was asked for it: by step a mapping of
+        solver, step, objective and residual; those of OSQP and CVXPY are not known
     memory : [bytes] largest increase of the resident memory of the process during the solution,
         without memory that the allocator reused; None if the system is not Linux
     """
@@ -59,8 +61,9 @@ class Entry(Record):
     message: str = ""
     contact: Contact | None = None
     disagreement: float = np.nan
-    different_words: int | None = None
+    different_statuses: int | None = None
     memory: int | None = None
+    steps: tuple[Mapping[str, Any], ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,7 +92,7 @@ class Comparison(Table, Plottable):
             if (found := entry.contact) is None:
                 yield entry.solver, f"{entry.outcome}: {entry.message}"[:LINE]
             else:
-                proved = f"{found.certificate.scope}; {in_words(found.status)}"
+                proved = f"{found.certificate.scope}; {in_text(found.status)}"
                 yield entry.solver, f"{proved}; {found.seconds:.2g} s"
         yield "contradictions", "; ".join(self.contradictions) or "none"
 
@@ -97,7 +100,7 @@ class Comparison(Table, Plottable):
         """A row for each entry; nan and "" where there is no answer."""
         none = np.full(len(self.contacts[0].scene), np.nan) if self.contacts else np.empty(0)
         answers = [entry.contact for entry in self.entries]
-        words = [entry.different_words for entry in self.entries]
+        statuses = [entry.different_statuses for entry in self.entries]
         columns = {
             "solver": [entry.solver for entry in self.entries],
             "outcome": [entry.outcome for entry in self.entries],
@@ -106,7 +109,7 @@ class Comparison(Table, Plottable):
             "seconds": [np.nan if each is None else each.seconds for each in answers],
             "iterations": [np.nan if each is None else each.iterations for each in answers],
             "disagreement": [entry.disagreement for entry in self.entries],
-            "different_words": [np.nan if each is None else each for each in words],
+            "different_statuses": [np.nan if each is None else each for each in statuses],
         }
         loads = np.array([none if each is None else each.loads for each in answers])
         return {name: (("entry",), np.array(column)) for name, column in columns.items()} | {
@@ -121,6 +124,7 @@ def compare(
     load: float | None = None,
     solvers: Sequence[solvers.Solver] | None = None,
     influence: Kind | None = None,
+    log: bool = False,
 ) -> Comparison:
     """Press on the scene with every solver.
 
@@ -128,6 +132,7 @@ def compare(
     solvers  : settings objects; the default is `every_solver()`. Newton's method is the reference
         and always the first
     influence : compliance operator, as for `press`
+    log : keep the steps of each solver in its entry
 
     Raises InputError where the reference refuses the input. Errors of the other solvers are in
     their entries.
@@ -139,7 +144,11 @@ def compare(
         LOGGER.info(solver.name)
         known = entries[0].contact if entries else None
         pressed = partial(press, scene, approach=approach, load=load, influence=influence)
-        entries.append(_enter(solver, pressed, known))
+        _load_code_of(solver)
+        kept: AbstractContextManager[Sequence[Any]] = logged_steps() if log else nullcontext(())
+        with kept as steps:
+            entry = _enter(solver, pressed, known)
+        entries.append(replace(entry, steps=tuple(steps)))
     answers = [entry.contact for entry in entries if entry.contact is not None]
     pairs = combinations([Answer.of(contact) for contact in answers], 2)
     return Comparison(
@@ -192,7 +201,6 @@ _REFERENCE = solvers.Newton()
 def _enter(
     solver: solvers.Solver, press_with: Callable[..., Contact], reference: Contact | None
 ) -> Entry:
-    _load_code_of(solver)
     memory = MemoryRise()
     try:
         contact = press_with(solver=solver)
@@ -212,7 +220,7 @@ def _enter(
         outcome="answered",
         contact=contact,
         disagreement=_relative(contact.loads - reference.loads, reference.loads),
-        different_words=int(np.sum(contact.status != reference.status)),
+        different_statuses=int(np.sum(contact.status != reference.status)),
         memory=risen,
     )
 
@@ -273,7 +281,7 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
     proved = (one.status != "undecided") & (other.status != "undecided")
     if len(where := np.flatnonzero(proved & (one.status != other.status))):
         each = (f"{i}: {one.status[i]} and {other.status[i]}" for i in where)
-        lines.append(f"words of asperities {joined(each)}")
+        lines.append(f"statuses of asperities {joined(each)}")
     return [f"{first.name} and {second.name}: {line}" for line in lines]
 
 

@@ -38,7 +38,7 @@ from convexrough.sphere import hertz
 if TYPE_CHECKING:
     from convexrough.gradients.change import ContactChange, Direction
     from convexrough.gradients.gradient import Gradient, Holding
-    from convexrough.proof import Proof, Sheared
+    from convexrough.proof import Proof, ShearedState
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,7 +110,7 @@ class Contact(Cached, Table, Plottable):
         yield from super()._rows()
         yield from (("warning", each[:LINE]) for each in self.warnings)
 
-    def proof(self, *, sheared: Sequence[Sheared] = ()) -> Proof:
+    def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
         """A proof file for `convexrough check` and other checkers; `.save(path)` writes it.
 
         sheared : shear states of this contact to prove as well, with the losses of their cycles
@@ -118,7 +118,11 @@ class Contact(Cached, Table, Plottable):
         Raises InputError for scenes too large for exact arithmetic, and ProofError where nothing is
         proved.
         """
-        from convexrough.proof import Near, prove, refuse_many  # it reads and writes: when asked
+        from convexrough.proof import (
+            NearState,
+            prove,
+            refuse_many,
+        )  # it reads and writes: when asked
 
         refuse_many(self.scene)
         by_load, n = self.prescribed_load is not None, len(self.scene)
@@ -126,10 +130,10 @@ class Contact(Cached, Table, Plottable):
         for state in sheared:
             drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
             level = levels.below(Ball.exact(drop / Fraction(levels.problem.units.force)))
-            held.append((state.force, Near.of(level, n)))
+            held.append((state.force, NearState.of(level, n)))
         return prove(
             self.scene,
-            Near.of(levels.top, n),
+            NearState.of(levels.top, n),
             approach=None if by_load else self.approach,
             load=self.prescribed_load,
             sheared=held,

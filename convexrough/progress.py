@@ -1,5 +1,49 @@
 """The logger `convexrough`: long work reports its progress there, and the command line shows it."""
 
+from __future__ import annotations
+
 import logging
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
 
 LOGGER = logging.getLogger("convexrough")
+
+
+def log_step(solver: str, step: int, objective: float, residual: float) -> None:
+    """Log a step of an iteration; `args` of the log record holds the four by name."""
+    LOGGER.info(
+        "%(solver)s: step %(step)d, objective %(objective).12g, residual %(residual).1e",
+        {"solver": solver, "step": step, "objective": objective, "residual": residual},
+    )
+
+
+@contextmanager
+def logged(call: Callable[[logging.LogRecord], object]) -> Iterator[None]:
+    """Call with every log record while the body runs."""
+
+    class Handler(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            call(record)
+
+    handler, level = Handler(), LOGGER.level
+    LOGGER.addHandler(handler)
+    LOGGER.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        LOGGER.removeHandler(handler)
+        LOGGER.setLevel(level)
+
+
+@contextmanager
+def logged_steps() -> Iterator[list[Mapping[str, Any]]]:
+    """The steps that solvers log while the body runs: solver, step, objective, residual."""
+    steps: list[Mapping[str, Any]] = []
+
+    def keep(record: logging.LogRecord) -> None:
+        if isinstance(record.args, Mapping):
+            steps.append(record.args)
+
+    with logged(keep):
+        yield steps

@@ -65,14 +65,14 @@ class Record:
     def _rows(self) -> Iterator[tuple[str, str]]:
         """The name of each line, and what stands there."""
         for name in (*self._shown, *(each.name for each in self._fields())):
-            if words := in_words(getattr(self, name)):  # nothing is said where there is nothing
-                yield name, words
+            if text := in_text(getattr(self, name)):  # nothing is said where there is nothing
+                yield name, text
 
     def _headline(self) -> str:
         """The record in one line."""
         parts = [str(getattr(self, name)) for name in ("scope", "solver") if hasattr(self, name)]
         if hasattr(self, "status"):
-            parts.append(in_words(self.status))
+            parts.append(in_text(self.status))
         if hasattr(self, "__len__"):
             parts.append(f"{len(self):,} asperities")
         return f"{type(self).__name__}: {'; '.join(parts)}" if parts else type(self).__name__
@@ -140,7 +140,7 @@ def singular(name: str) -> str:
     return name if name.endswith(("ss", "us")) or name in COUNTS else name.removesuffix("s")
 
 
-def in_words(value: Any) -> str:
+def in_text(value: Any) -> str:
     """A value in one line: an array as its size and range, statuses as their counts.
 
     A mapping is shown as its keys, a tuple of records as their number.
@@ -174,9 +174,9 @@ def _of_array(values: NDArray[Any]) -> str:
     return f"{size} from {low:.6g} to {high:.6g}"
 
 
-def _counted(words: NDArray[np.str_]) -> Iterator[str]:
+def _counted(statuses: NDArray[np.str_]) -> Iterator[str]:
     """How many there are of each, in the order in which they come."""
-    while len(words):
-        same = words == words[0]
-        yield f"{np.count_nonzero(same):,} {words[0]}"
-        words = words[~same]
+    while len(statuses):
+        same = statuses == statuses[0]
+        yield f"{np.count_nonzero(same):,} {statuses[0]}"
+        statuses = statuses[~same]

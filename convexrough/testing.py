@@ -1,6 +1,6 @@
 """For the tests of other software: assert that forces are certified, or that two answers agree.
 
-All raise AssertionError with a message that says which asperities, by how much, and which word;
+All raise AssertionError with a message that says which asperities, by how much, and which status;
 none needs a test framework. Loads that no certificate can judge (negative, not finite, of the
 wrong number) raise InputError, as everywhere.
 """

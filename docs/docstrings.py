@@ -74,6 +74,6 @@ def _list(paragraph: list[str]) -> Iterator[str]:
 def _plain(text: str) -> str:
     """Escaped, but for `code`."""
     pieces = re.split(r"`([^`]+)`", text)
-    words = [re.sub(r"([\\*|_`])", r"\\\1", piece) for piece in pieces[::2]]
+    plain = [re.sub(r"([\\*|_`])", r"\\\1", piece) for piece in pieces[::2]]
     code = [f"\\ ``{piece}``\\ " for piece in pieces[1::2]]
-    return "".join(a + b for a, b in zip(words, [*code, ""], strict=True))
+    return "".join(a + b for a, b in zip(plain, [*code, ""], strict=True))

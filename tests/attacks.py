@@ -12,11 +12,11 @@ Array = NDArray[np.float64]
 
 
 def assert_honest(certificate: cr.Certificate, loads: Array, exact: Any) -> None:
-    """Every word agrees with the proved solution, and every bound covers the distance to it."""
-    for word, load, gap in zip(certificate.status, exact.loads, exact.gaps, strict=True):
-        assert word in ("contact", "open", "undecided")
-        assert word != "contact" or load > 0
-        assert word != "open" or gap > 0
+    """Every status agrees with the proved solution, and every bound covers the distance to it."""
+    for status, load, gap in zip(certificate.status, exact.loads, exact.gaps, strict=True):
+        assert status in ("contact", "open", "undecided")
+        assert status != "contact" or load > 0
+        assert status != "open" or gap > 0
     assert (np.abs(multiprecision.errors(loads, exact.loads)) <= certificate.load_errors).all()
     gap_errors = np.abs(multiprecision.errors(certificate.gaps, exact.gaps))
     assert (gap_errors <= certificate.gap_errors).all()

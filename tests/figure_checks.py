@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 
-def words(figure: Figure) -> list[Text]:
+def texts(figure: Figure) -> list[Text]:
     """Every text that is drawn, after drawing the figure."""
     figure.draw_without_rendering()
     ticks, drawn = set(), []
@@ -27,7 +27,7 @@ def words(figure: Figure) -> list[Text]:
 
 def fits(figure: Figure) -> None:
     """Every text is of a size to print, inside the figure, and clear of every other."""
-    boxes = {text: text.get_window_extent() for text in words(figure)}
+    boxes = {text: text.get_window_extent() for text in texts(figure)}
     for text, box in boxes.items():
         assert 6 < float(text.get_fontsize()) < 10
         assert figure.bbox.padded(1).contains(box.x0, box.y0), text

@@ -75,10 +75,10 @@ def sheared(scene: cr.Scene, full: Any, force: float) -> dict[str, Any]:
         }
 
 
-def true_words(case: cr.gallery.HardCase, words: Any) -> bool:
-    """No word of a pressed contact is wrong."""
+def true_statuses(case: cr.gallery.HardCase, statuses: Any) -> bool:
+    """No status of a pressed contact is wrong."""
     allowed = np.where(case.touching, "contact", "open")
-    return bool(((words == allowed) | (words == "undecided")).all())
+    return bool(((statuses == allowed) | (statuses == "undecided")).all())
 
 
 def write(wanted: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""What is right today, for six scenes: values, proved bounds and words, and how to pin them again.
+"""What is right today, for six scenes: values, bounds and statuses, and how to pin them again.
 
     PYTHONPATH=tests python -m golden_values
 
@@ -76,7 +76,7 @@ def _pressed(name: str, **control: float) -> cr.Contact:
 
 
 def found(name: str, given: dict[str, Any]) -> tuple[Values, Values, Values]:
-    """Values and proved bounds by what they are, and how often each word is said."""
+    """Values and proved bounds by what they are, and how often each status is said."""
     contact, by_load = (_pressed(name, **{key: given[key]}) for key in ("approach", "load"))
     some, judged = given["asperities"], contact.certificate
     values: Values = {"load": contact.load, "approach": by_load.approach}
@@ -86,7 +86,7 @@ def found(name: str, given: dict[str, Any]) -> tuple[Values, Values, Values]:
         "approach": by_load.certificate.approach_error,
     }
     values["loads"], bounds["loads"] = contact.loads[some], judged.load_errors[some]
-    words: Values = {"pressed": Counter(contact.status), "scope": judged.scope}
+    statuses: Values = {"pressed": Counter(contact.status), "scope": judged.scope}
     for Q in given["forces"]:
         state, cycle = cr.shear(contact, force=Q), cr.cycle(contact, maximum=Q)
         errors = state.certificate.force_errors[some]
@@ -102,9 +102,9 @@ def found(name: str, given: dict[str, Any]) -> tuple[Values, Values, Values]:
             each["loss"] = (cycle.loss, cycle.loss_error)
         for what, (value, bound) in each.items():
             values[f"{what} at {Q!r}"], bounds[f"{what} at {Q!r}"] = value, bound
-        words[f"at {Q!r}"] = Counter(state.status)
+        statuses[f"at {Q!r}"] = Counter(state.status)
     plain = {key: np.asarray(value).tolist() for key, value in values.items()}
-    return plain, {key: np.asarray(value).tolist() for key, value in bounds.items()}, words
+    return plain, {key: np.asarray(value).tolist() for key, value in bounds.items()}, statuses
 
 
 def true(name: str, given: dict[str, Any]) -> Values:
@@ -137,14 +137,14 @@ def _text(value: Any) -> str:
 def main() -> None:
     for name in GOLDEN:
         given = asked(name)
-        values, bounds, words = found(name, given)
+        values, bounds, statuses = found(name, given)
         source = "reference" if name in SCENES else "package"
         pinned = {
             "given": given,
             "source": source,
             "values": true(name, given) if source == "reference" else values,
             "bounds": bounds,
-            "words": words,
+            "statuses": statuses,
         }
         path = FOLDER / f"{name.replace(', ', '-')}.json"
         lines = [f"{json.dumps(key)}: {_lined(value)}" for key, value in pinned.items()]

@@ -272,9 +272,9 @@ def odd_text(rng: random.Random, contents: bytes) -> bytes:
     if not found:
         return contents
     place = rng.choice(found)
-    words = ["\0", "\x1b[31m", "\u202e", "\U0001f600", '"', "'''", '"""', "\\", "=", "../..", "~"]
-    words += ["/dev/null", ".", "x" * 5000, "\ud800", "%s%n", "{0.__class__}", "true", "nan", "-"]
-    new = rng.choice(words).encode("utf-8", "surrogatepass")
+    strings = ["\0", "\x1b[31m", "\u202e", "\U0001f600", '"', "'''", '"""', "\\", "=", "../..", "~"]
+    strings += ["/dev/null", ".", "x" * 5000, "\ud800", "%s%n", "{0.__class__}", "true", "nan", "-"]
+    new = rng.choice(strings).encode("utf-8", "surrogatepass")
     return contents[: place.start()] + new + contents[place.end() :]
 
 

@@ -19,10 +19,10 @@ def false_claims(document: Any) -> list[str]:
         pressed = _solved(scene, document["pressed"]["radii"], {control: float.fromhex(value)})
         false = _outside("approach", claims["approach"], pressed.approach)
         false += _outside("load", claims["load"], pressed.load)
-        for i, word in enumerate(claims["status"]):
+        for i, status in enumerate(claims["status"]):
             true = "contact" if pressed.loads[i] > 0 else "open"
-            if word not in (true, "undecided"):
-                false.append(f"asperity {i} is {true}, not {word}")
+            if status not in (true, "undecided"):
+                false.append(f"asperity {i} is {true}, not {status}")
             false += _outside(f"load {i}", claims["loads"][i], pressed.loads[i])
             false += _outside(f"gap {i}", claims["gaps"][i], pressed.gaps[i])
         for state, claim in zip(document["sheared"], claims["shear"], strict=True):
@@ -43,13 +43,13 @@ def _false_shear(
         "displacement", claim["displacement"], travel * (pressed.approach - held.approach)
     )
     loss = arb(0)
-    for i, word in enumerate(claim["status"]):
+    for i, status in enumerate(claim["status"]):
         P, p = pressed.loads[i], held.loads[i]
         if p > P:
             false.append(f"the theorem does not hold at asperity {i}")
         true = "open" if not P > 0 else "partial" if p > 0 else "sliding"
-        if word not in (true, "undecided"):
-            false.append(f"asperity {i} is {true}, not {word}")
+        if status not in (true, "undecided"):
+            false.append(f"asperity {i} is {true}, not {status}")
         slip = travel * held.gaps[i] if P > 0 else arb(0)
         false += _outside(f"force {i}", claim["forces"][i], f * (P - p))
         false += _outside(f"slip {i}", claim["slips"][i], slip)

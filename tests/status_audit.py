@@ -1,4 +1,4 @@
-"""The word audit: every word and bound of random and hostile scenes against ball arithmetic.
+"""The status audit: every status and bound of random and hostile scenes against ball arithmetic.
 
     PYTHONPATH=tests python tests/status_audit.py 3000        prints the tables of docs/tests.md
 
@@ -36,7 +36,7 @@ class Dragged(Exception):
 
 
 class Wrong(AssertionError):
-    """A word or a bound that is not true."""
+    """A status or a bound that is not true."""
 
 
 @dataclass
@@ -47,13 +47,13 @@ class Tally:
     refused: int = 0
     unsolved: int = 0  # by the oracle, which needs both signs of every gap
     unsolved_vectors: int = 0  # states with the full tangential kernel
-    words: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
+    statuses: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
     ratios: dict[tuple[str, str], list[float]] = field(default_factory=dict)
 
-    def count(self, kind: str, operator: str, stage: str, words: Any) -> None:
-        seen = self.words.setdefault((kind, operator, stage), [0, 0])
-        seen[0] += len(words)
-        seen[1] += int((words == "undecided").sum())
+    def count(self, kind: str, operator: str, stage: str, statuses: Any) -> None:
+        seen = self.statuses.setdefault((kind, operator, stage), [0, 0])
+        seen[0] += len(statuses)
+        seen[1] += int((statuses == "undecided").sum())
 
     def compare(self, operator: str, stage: str, bounds: Any, values: Any, exact: Any) -> None:
         """Bound by bound, of numbers or vectors; the ratio is of the largest bound and error."""
@@ -127,7 +127,7 @@ def _grazing(scene: cr.Scene, approach: float, rng: np.random.Generator) -> cr.S
 
 
 def audit(seeds: Iterator[int] | range) -> Tally:
-    """Raises Wrong at the first wrong word or bound, with the seed of its scene."""
+    """Raises Wrong at the first wrong status or bound, with the seed of its scene."""
     tally = Tally()
     for seed in seeds:
         tally.scenes += 1
@@ -156,12 +156,12 @@ def _audit_scene(seed: int, tally: Tally) -> None:
     exact = solve_exactly(scene, **given, start=contact.loads, digits=DIGITS)
     proof = contact.certificate
     if proof.scope == "none":
-        require((proof.status == "undecided").all(), "a word without a proof")
+        require((proof.status == "undecided").all(), "a status without a proof")
         tally.count(kind, operator, "press", proof.status)
         return
-    for word, load, gap in zip(proof.status, exact.loads, exact.gaps, strict=True):
-        require(word != "contact" or load > 0, "contact of an open asperity")
-        require(word != "open" or gap > 0, "open of one that touches")
+    for status, load, gap in zip(proof.status, exact.loads, exact.gaps, strict=True):
+        require(status != "contact" or load > 0, "contact of an open asperity")
+        require(status != "open" or gap > 0, "open of one that touches")
     tally.count(kind, operator, "press", proof.status)
     tally.compare(operator, "load", proof.load_errors, contact.loads, exact.loads)
     tally.compare(operator, "gap", proof.gap_errors, proof.gaps, exact.gaps)
@@ -231,17 +231,17 @@ def _audit_shear(
         forces = exact.forces if exact else [FRICTION * p for p in full.loads]
     state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
     vector = cr.shear_vector(_with_poisson(contact, 0.0), force=force)
-    for stage, words in (
+    for stage, statuses in (
         ("shear", state.status),
         ("cycle", cycle.status),
         ("vector", vector.status),
     ):
-        for i, (word, load) in enumerate(zip(words, full.loads, strict=True)):
+        for i, (status, load) in enumerate(zip(statuses, full.loads, strict=True)):
             slides = exact is None or exact.slips[i] > 0
-            require(word != "sliding" or (load > 0 and slides), f"{stage}: sliding of {i}")
-            require(word != "partial" or (load > 0 and not slides), f"{stage}: partial of {i}")
-            require(word != "open" or not load > 0, f"{stage}: open of {i}")
-        tally.count(kind if fraction < 1 else "limit", operator, stage, words)
+            require(status != "sliding" or (load > 0 and slides), f"{stage}: sliding of {i}")
+            require(status != "partial" or (load > 0 and not slides), f"{stage}: partial of {i}")
+            require(status != "open" or not load > 0, f"{stage}: open of {i}")
+        tally.count(kind if fraction < 1 else "limit", operator, stage, statuses)
     proof = state.certificate
     tally.compare(operator, "force", proof.force_errors, state.forces, forces)
     errors = vector.certificate.force_errors
@@ -298,9 +298,9 @@ def _audit_vectors(
     tilted = _with_poisson(contact, float(rng.uniform(0.0, 0.5)))
     state = cr.shear_vector(tilted, force=pair)
     tally.count(kind, operator, "tensor", state.status)
-    for word, load in zip(state.status, full.loads, strict=True):
-        require(word in ("open", "undecided") or load > 0, "tensor: a word for an open asperity")
-        require(word != "open" or not load > 0, "tensor: open of one that touches")
+    for status, load in zip(state.status, full.loads, strict=True):
+        require(status in ("open", "undecided") or load > 0, "tensor: status of an open asperity")
+        require(status != "open" or not load > 0, "tensor: open of one that touches")
     try:
         true = solve_vectors(
             tilted.scene, list(full.loads), pair, state.forces, state.displacement, DIGITS - 20
@@ -310,7 +310,7 @@ def _audit_vectors(
         return
     touching = [i for i, load in enumerate(full.loads) if load > 0]
     for i, slides in zip(touching, true.sliding, strict=True):
-        require(state.status[i] != ("partial" if slides else "sliding"), f"tensor: word of {i}")
+        require(state.status[i] != ("partial" if slides else "sliding"), f"tensor: status of {i}")
     nu = arb(tilted.scene.material.poisson_ratio)
     with ctx.workdps(DIGITS + 30):
         travel = arb(FRICTION) * (2 - nu) / (2 * (1 - nu))
@@ -341,18 +341,18 @@ def report(tally: Tally) -> str:
     lines = [
         f"{tally.scenes:,} scenes, {tally.refused} refused, {tally.unsolved} beyond the oracle, "
         f"{tally.unsolved_vectors} of the vector states; "
-        "no wrong word, no bound too small.",
+        "no wrong status, no bound too small.",
         "",
-        "| scenes | stage | words | undecided |",
+        "| scenes | stage | statuses | undecided |",
         "|---|---|---|---|",
     ]
     merged: dict[tuple[str, str], list[int]] = {}
-    for (kind, _, stage), (words, undecided) in tally.words.items():
+    for (kind, _, stage), (statuses, undecided) in tally.statuses.items():
         seen = merged.setdefault((kind, stage), [0, 0])
-        seen[0] += words
+        seen[0] += statuses
         seen[1] += undecided
-    for (kind, stage), (words, undecided) in sorted(merged.items()):
-        lines.append(f"| {kind} | {stage} | {words:,} | {100 * undecided / words:.2f} % |")
+    for (kind, stage), (statuses, undecided) in sorted(merged.items()):
+        lines.append(f"| {kind} | {stage} | {statuses:,} | {100 * undecided / statuses:.2f} % |")
     lines += ["", "| operator | bound | least | median |", "|---|---|---|---|"]
     for (operator, stage), ratios in sorted(tally.ratios.items()):
         least, median = np.quantile(ratios, [0.0, 0.5])

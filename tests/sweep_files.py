@@ -1,7 +1,6 @@
 """Sweeps that several tests compute, and what it means that two tables are the same."""
 
 import json
-import logging
 import os
 import signal
 import subprocess
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import convexrough as cr
-from convexrough.progress import LOGGER
+from convexrough.progress import logged
 from convexrough.sweeps.scenes import Ask, Asked, Tables
 
 SMALL: dict[str, Any] = {
@@ -87,19 +86,8 @@ def _equal(one: Any, other: Any) -> bool:
 @contextmanager
 def reported_to(call: Callable[[str], None]) -> Iterator[None]:
     """Call with all that is said while work goes on, as it is said."""
-
-    class Handler(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            call(record.getMessage())
-
-    handler, level = Handler(), LOGGER.level
-    LOGGER.addHandler(handler)
-    LOGGER.setLevel(logging.INFO)
-    try:
+    with logged(lambda record: call(record.getMessage())):
         yield
-    finally:
-        LOGGER.removeHandler(handler)
-        LOGGER.setLevel(level)
 
 
 def started(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:

@@ -18,6 +18,7 @@ import convexrough as cr
 from convexrough import compare as comparing
 from convexrough.compare import Answer, compare, contradictions, every_solver
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import LOGGER
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton, Solution
 
 NAMES = [
@@ -68,7 +69,7 @@ def test_all_agree(name: str, control: str) -> None:
     for entry in comparison.entries:
         assert (entry.outcome, entry.message) == ("answered", "")
         assert entry.disagreement <= limits[entry.solver], entry.solver
-        assert entry.different_words == 0
+        assert entry.different_statuses == 0
         assert entry.contact is not None
         assert entry.contact.certificate.holds
         assert entry.contact.certificate.duality_gap >= 0
@@ -98,8 +99,8 @@ def test_a_poor_answer_is_measured_and_contradicts_nothing() -> None:
     assert poor.disagreement == pytest.approx(apart / reference.contact.loads.max())
     assert 1e-4 < poor.disagreement < 1e-3
     different = int(np.sum(poor.contact.status != reference.contact.status))
-    # Poor loads are near enough to prove every word of the solution near them.
-    assert poor.different_words == different == 0
+    # Poor loads are near enough to prove every status of the solution near them.
+    assert poor.different_statuses == different == 0
     assert comparison.contradictions == ()
     assert comparison.certified  # by the reference
 
@@ -134,7 +135,7 @@ def test_solvers_that_do_not_answer() -> None:
     assert (refused.outcome, refused.message) == ("refused", "scene: found this, expected another")
     for entry in (failed, refused):
         assert np.isnan(entry.disagreement)
-        assert (entry.contact, entry.different_words, entry.memory) == (None, None, None)
+        assert (entry.contact, entry.different_statuses, entry.memory) == (None, None, None)
     assert answered.outcome == "answered"
 
 
@@ -150,8 +151,33 @@ def test_without_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     comparison = compare(paper(), approach=5e-5, solvers=[BristleQP(16), Newton(tolerance=1e-3)])
     assert [entry.outcome for entry in comparison.entries] == ["failed", "answered", "answered"]
     assert all(np.isnan(entry.disagreement) for entry in comparison.entries)
-    assert all(entry.different_words is None for entry in comparison.entries)
+    assert all(entry.different_statuses is None for entry in comparison.entries)
     assert comparison.certified
+
+
+def test_steps_are_kept_where_they_are_asked_for() -> None:
+    chosen = [Conic(), BristleQP()]
+    newton, conic, bristles = compare(paper(), approach=5e-5, solvers=chosen, log=True).entries
+    assert bristles.steps == ()
+    for entry, solver, first in ((newton, "newton", 1), (conic, "clarabel", 0)):
+        assert [step["step"] for step in entry.steps] == [*range(first, first + len(entry.steps))]
+        assert {step["solver"] for step in entry.steps} == {solver}
+        assert entry.steps[-1]["residual"] < 1e-8 < entry.steps[0]["residual"]
+    energies = [step["objective"] for step in newton.steps]
+    assert energies == sorted(energies, reverse=True)
+    assert conic.steps[-1]["objective"] == pytest.approx(energies[-1], rel=1e-7)
+    assert not LOGGER.handlers
+    plain = compare(paper(), approach=5e-5, solvers=chosen)
+    assert not any(entry.steps for entry in plain.entries)
+
+
+@pytest.mark.parametrize(
+    ("solver", "said"), [(BristleQP, "OSQP"), (ConicCVXPY, "CVXPY"), (ConicCVXPY, "Clarabel")]
+)
+def test_libraries_print_their_iterations(capfd: Any, solver: Any, said: str) -> None:
+    for verbose in (False, True):
+        cr.press(paper(), approach=5e-5, solver=solver(verbose=verbose))
+        assert (said in capfd.readouterr().out) is verbose
 
 
 def test_wrong_input_is_raised() -> None:
@@ -200,13 +226,13 @@ def test_each_kind_of_contradiction(contact: cr.Contact) -> None:
     assert "approach 5.0000000000000002e-05 +- 0 and 6" in line
     assert contradictions(true, forged(contact, approach=6e-5, approach_error=2e-5)) == []
 
-    words = np.where(proof.status == "open", "contact", "open")
-    (line,) = contradictions(true, forged(contact, status=words))
-    assert "words of asperities 0: contact and open; 1: " in line
+    statuses = np.where(proof.status == "open", "contact", "open")
+    (line,) = contradictions(true, forged(contact, status=statuses))
+    assert "statuses of asperities 0: contact and open; 1: " in line
     assert line.endswith("; and 56 more")
-    undecided = np.full(len(words), "undecided")
+    undecided = np.full(len(statuses), "undecided")
     assert contradictions(true, forged(contact, status=undecided)) == []
-    assert contradictions(true, forged(contact, status=words, scope="none")) == []
+    assert contradictions(true, forged(contact, status=statuses, scope="none")) == []
 
 
 @pytest.fixture
@@ -249,13 +275,26 @@ def test_command(command: Any, tmp_path: Path) -> None:
     assert "duality gap        in N mm, " in ran.out
     table = ran.out.splitlines()[-len(NAMES) - 1 :]
     assert table[0].split() == [
-        *("solver", "disagreement", "load", "error", "duality", "gap", "certificate", "words"),
+        *("solver", "disagreement", "load", "error", "duality", "gap", "certificate", "statuses"),
         *("iterations", "seconds", "MB"),
     ]
     assert len({len(line) for line in table}) == 1
     for name, line in zip(NAMES, table[1:], strict=True):
         assert re.match(rf"{re.escape(name)} +\S+ +\S+ +\S+ +global +same +\d+ +\S+ +\S+$", line)
     assert list(tmp_path.iterdir()) == [tmp_path / "a.toml"]
+
+
+def test_command_with_a_log(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    assert command("compare", "a.toml", "--solver", "conic", "--log", "log.csv").status == 0
+    first, *rows = (tmp_path / "log.csv").read_text().splitlines()
+    assert first == "solver,step,objective,residual"
+    steps = [row.split(",") for row in rows]
+    assert list(dict.fromkeys(name for name, *_ in steps)) == ["newton", "conic + Newton step"]
+    assert all(np.isfinite([float(number) for number in row]).all() for _, *row in steps)
+    again = command("compare", "a.toml", "--log", "log.csv")
+    assert (again.status, again.out) == (2, "")
+    assert "log.csv: is there already" in again.err
 
 
 def fail(*_: Any, **__: Any) -> None:

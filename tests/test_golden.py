@@ -1,4 +1,4 @@
-"""What was right stays right, and as well proved: values and words pinned by `golden_values`."""
+"""What was right stays right, and as well proved: values and statuses pinned by `golden_values`."""
 
 import json
 from typing import Any
@@ -20,8 +20,8 @@ def distance(value: Any, pinned: Any) -> Any:
 def test_what_was_right_stays_right(name: str) -> None:
     path = golden_values.FOLDER / f"{name.replace(', ', '-')}.json"
     pinned = json.loads(path.read_text("utf-8"))
-    values, bounds, words = golden_values.found(name, pinned["given"])
-    assert words == pinned["words"]
+    values, bounds, statuses = golden_values.found(name, pinned["given"])
+    assert statuses == pinned["statuses"]
     assert all(what.startswith("loss at") for what in pinned["values"].keys() - values.keys())
     if pinned["source"] == "reference":  # few asperities, whose order is proved
         assert values.keys() == pinned["values"].keys()

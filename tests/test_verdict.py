@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import PAPER_APPROACH, operators, paper, scattered, twins
+from scenes import PAPER_APPROACH, paper, scattered, twins
 
 import convexrough as cr
 
@@ -72,22 +72,8 @@ def test_single_corruptions(kind: str, seeds: range, control: str) -> None:
     assert first >= tried - 1
 
 
-@pytest.mark.parametrize("influence", operators(paper()))
-@pytest.mark.parametrize("index", [36, 7, 0])
-def test_a_dropped_asperity_of_the_paper(influence: Any, index: int) -> None:
-    """It is named, alone, with what the solution has there."""
-    contact = cr.press(paper(), approach=PAPER_APPROACH)
-    loads = contact.loads.copy()
-    loads[index] = 0.0
-    verdict = cr.verify(paper(), loads, approach=PAPER_APPROACH, influence=influence)
-    assert verdict.wrongly_open.tolist() == verdict.suspects.tolist() == [index]
-    assert verdict.errors[index] == pytest.approx(contact.loads[index], rel=1e-6)
-    assert verdict.solution is not None
-    assert not verdict.holds
-
-
 def test_a_small_load_that_is_missing_does_not_pass() -> None:
-    """Where the loads are good enough for every word, the set still has to be that of the words."""
+    """Loads may be good enough for every status; the given set still has to be the proved one."""
     passed = 0
     for seed in range(40):
         contact, given = solved(seed, "approach")
@@ -100,7 +86,7 @@ def test_a_small_load_that_is_missing_does_not_pass() -> None:
             assert verdict.wrongly_open.tolist() == [i]
             assert not verdict.holds
             passed += verdict.certificate.holds
-    assert passed > 5  # whose words alone say that all is well
+    assert passed > 5  # whose statuses alone say that all is well
 
 
 def test_what_is_right_holds() -> None:
@@ -128,13 +114,6 @@ def test_totals_in_another_unit() -> None:
     assert cr.verify(paper(), contact.loads * (1 + 1e-8), load=contact.load).holds
     assert not cr.verify(paper(), contact.loads * (1 + 1e-5), load=contact.load).total_holds
     assert cr.verify(paper(), contact.loads * (1 + 1e-5), load=contact.load, within=1e-4).holds
-
-
-def test_loads_in_another_unit_under_a_prescribed_approach() -> None:
-    contact = cr.press(paper(), approach=PAPER_APPROACH)
-    verdict = cr.verify(paper(), 1e3 * contact.loads, approach=PAPER_APPROACH)
-    assert not verdict.near_enough
-    assert not verdict.holds
 
 
 @pytest.mark.parametrize("noise", [1e-20, -1e-20, 1e-17, -1e-17])

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough.bench.rows import Bench, Row, frontier
-from convexrough.bench.scenes import WORDS, Family
+from convexrough.bench.scenes import FAMILIES, Family
 from convexrough.plots.style import DOUBLE, FAINT, LABEL, ROUGH, SINGLE, TICK, UNSURE, label
 
 #: Marker, line, face and colour of each solver: no two alike in grey.
@@ -96,7 +96,7 @@ def cost_figure(bench: Bench) -> Figure:
     figure = Figure(figsize=(SINGLE, 2.9), layout="constrained")
     axes = figure.subplots()
     axes.set(xscale="log", yscale="log")
-    for family in WORDS:
+    for family in FAMILIES:
         if rows := bench.presses(family):
             x, y = np.array([(row.asperities, row.seconds) for row in rows]).T
             b = bench.exponent(family)

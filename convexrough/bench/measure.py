@@ -165,9 +165,9 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
         "sweep": {"seeds": scenes, "measure": ["contact", "loss"]},
     }
     began = time.perf_counter()
-    words = sweep(file, workers=workers).read(["status"])["status"]
+    statuses = sweep(file, workers=workers).read(["status"])["status"]
     seconds = (time.perf_counter() - began) / scenes
-    said = f"{scenes:,} scenes, {workers} processes, {np.sum(words == 'certified'):,} certified"
+    said = f"{scenes:,} scenes, {workers} processes, {np.sum(statuses == 'certified'):,} certified"
     return Row("sweep", "rough", size, message=said, seconds=seconds, runs=1)
 
 

@@ -51,11 +51,15 @@ class Profile(Table):
 
     def rows(self) -> list[list[str]]:
         """A heading, and a line for each solver: outcomes, and parts within FACTORS."""
-        words = ("right", "wrong", "refused", "failed")
+        outcomes = ("right", "wrong", "refused", "failed")
         parts = np.array([self.part(factor) for factor in FACTORS]).T
-        heading = ["solver", *words, *(f"within {factor}x" for factor in FACTORS)]
+        heading = ["solver", *outcomes, *(f"within {factor}x" for factor in FACTORS)]
         return [heading] + [
-            [solver, *(str(said.count(word)) for word in words), *(f"{p:.0%}" for p in row)]
+            [
+                solver,
+                *(str(said.count(outcome)) for outcome in outcomes),
+                *(f"{p:.0%}" for p in row),
+            ]
             for solver, said, row in zip(self.solvers, self.outcomes, parts, strict=True)
         ]
 

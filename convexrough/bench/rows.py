@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from convexrough.bench.scenes import WORDS, Family
+from convexrough.bench.scenes import FAMILIES, Family
 from convexrough.version import __version__
 
 #: A point has to be this much faster before it counts as faster: what timing can tell.
@@ -100,7 +100,7 @@ class Bench:
             "quick": self.quick,
             "machine": self.machine,
             "seconds": self.seconds,
-            "exponents": {family: self.exponent(family) for family in WORDS},
+            "exponents": {family: self.exponent(family) for family in FAMILIES},
             "verdicts": self.verdicts(),
             "rows": [asdict(row) for row in self.rows],
         }
@@ -112,7 +112,7 @@ class Bench:
             beaten = [f"{row.solver}, {row.setting}" for row in better_than_default(rows)]
             said = f"not on the frontier: {'; '.join(beaten)}" if beaten else "on the frontier"
             lines.append(f"{n:,} asperities ({family}): the default solver is {said}.")
-        for family in WORDS:
+        for family in FAMILIES:
             if math.isfinite(b := self.exponent(family)):
                 sizes = [row.asperities for row in self.presses(family, FITTED_FROM)]
                 lines.append(f"The time of a press grows as n^{b:.2f} from {min(sizes):,} to "

@@ -17,7 +17,7 @@ APPROACH = 5e-5
 
 #: A hexagonal lattice of equal asperities; with random heights (standard deviation 1e-6 R) and tip
 #: radii (10 %); with every asperity moved at random, by up to 0.15 of the spacing.
-WORDS: tuple[Family, ...] = ("lattice", "rough", "scattered")
+FAMILIES: tuple[Family, ...] = ("lattice", "rough", "scattered")
 
 #: Refinements by which a scene has about so many asperities.
 REFINEMENTS = {61: 1.0, 700: 3.4, 8_400: 12.0, 13_000: 15.0, 36_000: 25.0, 120_000: 45.0,

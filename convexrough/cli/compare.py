@@ -16,13 +16,15 @@ from convexrough.cli.speech import (
     progress,
     say_aside,
 )
+from convexrough.errors import FileError
 
 
 @click.command()
 @click.argument("scene", type=PATH)
 @solver_option
+@click.option("--log", metavar="FILE", type=PATH, help="Write each iteration to a CSV file.")
 @json_option
-def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
+def compare(scene: Path, solvers: tuple[str, ...], log: Path | None, as_json: bool) -> int:
     """Compare all solvers on one scene: agreement, certificate, time.
 
     SCS and QOCO also solve the cone program, where they are installed. With --solver, only the
@@ -34,9 +36,12 @@ def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named
     from convexrough.run import comparison as report
+    from convexrough.run.results import write_rows
     from convexrough.run.scene_file import read_scene
 
     chosen = [solver_named(name) for name in solvers] or None
+    if log is not None and log.exists():
+        raise FileError(f"{log}: is there already, and stays as it is; name another file")
     file = read_scene(scene)
     with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities"):
         comparison = compare_solvers(
@@ -45,7 +50,10 @@ def compare(scene: Path, solvers: tuple[str, ...], as_json: bool) -> int:
             load=file.load,
             influence=file.influence,
             solvers=chosen,
+            log=log is not None,
         )
+    if log is not None:
+        write_rows(log, report.steps(comparison))
     summary = report.comparison_summary(comparison)
     echo(summary, report.describe_comparison(summary, file.units), as_json)
     for warning in report.comparison_warnings(summary):

@@ -72,22 +72,12 @@ def progress(message: str) -> Iterator[Callable[[str], object]]:
     if not sys.stderr.isatty():
         yield lambda message: None
         return
-    import logging
-
     from rich.console import Console
 
-    from convexrough.progress import LOGGER
+    from convexrough.progress import logged
 
-    class Shown(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            status.update(f"{message}: {record.getMessage()}")
-
-    handler, level = Shown(), LOGGER.level
-    with Console(stderr=True).status(message) as status:
-        LOGGER.addHandler(handler)
-        LOGGER.setLevel(logging.INFO)
-        try:
-            yield status.update
-        finally:
-            LOGGER.removeHandler(handler)
-            LOGGER.setLevel(level)
+    with (
+        Console(stderr=True).status(message) as status,
+        logged(lambda record: status.update(f"{message}: {record.getMessage()}")),
+    ):
+        yield status.update

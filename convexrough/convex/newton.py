@@ -14,7 +14,6 @@ halved until Phi falls enough (docs/theory/newton.md). What is different from la
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -22,6 +21,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.errors import SolverError
+from convexrough.progress import log_step
 
 #: Most of the defect that a linear solver may leave in a step; less as steps succeed, by the square
 #: of what the last one left (Eisenstat and Walker, SIAM J. Sci. Comput. 17 (1996) 16, choice 2).
@@ -37,7 +37,7 @@ PROMISED = 1e-4
 SHORTEST = 1e-12
 
 
-class State(Protocol):
+class Iterate(Protocol):
     """A point of the iteration.
 
     unknown  : eta;  forces : p(eta), as far as the constraints let them;  defect : F
@@ -58,7 +58,7 @@ class State(Protocol):
     def scale(self) -> float: ...
 
 
-Point = TypeVar("Point", bound=State)
+Point = TypeVar("Point", bound=Iterate)
 
 
 class Law(Protocol[Point]):
@@ -120,20 +120,17 @@ def solve(
     stopping: Stopping,
     *,
     before: float = np.inf,
-    report: Callable[[int, Point], object] | None = None,
 ) -> tuple[Point, int]:
     """The state that is as good as it gets, and how many steps it took.
 
     before : 2-norm of the defect that the start can be said to come from, for the first step
-    report : called before each step with its number, from 1, and the state
 
     It ends where  residual <= tolerance * scale;  or, once  residual <= accurate * scale,  where
     the defect is small beside rounding, which a certificate has to allow for anyway, or where a
     step does not halve the residual (the better of the two states is the answer). Else SolverError.
     """
     for step in range(1, stopping.most + 1):
-        if report is not None:
-            report(step, state)
+        log_step(law.solver, step, state.energy, _relative(state))
         accurate = state.residual <= stopping.accurate * state.scale
         size, noise = math.sqrt(np.vdot(state.defect, state.defect)), law.noise(state)
         done = state.residual <= max(stopping.tolerance * state.scale, 0.0)
@@ -150,13 +147,18 @@ def solve(
             return min(state, following, key=lambda each: each.residual), step
         state, before = following, size
     needed = max(stopping.tolerance, stopping.accurate)
-    part = state.residual / state.scale if state.scale != 0 else np.inf
     raise SolverError(
-        f"residual {part:.3g} of {law.unit} after {stopping.most} steps, {needed:.3g} needed",
+        f"residual {_relative(state):.3g} of {law.unit} after {stopping.most} steps, "
+        f"{needed:.3g} needed",
         solver=law.solver,
         advice=law.advice(state),
         iterate=state.forces,
     )
+
+
+def _relative(state: Iterate) -> float:
+    """The residual over its scale."""
+    return state.residual / state.scale if state.scale != 0 else np.inf
 
 
 def descend(law: Law[Point], state: Point, direction: Array) -> Point:

@@ -22,7 +22,7 @@ LIFT, Y3, Y5, Z = 7, 3, 5, 6
 THIN = 1e-9
 
 
-class Piece(NamedTuple):
+class ConePiece(NamedTuple):
     """A part of W. Forces are over the load N_b of the asperity, displacements over k N_b^(2/3).
 
     With L = N / N_b from low to high,  T = force - rate L,  deflection = own - rate L^(2/3)  and
@@ -78,7 +78,7 @@ class Piece(NamedTuple):
         return self.own * force + 0.6 * self.rate**2 * float(np.cbrt(level)) ** 5
 
 
-def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[Piece]:
+def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[ConePiece]:
     """Those of an asperity with this curve, once its indentation has become `own` > 0."""
     load = float(hertz.load(own, k))
     base = min(float(curve.load), own)
@@ -92,7 +92,7 @@ def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[Piece]:
     start = {1: (float(T[-1]), 0.0), -1: (float(T[-1]), 0.0)}  # force and energy reached so far
     if own > base * (1 + THIN):
         softness = (1.0 - base / own) / (1.0 - top)
-        stuck = Piece(0.0, 1.0 - top, 0.0, float(T[-1]), moved, 0.0, softness)
+        stuck = ConePiece(0.0, 1.0 - top, 0.0, float(T[-1]), moved, 0.0, softness)
         found.append(stuck)
         for sign, end in zip((-1, 1), stuck.forces(), strict=True):
             start[sign] = end, stuck.cost(end)
@@ -105,7 +105,7 @@ def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[Piece]:
                 continue
             level = float(T[j]) - slopes[j] * low + sign
             reached = float(xi[j]) - slopes[j] * low ** (2 / 3) + sign
-            piece = Piece(low, high, rate, level, reached, 0.0)
+            piece = ConePiece(low, high, rate, level, reached, 0.0)
             piece = piece._replace(energy=energy - piece.cost(force))
             found.append(piece)
             force = piece.forces()[1 if sign > 0 else 0]

@@ -18,7 +18,7 @@ import numpy as np
 from convexrough.arrays import Array, Indices
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, power_cones
 from convexrough.errors import SolverError
-from convexrough.friction.conic_pieces import LIFT, Y3, Y5, Piece, pieces_of
+from convexrough.friction.conic_pieces import LIFT, Y3, Y5, ConePiece, pieces_of
 from convexrough.friction.general_step import Bundle, Stepper
 from convexrough.friction.levels import Snapshot
 from convexrough.influence import couple
@@ -75,7 +75,7 @@ class StepProgram:
     own: Array
     parts: Array
     shells: Array
-    pieces: tuple[tuple[int, Piece], ...]
+    pieces: tuple[tuple[int, ConePiece], ...]
 
     @classmethod
     def assemble(cls, stepper: Stepper, now: Bundle, level: Snapshot, total: float) -> StepProgram:

@@ -27,7 +27,7 @@ import numpy as np
 from convexrough.errors import InputError
 from convexrough.frames import Variables
 from convexrough.plottable import Plottable
-from convexrough.record import Along, Table, in_words
+from convexrough.record import Along, Table, in_text
 
 
 class Piece(NamedTuple):
@@ -45,7 +45,7 @@ class Piece(NamedTuple):
     load_after: Fraction
 
     @property
-    def at_constant_load(self) -> bool:
+    def load_constant(self) -> bool:
         """The load stays."""
         return self.load_before == self.load_after
 
@@ -86,8 +86,8 @@ class MemoryCurve(Table, Plottable):
     def _rows(self) -> Iterator[tuple[str, str]]:
         """Rounded: fractions are long."""
         for name, (_, values) in self._variables().items():
-            yield name, in_words(values)
-        yield "front", "none" if self.front is None else in_words(float(self.front))
+            yield name, in_text(values)
+        yield "front", "none" if self.front is None else in_text(float(self.front))
 
     def _variables(self) -> Variables:
         return {

@@ -31,7 +31,7 @@ from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
 from convexrough.friction.path import points_of, pressed_for
 from convexrough.friction.shear import level_at
-from convexrough.friction.state import displacements_of, stick_radii, worded
+from convexrough.friction.state import by_status, displacements_of, stick_radii
 from convexrough.friction.walk import Point, Walk, levels_needed
 from convexrough.influence import Kind
 from convexrough.numbers.balls import Ball
@@ -440,7 +440,7 @@ def _cycle(
     rest, top, bottom = (levels.at(s) for s in (closed.stuck[0], levels.load, closed.least))
     sliding = bottom.touching & rest.open
     intermittent = top.touching & bottom.open
-    words = {
+    statuses = {
         "intermittent": intermittent,
         "sliding": sliding,
         "partial" if closed.later else "stuck": rest.touching & top.touching,
@@ -457,17 +457,17 @@ def _cycle(
     if order != "proved":
         error = first_error = np.inf
     if order == "fails":
-        amplitude_error, words = np.inf, {}
+        amplitude_error, statuses = np.inf, {}
         slip_errors, radius_errors = slip_errors + np.inf, radius_errors + np.inf
     if closed.general is not None:
         first, both = closed.general.losses[[closed.once, -1]]
         loss = both - first
         amplitude = float(np.ptp(closed.general.states.displacements[closed.once :])) / 2.0
-    everywhere = {name: levels.to_scene(which) for name, which in words.items()}
+    everywhere = {name: levels.to_scene(which) for name, which in statuses.items()}
     slides = everywhere.get("sliding", np.zeros(len(levels.scene), dtype=bool))
     lost, kept = levels.to_scene(intermittent), levels.to_scene(bottom.touching)
     doubtful = levels.to_scene(~(rest.touching | rest.open))
-    slip_errors = np.where(slides | doubtful, slip_errors, 0.0) if words else slip_errors
+    slip_errors = np.where(slides | doubtful, slip_errors, 0.0) if statuses else slip_errors
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
     whole = reference.energy_scale if reference else np.nan  # W0
     found = Cycle(
@@ -478,7 +478,7 @@ def _cycle(
         loss_error=float(error),
         loss_first=float(first),
         loss_first_error=float(first_error),
-        status=worded(levels, top, **words),
+        status=by_status(levels, top, **statuses),
         slips=frozen(np.where(lost, np.nan, np.where(kept, slips, 0.0))),
         slip_errors=frozen(slip_errors),
         stick_radii=radii,

@@ -25,7 +25,7 @@ from convexrough.arrays import Array, frozen
 from convexrough.errors import SolverError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, Snapshot
-from convexrough.friction.state import States, worded
+from convexrough.friction.state import States, by_status
 from convexrough.influence import couple
 from convexrough.sphere import hertz
 
@@ -157,7 +157,7 @@ class Stepper:
         return own + 0.5 * float(state.carried @ self.A @ state.carried)
 
 
-class Followed(NamedTuple):
+class SteppedPath(NamedTuple):
     """What general steps find at m points, of which nothing is proved.
 
     losses : (m,) since the beginning, nan where steps do not settle them;  status : (m, N)
@@ -176,7 +176,7 @@ def followed(
     points: Sequence[tuple[Fraction, Fraction]],
     steps: int | None = None,
     stepper: type[Stepper] | None = None,
-) -> Followed:
+) -> SteppedPath:
     """The general step along a path, so many times per segment.
 
     The error of n steps is about e / n^2, so of losses by n and 2n steps (4 W_2n - W_n) / 3 is
@@ -187,7 +187,7 @@ def followed(
     """
     by = (stepper or Stepper)(levels)
 
-    def found(count: int) -> Followed:
+    def found(count: int) -> SteppedPath:
         return _found(levels, by, by.along(start, points, count))
 
     if steps is not None:
@@ -205,7 +205,7 @@ def followed(
         count, before = 2 * count, here
 
 
-def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) -> Followed:
+def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) -> SteppedPath:
     unit = (float(levels.coefficient.value), float((levels.coefficient * levels.ratio).value))
     f, travel = unit
     positions = travel * np.array([each.positions for each in bundles])
@@ -216,10 +216,10 @@ def _found(levels: FrictionLevels, stepper: Stepper, bundles: Sequence[Bundle]) 
     parts = (displacements, forces, positions, positions - own)
     unknown = (np.full(part.shape, np.inf) for part in parts)
     fields = (frozen(each) for pair in zip(parts, unknown, strict=True) for each in pair)
-    return Followed(
+    return SteppedPath(
         states=States(*fields),
         losses=frozen(f * travel * spent),
-        status=frozen(np.array([worded(levels, levels.at(each.load)) for each in bundles])),
+        status=frozen(np.array([by_status(levels, levels.at(each.load)) for each in bundles])),
         fronts=np.array([[_front(curve) for curve in each.curves] for each in bundles]),
     )
 

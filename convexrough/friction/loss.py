@@ -66,9 +66,9 @@ def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
 def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     """(k,) of -dB/dL along each piece."""
     levels.prepare(load for piece in pieces for load in piece[2:])
-    still = np.array([piece.at_constant_load for piece in pieces], dtype=bool)
+    still = np.array([piece.load_constant for piece in pieces], dtype=bool)
     at, found = (
-        [(p.load_after, end) for p in pieces if p.at_constant_load for end in p[2:4]],
+        [(p.load_after, end) for p in pieces if p.load_constant for end in p[2:4]],
         list[Ball](),
     )
     known = list(dict.fromkeys(at))
@@ -78,7 +78,7 @@ def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     place = {pair: k for k, pair in enumerate(known)}
     total = joined([*found, Ball.exact(np.zeros(0))])
     before, lost = (total[[place[pair] for pair in at[end::2]]] for end in (0, 1))
-    moving = front_integrals(levels, [piece for piece in pieces if not piece.at_constant_load])
+    moving = front_integrals(levels, [piece for piece in pieces if not piece.load_constant])
     back = np.argsort(np.argsort(~still, kind="stable"))
     return joined([lost - before, moving])[back]
 
@@ -169,7 +169,7 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
     for piece in pieces:
         cut = (
             1
-            if piece.at_constant_load
+            if piece.load_constant
             else max(1, round(cells * float((piece.top - piece.bottom) / run)))
         )
         steps = [Fraction(k, cut) for k in range(cut + 1)]

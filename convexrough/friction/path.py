@@ -47,7 +47,7 @@ class LoadPath(Table, Plottable):
     status         : (m, n) "stuck", "partial", "sliding", "open" or "undecided"
     curves         : the memory curve after each point; it and the fronts rest on order
     order          : "proved" that no indentation falls with the load, as far as the path asks;
-        "proved for one step": words and bounds of states are those of the program with one step
+        "proved for one step": statuses and bounds of states are those of the program with one step
         for each segment, and no loss is proved; "fails": general steps answer, without a proof
     presses        : how many normal problems were solved
     start          : [force] the load of the pressed contact that it starts from; 0 of none
@@ -94,7 +94,7 @@ class LoadPath(Table, Plottable):
         return self.contact.scene
 
     @property
-    def held(self) -> bool:
+    def load_constant(self) -> bool:
         """The load is that of the pressed contact all the way, as in a history."""
         return bool((self.loads == self.start).all())
 

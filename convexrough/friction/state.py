@@ -61,7 +61,7 @@ def used_by(curves: Sequence[MemoryCurve]) -> set[Fraction]:
     return bent | {curve.front for curve in curves if curve.front is not None}
 
 
-class Sums(NamedTuple):
+class LevelSums(NamedTuple):
     """Sums over levels, each times its bends, of m curves: some of `places` for each of them.
 
     used : (k,) loads of the levels;  places : (m, j) which of them;  weights : (m, j) bends
@@ -72,7 +72,7 @@ class Sums(NamedTuple):
     weights: Ball
 
     @classmethod
-    def of(cls, curves: Sequence[MemoryCurve]) -> Sums:
+    def of(cls, curves: Sequence[MemoryCurve]) -> LevelSums:
         """Those that states of these curves are made of."""
         bends = [[(load, bend) for load, bend in curve.bends if bend] for curve in curves]
         used = sorted({load for each in bends for load, _ in each} or {curves[0].load})
@@ -97,7 +97,7 @@ class Sums(NamedTuple):
 
 def displacements_of(levels: FrictionLevels, curves: Sequence[MemoryCurve]) -> Ball:
     """(m,) X of these curves [length]."""
-    sums = Sums.of(curves)
+    sums = LevelSums.of(curves)
     approaches = Ball.stacked([levels.at(load).approach for load in sums.used])
     return sums.total(approaches) * levels.travel_unit
 
@@ -106,7 +106,7 @@ def states_of(
     levels: FrictionLevels, curves: Sequence[MemoryCurve], which: Indices | None = None
 ) -> States:
     """The states of these curves; of some asperities alone, in this order, or of all."""
-    sums, some = Sums.of(curves), slice(None) if which is None else which
+    sums, some = LevelSums.of(curves), slice(None) if which is None else which
     levels.prepare(sums.used)
     solved = [levels.at(load) for load in sums.used]
     loads = Ball.stacked([levels.loads(level)[some] for level in solved])
@@ -121,25 +121,25 @@ def states_of(
     return States(*(part for ball in fields for part in rounded(ball)))
 
 
-def words(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:
+def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:
     """(N,) "open", "sliding", "partial", "stuck" or "undecided", from the proofs at P and at L."""
     here = levels.at(curve.load)
     if order == "fails":
-        return worded(levels, here)
+        return by_status(levels, here)
     if curve.front is None:
-        return worded(levels, here, stuck=here.touching)
+        return by_status(levels, here, stuck=here.touching)
     front = levels.at(curve.front)
     sliding = here.touching & front.open
-    return worded(levels, here, partial=here.touching & front.touching, sliding=sliding)
+    return by_status(levels, here, partial=here.touching & front.touching, sliding=sliding)
 
 
-def worded(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
+def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
     """(N,) "open" where open here, each of the given statuses where proved; else "undecided"."""
     found = np.full(len(levels.scene), "open", dtype="<U12")
     some = np.full(len(levels.candidates), "undecided", dtype="<U12")
     some[here.open] = "open"
-    for word, which in proved.items():
-        some[which] = word
+    for status, which in proved.items():
+        some[which] = status
     found[levels.candidates] = some
     return frozen(found)
 

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.friction.curve import MemoryCurve, Piece
-from convexrough.friction.general_step import Followed, Stepper, followed
+from convexrough.friction.general_step import SteppedPath, Stepper, followed
 from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.loss import losses
 from convexrough.friction.order import Order
-from convexrough.friction.state import States, states_of, used_by, words
+from convexrough.friction.state import States, states_of, statuses_of, used_by
 from convexrough.numbers.balls import TINY, UP, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import SAFETY
@@ -68,7 +68,7 @@ class Walk:
         return self.levels.order(self.needed)
 
     @cached_property
-    def general(self) -> Followed | None:
+    def general(self) -> SteppedPath | None:
         """What general steps find, where they are asked for or order fails."""
         if self.steps is None and (self.order != "fails" or not self.levels.proved):
             return None
@@ -85,7 +85,9 @@ class Walk:
         """(m, N)"""
         if self.general is not None:
             return self.general.status
-        return frozen(np.array([words(self.levels, each, self.order) for each in self.curves]))
+        return frozen(
+            np.array([statuses_of(self.levels, each, self.order) for each in self.curves])
+        )
 
     def losses(self) -> tuple[Array, Array]:
         """(m,) energy lost since the beginning [force length], and proved bounds."""

@@ -44,7 +44,7 @@ Direction: TypeAlias = tuple[Sequence[Fraction], Sequence[Fraction]]
 NONE = Ball(Pair.exact(np.nan), np.asarray(np.inf))
 
 
-class Sums(NamedTuple):
+class LevelWeights(NamedTuple):
     """Losses over c_t f^2, and displacements over c_t f, as weights on V and D0 by levels."""
 
     losses: dict[Fraction, Weights]
@@ -97,9 +97,9 @@ class Walk:
     start: Fraction
     steps: Sequence[tuple[int, Fraction, Fraction]]
 
-    def sums(self, loads: Sequence[Fraction], heights: Sequence[Fraction]) -> Sums:
+    def sums(self, loads: Sequence[Fraction], heights: Sequence[Fraction]) -> LevelWeights:
         """At these P and T."""
-        curve, found = MemoryCurve.pressed(self.start), Sums({}, {})
+        curve, found = MemoryCurve.pressed(self.start), LevelWeights({}, {})
         for point, lost, moved in self.steps:
             curve, pieces = curve.go(loads[point], heights[point])
             if lost:
@@ -120,7 +120,7 @@ class Along:
     heights: Sequence[Fraction]
 
     @cached_property
-    def sums(self) -> Sums:
+    def sums(self) -> LevelWeights:
         return self.walk.sums(self.loads, self.heights)
 
     def parts(self, moves: Moves) -> tuple[list[Part], Ball, Ball]:

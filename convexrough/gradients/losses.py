@@ -72,13 +72,15 @@ def path_gradient(
     if losses is None and displacements is None:
         spent = np.eye(m)[-1]
     known = sheared.known
-    if path.held and any(abs(known.height(force)) == known.load for force in path.forces.tolist()):
+    if path.load_constant and any(
+        abs(known.height(force)) == known.load for force in path.forces.tolist()
+    ):
         expected = "forces below f P: where all slide, a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
     later = np.cumsum(spent[::-1])[::-1]  # what is lost at a step counts in all that follow
     steps = [(k, Fraction(later[k]), Fraction(far[k])) for k in range(m)]
     walk = Walk(Fraction(path.start), steps)
-    return _gradient(sheared, walk, path.loads, path.forces, holding, paths=not path.held)
+    return _gradient(sheared, walk, path.loads, path.forces, holding, paths=not path.load_constant)
 
 
 def _gradient(

@@ -29,7 +29,7 @@ from convexrough.numbers.balls import Ball
 NEWTON = 3
 
 
-class Result(Protocol):
+class FrictionResult(Protocol):
     """What friction makes of a contact."""
 
     @property
@@ -46,7 +46,7 @@ class Frictional:
     known: FrictionLevels
 
     @classmethod
-    def of(cls, result: Result) -> Frictional:
+    def of(cls, result: FrictionResult) -> Frictional:
         """Of a result that is a sum of levels; InputError for one of general steps."""
         if result.order == "fails":
             expected = "indentations that do not fall with the load: no sum of levels else"

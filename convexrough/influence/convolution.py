@@ -35,7 +35,7 @@ Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class SiteBox:
     """A box of sites, and convolutions on it.
 
     shape  : (rows, columns) of sites;  basis : (2, 2) rows b1 and b2, in units of the spacing: so
@@ -284,7 +284,7 @@ def _pass_roundoffs(length: int) -> int:
     return total
 
 
-def neighbours(box: Box) -> Iterator[tuple[float, int, int]]:
+def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
     """Differences of two sites, one of each pair +-, by increasing distance."""
     rows, columns = box.shape
     reach = 1

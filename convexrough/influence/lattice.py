@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arrays import Array, Indices, even
-from convexrough.influence.convolution import Box, Kernel, neighbours, through_waves
+from convexrough.influence.convolution import Kernel, SiteBox, neighbours, through_waves
 from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, cubed
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
@@ -62,7 +62,7 @@ class LatticeCoupling:
     site_error : [spacing] bound on how far the difference of two points is from that of their sites
     """
 
-    box: Box
+    box: SiteBox
     sources: Indices
     targets: Indices
     scale: float
@@ -395,15 +395,15 @@ def _least_symbol(lattice: Lattice) -> float:
     return least_symbol(lattice.basis / lattice.spacing)
 
 
-def _boxed(lattice: Lattice, places: Sites) -> tuple[Box, Indices]:
+def _boxed(lattice: Lattice, places: Sites) -> tuple[SiteBox, Indices]:
     """The smallest box, and where in it each place is."""
     basis = lattice.basis / lattice.spacing
     if len(places) == 0:
-        return Box((1, 1), basis), np.zeros(0, dtype=np.intp)
+        return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
     low, high = places.min(axis=0), places.max(axis=0)
     rows, columns = (high - low + 1).tolist()
     index = (places[:, 0] - low[0]) * np.intp(columns) + (places[:, 1] - low[1])
-    return Box((rows, columns), basis, _extent(places, (low + high) / 2.0, basis)), index
+    return SiteBox((rows, columns), basis, _extent(places, (low + high) / 2.0, basis)), index
 
 
 def _extent(places: Sites, middle: Array, basis: Array) -> float:

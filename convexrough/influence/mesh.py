@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.influence.convolution import Box, Kernel
+from convexrough.influence.convolution import Kernel, SiteBox
 from convexrough.influence.near_pairs import Order
 from convexrough.influence.softened import Softened, twofold_lagrange
 from convexrough.influence.splitting import Splitting
@@ -25,7 +25,7 @@ PLACES = 2**12
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh(Box):
+class Mesh(SiteBox):
     """A box of square cells, with the softened kernel."""
 
     def softened(self, kernel: Softened) -> Kernel:

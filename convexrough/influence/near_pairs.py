@@ -86,7 +86,7 @@ Piece: TypeAlias = tuple[slice, Indices, Indices]
 
 
 @dataclass(frozen=True, eq=False)
-class Near:
+class NearPairs:
     """S of docs/theory/operators-mesh.md: 1 / r^q less its smooth part, of pairs within the cut.
 
     upper   : (n, n) sparse, pairs i < j;  own : what each point gets of itself
@@ -99,7 +99,7 @@ class Near:
     nearest: float
 
     @classmethod
-    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> Near:
+    def assemble(cls, order: Order, splitting: Splitting, dtype: Any) -> NearPairs:
         from scipy.sparse import csr_array
 
         n = len(order.points)

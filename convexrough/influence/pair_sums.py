@@ -21,7 +21,7 @@ from convexrough.arrays import Array
 from convexrough.influence.convolution import Kernel
 from convexrough.influence.coupling import Rounding
 from convexrough.influence.mesh import BLOCK, Interpolation, Mesh
-from convexrough.influence.near_pairs import Near, Order
+from convexrough.influence.near_pairs import NearPairs, Order
 from convexrough.influence.softened import WEIGHT_ROUNDOFFS, lebesgue
 from convexrough.influence.splitting import Splitting
 from convexrough.roundoff import ROUNDOFF
@@ -33,7 +33,7 @@ class Product:
 
     splitting: Splitting
     order: Order
-    near: Near
+    near: NearPairs
     weights: Interpolation | None
     mesh: Mesh
     kernel: Kernel
@@ -43,7 +43,7 @@ class Product:
         cls, points: Array, splitting: Splitting, dtype: Any, tails: Array | None = None
     ) -> Product:
         order = Order.of(points, splitting, tails)
-        near = Near.assemble(order, splitting, dtype)
+        near = NearPairs.assemble(order, splitting, dtype)
         if not splitting.meshed:
             nothing = Kernel(np.empty((0, 0)), 0.0, 0.0)
             return cls(splitting, order, near, None, Mesh((1, 1), np.eye(2)), nothing)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence.convolution import Box, Kernel, through_waves
+from convexrough.influence.convolution import Kernel, SiteBox, through_waves
 from convexrough.numbers.balls import TINY, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_sum
 from convexrough.roundoff import ROUNDOFF
@@ -116,7 +116,7 @@ class Sliced:
     budget  : the most that both norms of two slices may multiply to
     """
 
-    box: Box
+    box: SiteBox
     unit: float
     kernels: list[Kernel]
     bits: int
@@ -125,7 +125,9 @@ class Sliced:
     budget: float
 
     @classmethod
-    def of(cls, box: Box, values: Values, norm: float, unit: float, count: int = SLICES) -> Sliced:
+    def of(
+        cls, box: SiteBox, values: Values, norm: float, unit: float, count: int = SLICES
+    ) -> Sliced:
         """norm : about the 2-norm of the kernel, over all differences of two sites."""
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
@@ -223,7 +225,7 @@ class Sliced:
         return [*levels, left]
 
 
-def each_loss(box: Box, count: int) -> float:
+def each_loss(box: SiteBox, count: int) -> float:
     """Of a component of a level, over both 2-norms: (2) of docs/theory/operators-lattice.md.
 
     Twice `count` and 6 roundoffs instead of 4: up to so many sums of loads and of products are
@@ -232,7 +234,7 @@ def each_loss(box: Box, count: int) -> float:
     return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 2.0 * count + 6.0)
 
 
-def _kernels(box: Box, values: Values, bits: int, more: int, count: int) -> list[Kernel]:
+def _kernels(box: SiteBox, values: Values, bits: int, more: int, count: int) -> list[Kernel]:
     def slices(i: Indices, j: Indices, _: Array) -> list[Array]:
         return cut(values.at(i, j), bits, more, count)
 

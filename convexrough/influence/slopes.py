@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from convexrough.arrays import Array, Indices
-from convexrough.influence.convolution import Box, Kernel
+from convexrough.influence.convolution import Kernel, SiteBox
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.softened import Softened
 
@@ -25,7 +25,7 @@ from convexrough.influence.softened import Softened
 BLOCK = 2**22
 
 
-def pulls(box: Box, over_cube: Callable[[Array], Array]) -> list[Kernel]:
+def pulls(box: SiteBox, over_cube: Callable[[Array], Array]) -> list[Kernel]:
     """x and y over r^3 for every difference of two sites of a box: odd kernels.
 
     over_cube : 1 / r^3, or what is taken for it, of squared distances

@@ -31,7 +31,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-WORDS = np.array(["undecided", "contact", "open"])
+STATUSES = np.array(["undecided", "contact", "open"])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -206,9 +206,9 @@ def certificate_of(
         coupled = screened.coupling.apply(moved)
         errors[screened.which] += coupled + screened.coupling.rounding(moved).of(coupled)
     errors *= 1 + SAFETY
-    words = 2 * (indentation < -errors)
-    words[problem.candidates[found.touching]] = 1
-    words[problem.candidates[found.open]] = 2
+    statuses = 2 * (indentation < -errors)
+    statuses[problem.candidates[found.touching]] = 1
+    statuses[problem.candidates[found.open]] = 2
     others = NO_OTHERS
     if found.box.scope != "global":
         approach_bound = lowest_approach_bound(problem, found.loads.value, start.product.value)
@@ -218,7 +218,7 @@ def certificate_of(
     return Certificate(
         scope="local" if others.possible else "global",
         convexity_number=found.box.convexity_number,
-        status=frozen(WORDS[words]),
+        status=frozen(STATUSES[statuses]),
         load_errors=frozen(load_errors),
         gaps=frozen(np.maximum(-indentation, 0.0) * length),
         gap_errors=frozen(errors * length),
@@ -302,7 +302,7 @@ def _unproved(
     return Certificate(
         scope="none",
         convexity_number=max(1.0, problem.convexity_number(start.loads.high)),
-        status=frozen(np.full(n, WORDS[0])),
+        status=frozen(np.full(n, STATUSES[0])),
         load_errors=frozen(np.full(n, np.inf)),
         gaps=frozen(np.maximum(-indentation, 0.0) * length),
         gap_errors=frozen(np.full(n, np.inf)),

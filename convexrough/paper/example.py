@@ -81,8 +81,8 @@ def compare(found: list[Result]) -> dict[str, Any]:
     }
 
 
-def _count(status: NDArray[np.str_], word: str) -> int:
-    return int((status == word).sum())
+def _count(statuses: NDArray[np.str_], status: str) -> int:
+    return int((statuses == status).sum())
 
 
 def _pair(paper: Any, computed: Any) -> dict[str, Any]:

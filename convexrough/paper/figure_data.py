@@ -11,6 +11,7 @@ import convexrough as cr
 from convexrough import fields
 from convexrough.arrays import Array, Indices
 from convexrough.paper.states import AMPLITUDES, SHARE, PaperStates
+from convexrough.plots.cycle import smooth_loop
 
 Columns = dict[str, NDArray[Any]]
 
@@ -73,10 +74,8 @@ def _at_half(found: PaperStates) -> dict[str, Columns]:
 
 def _loading(found: PaperStates) -> dict[str, Columns]:
     """Figs. 7 to 9: first loading, the loop at half of gross sliding, and energies."""
-    path, loop, maximum = found.path, found.loop, SHARE * found.limit
+    path, loop = found.path, found.loop
     smooth = cr.smooth(found.contact.scene, load=found.contact.load)
-    branch = smooth.branch(loop.forces[: len(loop.forces) // 2 + 1], maximum)
-    smooth_loop: Array = np.concatenate((branch, -branch[1:]))
     return {
         "fig7_asperities": {
             "fraction": found.fractions,
@@ -87,7 +86,7 @@ def _loading(found: PaperStates) -> dict[str, Columns]:
         "fig8_loops": {
             "force": loop.forces,
             "displacement": loop.displacements,
-            "smooth_displacement": smooth_loop,
+            "smooth_displacement": smooth_loop(smooth, loop.forces),
             **_of_each_ring("force", found.named, loop.asperity_forces),
             **_of_each_ring("displacement", found.named, loop.asperity_displacements),
         },

@@ -34,7 +34,7 @@ from convexrough.plots.style import (
     label,
     legend_above,
     legend_outside,
-    no_contact_figure,
+    no_contact,
     title,
     towards_rim,
 )
@@ -64,9 +64,10 @@ def paper_figures(
 
     found : what they show, where it is known; else it is computed
     """
-    scale = Scale(contact, length_unit, force_unit)
     if not contact.loads.any():
-        return _no_contact(scale)
+        return no_contact("fig3_pressure", "fig4_rings", "fig5_traction", "fig6_section",
+                          "fig7_asperities", "fig8_loops", "fig9_energy")  # fmt: skip
+    scale = Scale(contact, length_unit, force_unit)
     found = found or PaperStates.of(contact)
     some = evenly_chosen(list(found.named), MOST_ASPERITIES)
     firsts = [int(found.named[name][0]) for name in some]
@@ -196,15 +197,3 @@ def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
     title(axes, f"$y$ = 0, $Q/(fP)$ = {SHARE:g}")
     legend_above(axes, ncols=4)
     return figure
-
-
-def _no_contact(scale: Scale) -> Figures:
-    return Figures(
-        fig3_pressure=pressure_figure(scale),
-        fig4_rings=no_contact_figure(("$x$", "$y$"), ("$Q$", "ring")),
-        fig5_traction=no_contact_figure(("$x$", "$y$"), ("$x$", "traction")),
-        fig6_section=no_contact_figure(("$x$", "traction")),
-        fig7_asperities=no_contact_figure(("$Q$", "$Q_i$"), ("$Q$", "$X_i$ + slip")),
-        fig8_loops=no_contact_figure(("$X$", "$Q$"), ("$X_i$ + slip", "$Q_i$")),
-        fig9_energy=no_contact_figure(("amplitude of $Q$", "$W$")),
-    )

@@ -9,10 +9,10 @@ notebook. Discs of dense scenes are pixels inside a vector file: save that with 
 
 from convexrough.plots.axes import plot, thumbnail
 from convexrough.plots.between import between
-from convexrough.plots.closed_path import phase_figures, steady_figures
 from convexrough.plots.cycle import cycle_figures
 from convexrough.plots.fretting import fretting_figures
 from convexrough.plots.gradient import gradient_figures
+from convexrough.plots.load_plane import phase_figures, steady_figures
 from convexrough.plots.notebook import save
 from convexrough.plots.path import history_figures, path_figures
 from convexrough.plots.press import press_figures

@@ -7,15 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection
-from matplotlib.colors import to_rgba, to_rgba_array
+from matplotlib.colors import Normalize, to_rgba, to_rgba_array
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.plots.measure import Measure, Scale
-from convexrough.plots.style import DASHED, DOTTED, FAINT, SMOOTH, label, round_ticks
+from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH, bar, label, round_ticks
 
 #: From these numbers of discs on, they are pixels inside a vector file, and too small to be drawn.
 DENSE, CROWDED = 200, 3000
@@ -41,7 +42,7 @@ class Layer(NamedTuple):
     rim    : colour of their outline, None of none where discs are many or stacked
     """
 
-    word: str
+    status: str
     radii: Array
     shades: Any
     rim: str | None = SMOOTH
@@ -109,13 +110,28 @@ def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> Window:
     return draw_map(axes, points, layers, scale.length, smooth=scale.axes)
 
 
+def draw_values(
+    axes: Axes, scale: Scale, values: Array, name: str, *, signed: bool = False
+) -> None:
+    """The discs of a contact in the colours of their values, and a bar of this name.
+
+    signed : from dark, below 0, to light, above it
+    """
+    most = float(np.abs(values).max()) or 1.0
+    spread = Normalize(-most if signed else 0.0, most)
+    colours = ScalarMappable(spread, "viridis" if signed else COLOURS)
+    radii = scale.contact.contact_radii
+    draw_contact(axes, scale, [Layer("contact discs", radii, colours.to_rgba(values))])
+    bar(axes, colours, name, above=not signed)
+
+
 def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
     """The discs of a layer, in true size."""
     there = layer.radii > 0
     if not there.any():
         return
     shades = to_rgba_array(layer.shades)
-    few = int(there.sum()) < DENSE or layer.word == "undecided"
+    few = int(there.sum()) < DENSE or layer.status == "undecided"
     axes.add_collection(
         EllipseCollection(
             *(2.0 * layer.radii[there],) * 2,
@@ -127,7 +143,7 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
             edgecolors=layer.rim or "none",
             linewidths=0.4 if few and layer.rim else 0.0,
             rasterized=int(there.sum()) >= DENSE,
-            label=layer.word,
+            label=layer.status,
         ),
         autolim=False,
     )
@@ -147,8 +163,8 @@ def status_layers(
 ) -> list[Layer]:
     """A layer for each status, and the stick discs inside those that slip in part."""
     layers = [
-        Layer(word, np.where(status == word, radii, 0.0), colour)
-        for word, (colour, _) in LOOKS.items()
+        Layer(name, np.where(status == name, radii, 0.0), colour)
+        for name, (colour, _) in LOOKS.items()
     ]
     if stick_radii is not None:
         stick = np.where((status == "partial") & (radii > 0), stick_radii, 0.0)
@@ -156,10 +172,10 @@ def status_layers(
     return layers
 
 
-def status_handles(words: Iterable[str], *, stick: bool = False) -> list[Line2D]:
+def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line2D]:
     """The entries of a legend: each status that occurs, and stick discs."""
-    entries = [each for word, each in LOOKS.items() if word in words]
-    if stick and "partial" in words:
+    entries = [each for status, each in LOOKS.items() if status in statuses]
+    if stick and "partial" in statuses:
         entries.insert(0, (STICK, "stick disc"))
     return [_handle(colour, text) for colour, text in entries]
 

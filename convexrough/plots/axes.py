@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import singledispatch
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from convexrough.friction.fretting import Fretting
 from convexrough.friction.path import LoadPath
 from convexrough.friction.phases import PhaseLosses
 from convexrough.friction.shear import ShearState
-from convexrough.friction.side_by_side import PathComparison
+from convexrough.friction.side_by_side import PathComparison, PathEntry
 from convexrough.gradients.gradient import Gradient
 from convexrough.melan.shakedown import Shakedown
 from convexrough.plots.asperity_map import (
@@ -30,11 +29,10 @@ from convexrough.plots.asperity_map import (
     status_layers,
 )
 from convexrough.plots.between import between
-from convexrough.plots.closed_path import draw_losses
 from convexrough.plots.cycle import draw_loop, smooth_loop
 from convexrough.plots.fretting import draw_slip
 from convexrough.plots.gradient import draw_gradient
-from convexrough.plots.load_plane import draw_closed, draw_curve, draw_path
+from convexrough.plots.load_plane import draw_closed, draw_curve, draw_losses, draw_path
 from convexrough.plots.measure import Scale, measure
 from convexrough.plots.notebook import Figure, image_tag
 from convexrough.plots.path import draw_loop as draw_path_loop
@@ -77,7 +75,8 @@ def plot(
 
     Raises InputError for anything else.
     """
-    if _draw.dispatch(type(result)) is _draw.dispatch(object):
+    draw = next((draw for kind, draw in PICTURES.items() if isinstance(result, kind)), None)
+    if draw is None:
         expected = "a result that has a picture: a Contact, a state, a Cycle, LoadPath, ..."
         raise InputError("result", found=f"type {type(result).__name__}", expected=expected)
     if axes is None:
@@ -86,7 +85,7 @@ def plot(
     if isinstance(contact, Contact) and not contact.loads.any():
         say_nothing(axes)
     else:
-        _draw(result, axes, length_unit, force_unit)
+        draw(result, axes, length_unit, force_unit)
     return axes
 
 
@@ -104,27 +103,14 @@ def thumbnail(result: object) -> str:
     return image_tag(type(result).__name__, figure, 80)
 
 
-@singledispatch
-def _draw(result: Any, axes: Axes, *units: str) -> None:
-    """What `plot` does for each kind of result."""
-
-
-@_draw.register
-def _(contact: Contact, axes: Axes, *units: str) -> None:
-    draw_pressure(axes, Scale(contact, *units))
-
-
-@_draw.register(ShearState)
-@_draw.register(VectorShearState)
-def _(state: State, axes: Axes, *units: str) -> None:
+def _draw_state(state: State, axes: Axes, *units: str) -> None:
     scale = Scale(state.contact, *units)
     draw_state(axes, state, scale)
     axes.set_title(state_title(state, scale, narrow=False), fontsize=TICK)
     legend_below(axes, handles=legend_handles([state], scale))
 
 
-@_draw.register
-def _(cycle: Cycle, axes: Axes, *units: str) -> None:
+def _draw_cycle(cycle: Cycle, axes: Axes, *units: str) -> None:
     if np.ptp(cycle.loads) > 0:
         return draw_closed(axes, cycle, units[1])
     scale = Scale(cycle.contact, *units)
@@ -136,37 +122,16 @@ def _(cycle: Cycle, axes: Axes, *units: str) -> None:
     return label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
-@_draw.register
-def _(gradient: Gradient, axes: Axes, *units: str) -> None:
-    draw_gradient(axes, gradient, Scale(gradient.contact, *units))
+def _draw_path(path: LoadPath, axes: Axes, *units: str) -> None:
+    if path.load_constant:
+        draw_path_loop(axes, path, Scale(path.contact, *units), between(path))
+    else:
+        draw_path(axes, path, units[1])
 
 
-@_draw.register
-def _(fretting: Fretting, axes: Axes, *units: str) -> None:
-    draw_slip(axes, fretting, Scale(fretting.contact, *units))
-
-
-@_draw.register
-def _(verdict: Verdict, axes: Axes, *units: str) -> None:
-    draw_claim(axes, verdict, verdict.scene.asperities.positions, units[0])
-
-
-@_draw.register
-def _(comparison: Comparison, axes: Axes, *units: str) -> None:
-    entries = comparison.entries
-    _draw_times(
-        axes, [(e.solver, e.contact.seconds if e.contact else None, e.outcome) for e in entries]
-    )
-
-
-@_draw.register
-def _(comparison: PathComparison, axes: Axes, *units: str) -> None:
-    rows = [(e.way, e.seconds if e.path else None, e.outcome) for e in comparison.entries]
-    _draw_times(axes, rows)
-
-
-def _draw_times(axes: Axes, rows: Sequence[tuple[str, Any, str]]) -> None:
+def _draw_times(comparison: Comparison | PathComparison, axes: Axes, *units: str) -> None:
     """From above, what each took [s]; those without an answer say why."""
+    rows = [_took(entry) for entry in comparison.entries]
     for place, (_, seconds, outcome) in enumerate(rows):
         if seconds is None:
             axes.text(0.02, place, outcome, transform=axes.get_yaxis_transform(),
@@ -179,41 +144,34 @@ def _draw_times(axes: Axes, rows: Sequence[tuple[str, Any, str]]) -> None:
     label(axes, "time [s]", "")
 
 
-@_draw.register
-def _(path: LoadPath, axes: Axes, *units: str) -> None:
-    if path.held:
-        draw_path_loop(axes, path, Scale(path.contact, *units), between(path))
-    else:
-        draw_path(axes, path, units[1])
+def _took(entry: Any) -> tuple[str, float | None, str]:
+    if isinstance(entry, PathEntry):
+        return entry.way, entry.seconds if entry.path else None, entry.outcome
+    return entry.solver, entry.contact.seconds if entry.contact else None, entry.outcome
 
 
-@_draw.register
-def _(curve: MemoryCurve, axes: Axes, *units: str) -> None:
-    draw_curve(axes, curve, units[1])
-
-
-@_draw.register
-def _(losses: PhaseLosses, axes: Axes, *units: str) -> None:
-    draw_losses(axes, losses, *units)
-
-
-@_draw.register
-def _(limit: Shakedown, axes: Axes, *units: str) -> None:
-    draw_factors(axes, limit, units[0])
-
-
-@_draw.register
-def _(surface: Surface, axes: Axes, *units: str) -> None:
-    draw_surface(axes, surface)
-
-
-@_draw.register
-def _(summits: Summits, axes: Axes, *units: str) -> None:
+def _draw_summits(summits: Summits, axes: Axes, *units: str) -> None:
     every = np.ones(len(summits), dtype=bool)
     layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
     draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
 
 
-@_draw.register
-def _(curve: Provability, axes: Axes, *units: str) -> None:
-    draw_provability(axes, curve)
+#: What draws each kind of result: of it, the axes, and the units of length and force.
+PICTURES: dict[type, Callable[..., Any]] = {
+    Contact: lambda it, axes, *units: draw_pressure(axes, Scale(it, *units)),
+    ShearState: _draw_state,
+    VectorShearState: _draw_state,
+    Cycle: _draw_cycle,
+    Fretting: lambda it, axes, *units: draw_slip(axes, it, Scale(it.contact, *units)),
+    LoadPath: _draw_path,
+    MemoryCurve: lambda it, axes, *units: draw_curve(axes, it, units[1]),
+    PhaseLosses: lambda it, axes, *units: draw_losses(axes, it, *units),
+    Shakedown: lambda it, axes, *units: draw_factors(axes, it, units[0]),
+    Gradient: lambda it, axes, *units: draw_gradient(axes, it, Scale(it.contact, *units)),
+    Verdict: lambda it, axes, *units: draw_claim(axes, it, it.scene.asperities.positions, units[0]),
+    Comparison: _draw_times,
+    PathComparison: _draw_times,
+    Surface: lambda it, axes, *units: draw_surface(axes, it),
+    Summits: _draw_summits,
+    Provability: lambda it, axes, *units: draw_provability(axes, it),
+}

@@ -22,10 +22,10 @@ def between(path: LoadPath) -> LoadPath:
     """The same path with as many points more between any two; itself where these are dear."""
     m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
     each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)
-    if not path.held:
+    if not path.load_constant:
         each = min(each, 8) if m <= MOST_SEGMENTS else 1
     each = min(each, MOST_BETWEEN)
-    follows_on = path.held or path.start == 0.0  # not another's contact
+    follows_on = path.load_constant or path.start == 0.0  # not another's contact
     if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
         return path
     corners = np.column_stack((path.loads, path.forces))
@@ -35,7 +35,7 @@ def between(path: LoadPath) -> LoadPath:
         for a, b in pairwise(np.vstack(([path.start, 0.0], corners)))
     ]
     P, Q = np.concatenate(pieces).T
-    if path.held:
+    if path.load_constant:
         return history(path.contact, forces=Q)
     limit = (path.scene.friction or 1.0) * P
     return load_path(path.scene, loads=P, forces=np.clip(Q, -limit, limit))

@@ -25,7 +25,7 @@ from convexrough.plots.style import (
     few_ticks,
     label,
     legend_outside,
-    no_contact_figure,
+    no_contact,
     round_ticks,
     say_nothing,
     title,
@@ -63,11 +63,7 @@ def cycle_figures(
     contact = cycles[0].contact
     several = len(np.unique([each.maximum - each.minimum for each in cycles])) > 1
     if not contact.loads.any():
-        labels = ("$X$", "$Q$"), ("$X_i$ + slip", "$Q_i$")
-        figures = Figures({"hysteresis": no_contact_figure(*labels)})
-        if several:
-            figures["loss"] = no_contact_figure(("amplitude of $Q$", "$W$"))
-        return figures
+        return no_contact("hysteresis", *(["loss"] if several else []))
     scale = Scale(contact, length_unit, force_unit)
     by_range = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
     r = np.hypot(*(contact.scene.contact_points - scale.centre).T)
@@ -120,9 +116,8 @@ def loops_figure(
         for axes, slope in ((whole, 0.0), (upright, 2.0 / 3.0 * scale.travel / scale.limit)):
             draw_loop(axes, scale, loop.displacements, loop.forces, slope)
             if scale.sphere is not None:
-                forces = _around(cycle, POINTS)
-                moved = smooth_loop(scale.sphere, forces)
-                draw_loop(axes, scale, moved, forces, slope, smooth=True)
+                moved = smooth_loop(scale.sphere, loop.forces)
+                draw_loop(axes, scale, moved, loop.forces, slope, smooth=True)
         end = loop.displacements[0] - slope * loop.forces[0]
         upright.annotate(_range(cycle, scale), (x.of(end), q.of(loop.forces[0])), xytext=(4, 2),
                          textcoords="offset points", fontsize=7, va="center",
@@ -158,14 +153,6 @@ def draw_loop(
     other: dict[str, Any] = {"color": SMOOTH, "lw": 1.0, "ls": DASHED, "label": scale.name}
     look = other if smooth else rough
     axes.plot(scale.displacement.of(X - slope * Q), scale.force.of(Q), **look)
-
-
-def _around(cycle: Cycle, points: int) -> Array:
-    """Forces from the maximum to the minimum and back [force], close together at the ends."""
-    middle, half = (cycle.maximum + cycle.minimum) / 2, cycle.force_amplitude
-    down = middle + half * np.cos(np.linspace(0.0, np.pi, points // 2 + 1))
-    down = np.clip(down, cycle.minimum, cycle.maximum)
-    return np.append(down, down[-2::-1])
 
 
 def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 
 from convexrough.arrays import Array
 from convexrough.friction.fretting import Fretting
-from convexrough.plots.asperity_map import Layer, draw_contact
+from convexrough.plots.asperity_map import draw_values
 from convexrough.plots.measure import Measure, Scale, measure, product
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import COLOURS, DOUBLE, TICK, bar, no_contact_figure, title
+from convexrough.plots.style import DOUBLE, TICK, no_contact, title
 
 
 def fretting_figures(worn: Fretting, *, length_unit: str = "", force_unit: str = "") -> Figures:
@@ -22,7 +20,7 @@ def fretting_figures(worn: Fretting, *, length_unit: str = "", force_unit: str =
         mean shear traction and the largest, both at the largest force
     """
     if not worn.contact.loads.any():
-        return Figures({"fretting": no_contact_figure(("$x$", "$y$"))})
+        return no_contact("fretting")
     scale = Scale(worn.contact, length_unit, force_unit)
     figure = Figure(figsize=(DOUBLE, 6.2), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
@@ -52,9 +50,5 @@ def draw_slip(axes: Axes, worn: Fretting, scale: Scale) -> None:
 
 
 def _draw(axes: Axes, scale: Scale, values: Array, unit: Measure, name: str, symbol: str) -> None:
-    shown = np.nan_to_num(unit.of(values))
-    colours = ScalarMappable(Normalize(0.0, float(shown.max()) or 1.0), COLOURS)
-    radii = scale.contact.contact_radii
-    draw_contact(axes, scale, [Layer("contact discs", radii, colours.to_rgba(shown))])
+    draw_values(axes, scale, np.nan_to_num(unit.of(values)), unit.short(symbol))
     title(axes, name)
-    bar(axes, colours, unit.short(symbol), above=True)

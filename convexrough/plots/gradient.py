@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 
 from convexrough.gradients.gradient import Gradient
-from convexrough.plots.asperity_map import Layer, draw_contact
+from convexrough.plots.asperity_map import draw_values
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import SINGLE, bar, title
-
-#: From dark, where a taller asperity lowers the number, to light, where it raises it: also in grey.
-SIGNED = "viridis"
+from convexrough.plots.style import SINGLE, title
 
 
 def gradient_figures(
@@ -32,14 +26,9 @@ def gradient_figures(
 
 
 def draw_gradient(axes: Axes, gradient: Gradient, scale: Scale, of: str = "J") -> None:
-    """The map, with its bar of colours."""
-    contact = gradient.contact
-    parts, per = gradient.heights * contact.approach, ""
+    """Derivatives: dark where a taller asperity lowers the number, light where it raises it."""
+    parts, per = gradient.heights * gradient.contact.approach, ""
     if gradient.value:
         parts, per = parts / gradient.value, f"\\,/\\,{of}"
-    most = float(np.abs(parts).max()) or 1.0
-    colours = ScalarMappable(Normalize(-most, most), SIGNED)
-    shades = colours.to_rgba(parts)
-    draw_contact(axes, scale, [Layer("contact discs", contact.contact_radii, shades)])
+    draw_values(axes, scale, parts, f"$D_0\\,\\partial {of}/\\partial z{per}$", signed=True)
     title(axes, f"{gradient.holding} held")
-    bar(axes, colours, f"$D_0\\,\\partial {of}/\\partial z{per}$")

@@ -51,7 +51,10 @@ def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200
 
     Raises InputError for another format, or pixels that are too coarse or too fine.
     """
-    check_saving((form,), dpi)
+    if form not in FORMATS:
+        raise InputError("form", found=repr(form), expected=f"one of {', '.join(FORMATS)}")
+    if not LEAST_DPI <= dpi <= MOST_DPI:
+        raise InputError("dpi", found=dpi, expected=f"from {LEAST_DPI} to {MOST_DPI}")
     dates: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     canvas: Any = get_registered_canvas_class(form)(figure)
     before, figure.dpi = figure.dpi, dpi
@@ -60,12 +63,3 @@ def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200
             getattr(canvas, f"print_{form}")(path, metadata=dates.get(form))
     finally:
         figure.dpi = before
-
-
-def check_saving(formats: tuple[str, ...], dpi: int) -> None:
-    """Raise InputError for formats or a dpi that `save` does not know."""
-    for form in formats:
-        if form not in FORMATS:
-            raise InputError("formats", found=repr(form), expected=f"of {', '.join(FORMATS)}")
-    if not LEAST_DPI <= dpi <= MOST_DPI:
-        raise InputError("dpi", found=dpi, expected=f"from {LEAST_DPI} to {MOST_DPI}")

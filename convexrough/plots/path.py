@@ -30,7 +30,7 @@ from convexrough.plots.style import (
     label,
     legend_outside,
     mark_points,
-    no_contact_figure,
+    no_contact,
     round_ticks,
     shades_of,
     title,
@@ -52,7 +52,7 @@ def history_figures(
         the energy lost since the beginning against the step
     """
     if not past.contact.loads.any():
-        return Figures({"history": no_contact_figure(("$X$", "$Q$"), ("step", "energy lost"))})
+        return no_contact("history")
     scale = Scale(past.contact, length_unit, force_unit)
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     loop, cost = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})

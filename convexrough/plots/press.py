@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from convexrough import fields
 from convexrough.arrays import Array
 from convexrough.contact import Contact
-from convexrough.plots.asperity_map import CROWDED, Layer, Window, draw_contact, draw_map
+from convexrough.plots.asperity_map import CROWDED, Layer, Window, draw_contact
 from convexrough.plots.measure import Scale
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
@@ -27,9 +27,8 @@ from convexrough.plots.style import (
     draw_density,
     label,
     legend_above,
-    no_contact_figure,
+    no_contact,
     not_proved,
-    say_nothing,
     title,
     towards_rim,
 )
@@ -44,9 +43,10 @@ def press_figures(contact: Contact, *, length_unit: str = "", force_unit: str = 
         pressures of all against their distance from the centre
     "loads"    : load of each touching asperity by its distance from the centre
     """
+    if not contact.loads.any():
+        return no_contact("pressure", "loads")
     scale = Scale(contact, length_unit, force_unit)
-    loads = _loads_figure(scale) if contact.loads.any() else _no_loads(scale)
-    return Figures({"pressure": pressure_figure(scale), "loads": loads})
+    return Figures({"pressure": pressure_figure(scale), "loads": _loads_figure(scale)})
 
 
 def pressure_figure(scale: Scale) -> Figure:
@@ -56,11 +56,6 @@ def pressure_figure(scale: Scale) -> Figure:
     chart, profile = figure.subplots(1, 2, width_ratios=[1.0, 1.05], gridspec_kw={"wspace": 0.08})
     chart.set_anchor("E")
     label(profile, scale.length.label("x"), scale.pressure.label("p"))
-    if not contact.loads.any():
-        draw_map(chart, contact.scene.contact_points, [], scale.length)
-        title(chart, census(contact))
-        say_nothing(profile)
-        return figure
     colours, window = draw_pressure(chart, scale)
     chart.set_xlabel(scale.length.short("x"))
     crossed = (np.abs(contact.scene.contact_points[:, 1]) < contact.contact_radii).sum()
@@ -142,20 +137,20 @@ def distances(scale: Scale) -> Array:
     return away / scale.length.size
 
 
-def _draw_points(axes: Axes, x: Array, y: Array, top: float, word: str) -> bool:
+def _draw_points(axes: Axes, x: Array, y: Array, top: float, label: str) -> bool:
     """A dot for each, or how many there are where and their median; whether these are many."""
     if len(x) >= CROWDED:
-        draw_density(axes, x, y, top, word)
+        draw_density(axes, x, y, top, label)
         return True
     size = float(np.clip(40.0 / np.sqrt(len(x)), 1.2, 4.0))
-    axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=word, clip_on=False, zorder=3)
+    axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=label, clip_on=False, zorder=3)
     return False
 
 
 def census(contact: Contact) -> str:
     """How many touch, and how sure that is."""
-    words = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
-    return words + not_proved(contact.certificate.scope, contact.status)
+    text = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
+    return text + not_proved(contact.certificate.scope, contact.status)
 
 
 def _loads_figure(scale: Scale) -> Figure:
@@ -201,7 +196,3 @@ def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
     share = hertz.pressure(s, 1.0, 150.0 / np.pi) * np.median(areas[whole]) / scale.typical**2
     axes.plot(scale.length.of(scale.typical) * s, share, "--", lw=1.1, color=SMOOTH,
               label="smooth $p(r)$ × cell area")  # fmt: skip
-
-
-def _no_loads(scale: Scale) -> Figure:
-    return no_contact_figure((scale.length.label("r"), "asperity load  [% of total]"), width=SINGLE)

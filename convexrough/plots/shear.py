@@ -30,7 +30,7 @@ from convexrough.plots.style import (
     SMOOTH,
     TICK,
     legend_outside,
-    no_contact_figure,
+    no_contact,
     not_proved,
     round_ticks,
 )
@@ -54,8 +54,7 @@ def shear_figures(
         return Figures()
     scale = Scale(states[0].contact, length_unit, force_unit)
     if not states[0].contact.loads.any():
-        labels = scale.length.label("x"), scale.length.short("y")
-        return Figures({"stick_slip": no_contact_figure(labels, width=SINGLE)})
+        return no_contact("stick_slip")
     shown = evenly_chosen(states, MOST_PANELS)
     columns = len(shown) if len(shown) <= 4 else 3 if len(shown) in (5, 6, 9) else 4
     rows = -(-len(shown) // columns)
@@ -99,8 +98,8 @@ def draw_state(axes: Axes, state: State, scale: Scale) -> None:
 def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
     """What each look means, of those that occur."""
     loads = states[0].contact.loads
-    words = {word for state in states for word in np.unique(state.status[loads > 0])}
-    marks: list[Any] = status_handles(words - {"undecided"}, stick=True)
+    statuses = {status for state in states for status in np.unique(state.status[loads > 0])}
+    marks: list[Any] = status_handles(statuses - {"undecided"}, stick=True)
     if any(_doubtful(state).any() for state in states):
         marks.append(Line2D([], [], ls="", marker="x", ms=4, color=SMOOTH, label="undecided"))
     if (loads == 0).any() and np.count_nonzero(loads) < CROWDED:
@@ -120,6 +119,8 @@ def state_title(state: State, scale: Scale, *, narrow: bool) -> str:
     slide = int((touching & (state.status == "sliding")).sum())
     force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)
     share = f"{force / scale.limit:.4g}".replace("-", "\u2212")
-    words = f"{slide:,} of {int(touching.sum()):,} slide"
+    sliding = f"{slide:,} of {int(touching.sum()):,} slide"
     unsure = not_proved(state.certificate.scope, state.status)
-    return f"$Q/(fP)$ = {share}:{chr(10) if narrow else ' '}{words}" + unsure.replace(" ", "\n", 1)
+    return f"$Q/(fP)$ = {share}:{chr(10) if narrow else ' '}{sliding}" + unsure.replace(
+        " ", "\n", 1
+    )

@@ -142,9 +142,9 @@ def _stick(
     """c_i / a_i = (1 - Q_i / (f P_i))^(1/3) in thousandths, 0 sliding, -1 undecided."""
     left = np.maximum(1.0 - _shares(contact, loading, drawn), 0.0)
     rows = np.maximum(np.rint(1000.0 * np.cbrt(left)), 1.0).astype(int)
-    words = np.array([each.status[drawn] for each in steady])
-    rows[words == "sliding"] = 0
-    rows[words == "undecided"] = -1
+    statuses = np.array([each.status[drawn] for each in steady])
+    rows[statuses == "sliding"] = 0
+    rows[statuses == "undecided"] = -1
     return [row.tolist() for row in rows]
 
 
@@ -161,7 +161,7 @@ def _followed(contact: Contact, loading: LoadPath, which: Indices, X0: float) ->
     return {
         "x": _digits(x),
         "y": _digits(y),
-        "word": certificate.status[which].tolist(),
+        "status": certificate.status[which].tolist(),
         "load": _digits(contact.loads[which]),
         "load_error": [_bound(error) for error in certificate.load_errors[which]],
         "share": [_digits(curve) for curve in _shares(contact, loading, which).T],

@@ -16,7 +16,7 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, 
 
 from convexrough.arrays import Array
 from convexrough.plots.measure import literal as literal
-from convexrough.plots.notebook import Figure
+from convexrough.plots.notebook import Figure, Figures
 
 LABEL, TICK = 9, 8  # points
 SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal
@@ -83,13 +83,12 @@ def legend_outside(figure: Any, handles: Sequence[Any], place: str, ncols: int) 
                   frameon=False, handletextpad=0.5, columnspacing=1.4, borderpad=0.2)  # fmt: skip
 
 
-def no_contact_figure(*labels: tuple[str, str], width: float = DOUBLE) -> Figure:
-    """A panel for each pair of axis labels, and the text "no contact" in each."""
-    figure = Figure(figsize=(width, 2.6), layout="constrained")
-    for axes, (x, y) in zip(figure.subplots(1, len(labels), squeeze=False)[0], labels, strict=True):
-        label(axes, x, y)
-        say_nothing(axes)
-    return figure
+def no_contact(*stems: str) -> Figures:
+    """Figures of these names that say that nothing touches."""
+    figures = {stem: Figure(figsize=(SINGLE, 2.6), layout="constrained") for stem in stems}
+    for figure in figures.values():
+        say_nothing(figure.subplots())
+    return Figures(figures)
 
 
 def say_nothing(axes: Axes, why: str = "no contact") -> None:
@@ -148,7 +147,7 @@ def _inches(axes: Axes) -> Array:
     return np.array([0.75 * place.width * width, 0.75 * place.height * height])
 
 
-def draw_density(axes: Axes, x: Array, y: Array, top: float, word: str) -> None:
+def draw_density(axes: Axes, x: Array, y: Array, top: float, label: str) -> None:
     """How many points lie where, the darker the more, and the median of y along x.
 
     top : of y
@@ -164,7 +163,7 @@ def draw_density(axes: Axes, x: Array, y: Array, top: float, word: str) -> None:
     column = np.clip(np.searchsorted(across, x, side="right") - 1, 0, columns - 1)
     held = np.unique(column)
     middle = [np.median(y[column == each]) for each in held]
-    axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=word)
+    axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=label)
     axes.plot((across[held] + across[held + 1]) / 2, middle, color=ROUGH, lw=1.3,
               label="their median")  # fmt: skip
 

@@ -126,10 +126,10 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
     for axes in (upper, middle, lower):
         axes.axvspan(0.0, _place(until), color="0.92", lw=0.0, zorder=0)
         axes.axvline(_place(chosen), color=SMOOTH, lw=0.9, ls=":")
-    word = "nowhere" if np.isnan(first) else f"from {100 * first:.3g} %"
+    trusted = "nowhere" if np.isnan(first) else f"from {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
     size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
-    title(upper, f"to be trusted: {word}{size}")
+    title(upper, f"to be trusted: {trusted}{size}")
     return figure
 
 
@@ -172,7 +172,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
     draw_summits(axes, positions)
     bar(axes, image, _named("$z$", surface.unit), above=True)
     look: dict[str, Any] = dict(marker="o", ls="", ms=5.0, mec="0.4", mew=0.3)
-    handles = [Line2D([], [], color=colour, label=word, **look) for colour, word in named]
+    handles = [Line2D([], [], color=colour, label=label, **look) for colour, label in named]
     legend_outside(figure, handles, "lower center", 2)
     return figure
 

@@ -51,14 +51,14 @@ def draw_claim(axes: Axes, claim: Claim, points: Array, length_unit: str = "") -
     status, length = claim.status, measure(float(np.ptp(points)), length_unit)
     size = even_radii(points, np.ones(len(points), dtype=bool))
     layers = [
-        Layer(word, np.where(status == word, size, 0.0), shade)
-        for word, shade in SHADES.items()
-        if word in status
+        Layer(name, np.where(status == name, size, 0.0), shade)
+        for name, shade in SHADES.items()
+        if name in status
     ]
     draw_map(axes, points, layers, length)
     handles = [
-        Line2D([], [], ls="", marker="o", ms=6, mec="0.4", mew=0.3, color=SHADES[each.word],
-               label=NAMES.get(each.word, each.word)) for each in layers
+        Line2D([], [], ls="", marker="o", ms=6, mec="0.4", mew=0.3, color=SHADES[each.status],
+               label=NAMES.get(each.status, each.status)) for each in layers
     ]  # fmt: skip
     marked = list(zip(MARKS, claim.wrong.items(), strict=True))
     for mark, (what, those) in [*marked, ("^", ("undecided", claim.undecided))]:

@@ -21,7 +21,7 @@ from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton, TooDenseError
 from convexrough.solvers.bristles import LARGEST_S, BristleProgram
-from convexrough.solvers.cone_boxes import Boxes
+from convexrough.solvers.cone_boxes import ConeBoxes
 from convexrough.solvers.conic import LiftedProgram
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
 
@@ -186,17 +186,17 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
     )
 
 
-def _boxes(problem: NormalProblem, own: Array) -> Boxes:
+def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
     """Four cones an asperity where the solution is in their boxes, else five."""
     for five in (False, True):
-        boxes = Boxes.choose(problem, five=five)
+        boxes = ConeBoxes.choose(problem, five=five)
         if not (beyond := boxes.cut & (own[boxes.members] >= boxes.loads)).any():
             return boxes
     theta = problem.shells / problem.stiffness(own)
     raise boxes.too_dense(problem, "cones", np.where(beyond, theta[boxes.members], 0.0))
 
 
-def _objective(program: ConeProgram, boxes: Boxes, own: Array) -> float:
+def _objective(program: ConeProgram, boxes: ConeBoxes, own: Array) -> float:
     """The least objective: that of the powers of the solution's contact radii."""
     p = own[boxes.members]
     t = np.cbrt(p / boxes.loads)

@@ -1,5 +1,5 @@
 """Proofs as files, for `convexrough.checker` or anybody else's (docs/theory/proof-file.md)."""
 
-from convexrough.proof.proof import Near, Proof, Sheared, prove, refuse_many
+from convexrough.proof.proof import NearState, Proof, ShearedState, prove, refuse_many
 
-__all__ = ["Near", "Proof", "Sheared", "prove", "refuse_many"]
+__all__ = ["NearState", "Proof", "ShearedState", "prove", "refuse_many"]

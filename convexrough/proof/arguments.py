@@ -58,7 +58,7 @@ class Argument(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class TrialState:
     """Contact radii (n,) [length] near a solution, and the approach or the load over E*."""
 
     scene: Scene

@@ -21,20 +21,20 @@ from convexrough.errors import InputError, ProofError
 from convexrough.normal.level import Level
 from convexrough.numbers.pairs import Pair
 from convexrough.progress import LOGGER
-from convexrough.proof.arguments import Trial
+from convexrough.proof.arguments import TrialState
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
 
-class Sheared(Protocol):
+class ShearedState(Protocol):
     """A friction state on first loading, such as `convexrough.shear` returns."""
 
     @property
     def force(self) -> float: ...
 
 
-class Near(NamedTuple):
+class NearState(NamedTuple):
     """Loads near a solution, to any number of digits, in the order of the scene's asperities.
 
     loads : n of them [force];  approach : [length], None where it is not known better than loads
@@ -44,12 +44,12 @@ class Near(NamedTuple):
     approach: Fraction | None
 
     @classmethod
-    def given(cls, loads: Array) -> Near:
+    def given(cls, loads: Array) -> NearState:
         """Loads (n,) [force] as they are."""
         return cls(list(map(Fraction, loads.tolist())), None)
 
     @classmethod
-    def of(cls, level: Level, n: int) -> Near:
+    def of(cls, level: Level, n: int) -> NearState:
         """Those of a level, in a scene of n asperities."""
         found, units = [Fraction(0)] * n, level.problem.units
         if level.trial is None:
@@ -80,11 +80,11 @@ class Proof(Record):
 
 def prove(
     scene: Scene,
-    loads: ArrayLike | Near,
+    loads: ArrayLike | NearState,
     *,
     approach: float | None = None,
     load: float | None = None,
-    sheared: Sequence[tuple[float, Near]] = (),
+    sheared: Sequence[tuple[float, NearState]] = (),
 ) -> Proof:
     """A proof of the solution near these loads, wherever they came from.
 
@@ -101,14 +101,16 @@ def prove(
     """
     checks.exactly_one("approach", approach, "load", load)
     refuse_many(scene)
-    if not isinstance(loads, Near):
-        loads = Near.given(checks.array("loads", loads, length=len(scene), sign="not negative"))
+    if not isinstance(loads, NearState):
+        loads = NearState.given(
+            checks.array("loads", loads, length=len(scene), sign="not negative")
+        )
     if load is not None and not any(loads.loads):
         raise InputError("loads", found="none", expected="a load on some asperity")
     modulus = scene.material.contact_modulus
     rounded = np.array(loads.loads, dtype=np.float64)
     radii = hertz.contact_radius(rounded, modulus, scene.relative_radii)
-    trial = Trial(scene, radii, approach, None if load is None else load / modulus)
+    trial = TrialState(scene, radii, approach, None if load is None else load / modulus)
     document = _document(trial, {"approach": approach} if load is None else {"load": load})
     document["pressed"] = _place(trial, document, loads, approach)
     document["sheared"] = [
@@ -135,7 +137,7 @@ def refuse_many(scene: Scene) -> None:
         raise InputError("asperities of a scene to prove", found=f"{len(scene):,}", expected=most)
 
 
-def _document(trial: Trial, prescribed: dict[str, Any]) -> dict[str, Any]:
+def _document(trial: TrialState, prescribed: dict[str, Any]) -> dict[str, Any]:
     """The file, without what is said of the solution as yet."""
     scene = trial.scene
     x, y = scene.asperities.positions.T
@@ -163,7 +165,7 @@ def _document(trial: Trial, prescribed: dict[str, Any]) -> dict[str, Any]:
 
 
 def _place(
-    trial: Trial, document: dict[str, Any], near: Near, approach: float | None
+    trial: TrialState, document: dict[str, Any], near: NearState, approach: float | None
 ) -> dict[str, Any]:
     """Contact radii to thirty digits, and the approach."""
     scene = checker.read_scene(document["scene"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 from convexrough.compare import Comparison, Entry
 from convexrough.run.stage import Summary, unit_of
@@ -12,7 +13,7 @@ from convexrough.run.summary import headed
 from convexrough.tabular.columns import aligned, bound
 from convexrough.tabular.units import UnitNames
 
-HEADING = ["solver", "disagreement", "load error", "duality gap", "certificate", "words",
+HEADING = ["solver", "disagreement", "load error", "duality gap", "certificate", "statuses",
            "iterations", "seconds", "MB"]  # fmt: skip
 
 
@@ -23,11 +24,11 @@ def comparison_summary(comparison: Comparison) -> Summary:
 
 
 def _entry(entry: Entry) -> Summary:
-    said = ("solver", "outcome", "message", "disagreement", "different_words", "memory")
+    said = ("solver", "outcome", "message", "disagreement", "different_statuses", "memory")
     row: Summary = {name: getattr(entry, name) for name in said}
     if (contact := entry.contact) is not None:
         proof = contact.certificate
-        row |= {word: int((contact.status == word).sum()) for word in COUNTS}
+        row |= {status: int((contact.status == status).sum()) for status in COUNTS}
         row |= {"approach": contact.approach, "load": contact.load}
         row |= {"largest_load": float(contact.loads.max())}
         row |= {name: getattr(proof, name) for name in ("scope", "load_error", "duality_gap")}
@@ -36,14 +37,25 @@ def _entry(entry: Entry) -> Summary:
     return row
 
 
+def steps(comparison: Comparison) -> list[list[Any]]:
+    """The logged iterations: a row for each, below a heading."""
+    names = ["step", "objective", "residual"]
+    rows = [
+        [entry.solver, *(step[name] for name in names)]
+        for entry in comparison.entries
+        for step in entry.steps
+    ]
+    return [["solver", *names], *rows]
+
+
 def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
     """Aligned lines for people."""
     rows = [_cells(row) for row in summary["compare"]]
     first = summary["compare"][0]
     lines, work = [], unit_of("duality_gap", units)
     if first["outcome"] == "answered":
-        words = ", ".join(f"{first[word]} {word}" for word in COUNTS if first[word])
-        lines.append(f"asperities         {words}")
+        counts = ", ".join(f"{first[status]} {status}" for status in COUNTS if first[status])
+        lines.append(f"asperities         {counts}")
     lines += [
         f"disagreement       with {first['solver']}, over the largest load, as is the load error",
         f"duality gap        {f'in {work}, ' if work else ''}from the loads alone",
@@ -61,11 +73,11 @@ def _cells(row: Summary) -> list[str]:
         return [row["solver"], row["outcome"], *["-"] * (len(HEADING) - 2)]
     error, largest, memory = row["load_error"], row["largest_load"], row["memory"]
     relative = error / largest if largest else (math.inf if error else 0.0)
-    different, undecided = row["different_words"], row["undecided"]
+    different, undecided = row["different_statuses"], row["undecided"]
     said = {None: "-", 0: "same"}.get(different, f"{different} differ")
-    words = f"{said}, {undecided} undecided" if undecided else said
+    statuses = f"{said}, {undecided} undecided" if undecided else said
     return [row["solver"], _two(row["disagreement"]), bound(relative), _two(row["duality_gap"]),
-            row["scope"], words, str(row["iterations"]), _two(row["seconds"]),
+            row["scope"], statuses, str(row["iterations"]), _two(row["seconds"]),
             "-" if memory is None else f"{memory / 1e6:.1f}"]  # fmt: skip
 
 
@@ -76,7 +88,7 @@ def comparison_warnings(summary: Summary) -> Iterator[str]:
     yield from (f"{it['solver']}: {it['outcome']}" for it in rows if it["outcome"] != "answered")
     answered = [row for row in rows if row["outcome"] == "answered"]
     if not any(row["scope"] != "none" and not row["undecided"] for row in answered):
-        yield "not certified: no answer has a proved word for every asperity"
+        yield "not certified: no answer has a proved status for every asperity"
 
 
 def _two(value: float) -> str:

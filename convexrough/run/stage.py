@@ -19,9 +19,8 @@ from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.plottable import Plottable
-from convexrough.record import Table as Tabular
-from convexrough.record import singular
-from convexrough.run.values import Table
+from convexrough.record import Table, singular
+from convexrough.run.values import FileTable
 from convexrough.tabular.columns import aligned
 from convexrough.tabular.units import UnitNames
 
@@ -34,7 +33,7 @@ Columns = dict[str, NDArray[Any]]
 Summary = dict[str, Any]
 
 #: Statuses of asperities; as keys, the number of asperities with that status.
-WORDS = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
+STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
 #: Physical dimension of each number, by name; all others have none.
 KINDS = {
@@ -51,7 +50,7 @@ KIND = {name: kind for kind, names in KINDS.items() for name in names}
 MOST_PRINTED = 20
 
 
-class Stage(Table):
+class Stage(FileTable):
     """A table of the scene file that asks for a result from a pressed contact, with its checks.
 
     name    : of the table;  frictional : it needs [friction]
@@ -86,8 +85,8 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """How many asperities have this word, or what a result, or its certificate, calls so."""
-    if name in WORDS:
+    """How many asperities have this status, or what a result, or its certificate, calls so."""
+    if name in STATUSES:
         return (found.status == name).sum(axis=-1)
     return getattr(found if hasattr(found, name) else found.certificate, name)
 
@@ -98,8 +97,8 @@ def numbers_of(found: Any, names: Sequence[str]) -> Summary:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Tabular, Plottable):
-    """What a stage found: the summary, tables, figures and words are all read off `rows`.
+class Result(Table, Plottable):
+    """What a stage found: the summary, tables, figures and printed lines are all read off `rows`.
 
     found : results of the package, one for each row, or one with arrays along steps
     """
@@ -135,7 +134,7 @@ class Result(Tabular, Plottable):
         """What keeps this from being certified, a line for each reason."""
         unsure = sum(1 for row in self.known if row.get("undecided"))
         if unsure:
-            yield f"not certified: {unsure} of the rows in {self.name} have undecided words"
+            yield f"not certified: {unsure} of the rows in {self.name} have undecided statuses"
 
     @property
     def certified(self) -> bool:
@@ -195,7 +194,7 @@ class Steps(Result):
         (found,) = self.found
         arrays = {singular(name): name for along in found._along.values() for name in along}
         return {
-            name: number(found, name) if name in WORDS else getattr(found, arrays[name])
+            name: number(found, name) if name in STATUSES else getattr(found, arrays[name])
             for name in self.stage.numbers
         }
 

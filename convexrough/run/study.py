@@ -18,13 +18,13 @@ from convexrough.influence import KINDS, Kind
 from convexrough.run.stage import Stage
 from convexrough.run.stages import STAGES, Normal
 from convexrough.run.values import (
+    FileTable,
     Mistake,
     NonNegative,
     Positive,
     Radius,
     Ratio,
     Switch,
-    Table,
     Text,
     TipRadius,
     Whole,
@@ -41,11 +41,11 @@ Geometry = Annotated[Literal["summit", "closest"], expected('"summit" or "closes
 Pattern = Annotated[Literal["hexagonal", "square"], expected('"hexagonal", "square" or "file"')]
 
 
-class Sphere(Table):
+class Sphere(FileTable):
     radius: Radius
 
 
-class Material(Table):
+class Material(FileTable):
     """Both bodies are of this."""
 
     alternatives = ("contact_modulus", "youngs_modulus")
@@ -55,13 +55,13 @@ class Material(Table):
     hardness: Positive | None = None
 
 
-class Body(Table):
+class Body(FileTable):
     youngs_modulus: Positive
     poisson_ratio: Ratio
     hardness: Positive | None = None
 
 
-class Bodies(Table):
+class Bodies(FileTable):
     """Two bodies that differ."""
 
     elsewhere = ("two bodies", frozenset(Material.model_fields))
@@ -69,7 +69,7 @@ class Bodies(Table):
     base: Body
 
 
-class Summits(Table):
+class Summits(FileTable):
     """Asperities from a file."""
 
     elsewhere = (
@@ -83,7 +83,7 @@ class Summits(Table):
     geometry: Geometry = "closest"
 
 
-class Lattice(Table):
+class Lattice(FileTable):
     """Asperities in a pattern."""
 
     needs: ClassVar[Mapping[str, str]] = {"height_std": "seed", "tip_radius_cv": "seed"}
@@ -98,18 +98,18 @@ class Lattice(Table):
     geometry: Geometry = "closest"
 
 
-class Friction(Table):
+class Friction(FileTable):
     coefficient: Positive
 
 
-class Solver(Table):
+class Solver(FileTable):
     name: Annotated[str, expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)] = "newton"
     influence: (
         Annotated[Kind, expected(f"one of: {', '.join(KINDS)}", KINDS.__contains__)] | None
     ) = None
 
 
-class Units(Table):
+class Units(FileTable):
     length: Text = ""
     force: Text = ""
     pressure: Text = ""
@@ -151,7 +151,7 @@ def _is_file(table: Any) -> str:
 
 
 #: Tables without which there is no scene.
-REQUIRED: dict[str, type[Table]] = {
+REQUIRED: dict[str, type[FileTable]] = {
     "sphere": Sphere,
     "material": Material,
     "asperities": Lattice,
@@ -159,7 +159,7 @@ REQUIRED: dict[str, type[Table]] = {
 }
 
 
-class Study(Table):
+class Study(FileTable):
     """All tables of a scene file; those of stages are added to it."""
 
     sphere: Sphere
@@ -258,7 +258,7 @@ def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
         return None, [_said(model, each) for each in errors]
 
 
-T = TypeVar("T", bound=Table)
+T = TypeVar("T", bound=FileTable)
 
 
 def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list[str]]:

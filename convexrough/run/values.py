@@ -90,7 +90,7 @@ Force = Annotated[
 ]
 
 
-class Table(BaseModel):
+class FileTable(BaseModel):
     """A table: numbers are finite, no text or truth value stands for one, no other keys."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
@@ -120,13 +120,13 @@ class Table(BaseModel):
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
         """Mistakes in which keys are given, whatever their values."""
-        words, others = cls.elsewhere
+        stage, others = cls.elsewhere
         for key in keys:
             if key in cls.model_fields:
                 continue
             meant = f'did you mean "{MEANT[key]}"?' if MEANT.get(key) in cls.model_fields else ""
             unknown = f"unknown key, {meant or nearest(key, cls.model_fields)}"
-            yield key, f"not used with {words}" if key in others else unknown
+            yield key, f"not used with {stage}" if key in others else unknown
         if cls.alternatives:
             given = [key for key in cls.alternatives if key in keys]
             if len(given) != 1:

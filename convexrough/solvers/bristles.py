@@ -44,7 +44,13 @@ from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.cone_boxes import TooDenseError
 from convexrough.solvers.newton import newton_step
-from convexrough.solvers.programs import Answer, QuadraticProgram, RawAnswer, Reduction, run_osqp
+from convexrough.solvers.programs import (
+    ProgramAnswer,
+    QuadraticProgram,
+    RawAnswer,
+    Reduction,
+    run_osqp,
+)
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
@@ -70,6 +76,7 @@ class BristleQP:
     newton_step : end with one Newton step, which squares the error and costs little
     tolerance   : OSQP's, absolute and relative, in the problem's units; polishing then solves the
         equations of the bristles in contact to rounding, where OSQP has found these
+    verbose     : print OSQP's own table of iterations
 
     Raises TooDenseError where the contact leaves the convex range, and SolverError where OSQP is
     missing or does not solve the program.
@@ -79,6 +86,7 @@ class BristleQP:
     newton_step: bool = True
     tolerance: float = 1e-6
     max_iterations: int = 20_000
+    verbose: bool = False
 
     def __post_init__(self) -> None:
         for name in ("bristles", "max_iterations"):
@@ -106,11 +114,11 @@ class BristleQP:
         return Solution.of(problem, loads, approach, iterations, refine=self.newton_step)
 
     def _run(self, program: QuadraticProgram) -> RawAnswer:
-        return run_osqp(program, self.name, self.tolerance, self.max_iterations)
+        return run_osqp(program, self.name, self.tolerance, self.max_iterations, self.verbose)
 
 
 @dataclass(frozen=True, eq=False)
-class BristleProgram(Reduction[QuadraticProgram, RawAnswer, Answer]):
+class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
     """The contact law as rows of bristles, in the variables P and e, row by row.
 
     m       : bristles of each row
@@ -159,7 +167,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, Answer]):
             upper=upper,
         )
 
-    def invert(self, raw: RawAnswer) -> Answer:
+    def invert(self, raw: RawAnswer) -> ProgramAnswer:
         """A bristle is in contact where h phi exceeds its multiplier.
 
         The sign of their difference is decided, where phi itself is 0 to the solver's accuracy
@@ -175,7 +183,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, Answer]):
         if len(beyond := np.flatnonzero(self.cut & (loads >= self.box))):
             ratios = problem.shells[beyond] / problem.stiffness(loads[beyond], beyond)
             raise TooDenseError(self.solver, problem.candidates[beyond], ratios, LARGEST_S)
-        return Answer(loads, approach, raw.iterations)
+        return ProgramAnswer(loads, approach, raw.iterations)
 
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:

@@ -21,7 +21,7 @@ from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.newton import newton_step
-from convexrough.solvers.programs import Answer
+from convexrough.solvers.programs import ProgramAnswer
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
@@ -69,7 +69,7 @@ class TooDenseError(InputError):
 
 
 @dataclass(frozen=True, eq=False)
-class Boxes:
+class ConeBoxes:
     """Which asperities are in a lifted program, in which boxes, tied by which cones.
 
     members : (m,) candidates in the program
@@ -87,7 +87,7 @@ class Boxes:
     limit: float
 
     @classmethod
-    def choose(cls, problem: NormalProblem, *, five: bool = False) -> Boxes:
+    def choose(cls, problem: NormalProblem, *, five: bool = False) -> ConeBoxes:
         """A little wider than the a priori bounds, and S_i not above what the form can do."""
         bounds = problem.bounds(problem.approach_bound)
         members = np.flatnonzero(bounds > NEGLIGIBLE * bounds.max())
@@ -142,7 +142,7 @@ class ConeSolver(ABC):
         """The name, but for the Newton step."""
 
     @abstractmethod
-    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
+    def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
         """What the solver makes of the program in these boxes, not yet judged."""
 
     @property
@@ -159,12 +159,12 @@ class ConeSolver(ABC):
         `start` is not used: cone solvers begin in the middle.
         """
         try:
-            return solve_in(self, problem, Boxes.choose(problem))
+            return solve_in(self, problem, ConeBoxes.choose(problem))
         except TooDenseError:
-            return solve_in(self, problem, Boxes.choose(problem, five=True))
+            return solve_in(self, problem, ConeBoxes.choose(problem, five=True))
 
 
-def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: Boxes) -> Solution:
+def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> Solution:
     """The answer of one form, if it is the solution of the contact law."""
     most = float(boxes.loads.sum())
     if problem.load is not None and most <= problem.load:  # no state in the boxes carries as much
@@ -173,7 +173,9 @@ def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: Boxes) -> Soluti
     return judged(solver, problem, boxes, solver.answer(problem, boxes))
 
 
-def judged(solver: ConeSolver, problem: NormalProblem, boxes: Boxes, answer: Answer) -> Solution:
+def judged(
+    solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes, answer: ProgramAnswer
+) -> Solution:
     """The answer as the solution of the contact law, if it is that; else the errors above.
 
     The sign of D - A P tells open asperities from lightly loaded ones ("What comes back").
@@ -208,7 +210,9 @@ def judged(solver: ConeSolver, problem: NormalProblem, boxes: Boxes, answer: Ans
     return Solution.of(problem, loads, approach, answer.iterations, refine=False)
 
 
-def _pressed_on(problem: NormalProblem, boxes: Boxes, loads: Array, indentation: Array) -> Array:
+def _pressed_on(
+    problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
+) -> Array:
     """(m,) contact radius over (pi/2) s_i that an asperity stopped by its box wants; else 0.
 
     What presses an asperity on and the room it has left, as parts of what it has in its box, are

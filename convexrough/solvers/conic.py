@@ -17,8 +17,14 @@ from convexrough import checks
 from convexrough.convex.cones import power_cones
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.cone_boxes import Boxes, ConeSolver
-from convexrough.solvers.programs import Answer, ConeProgram, RawAnswer, Reduction, run_clarabel
+from convexrough.solvers.cone_boxes import ConeBoxes, ConeSolver
+from convexrough.solvers.programs import (
+    ConeProgram,
+    ProgramAnswer,
+    RawAnswer,
+    Reduction,
+    run_clarabel,
+)
 
 #: From this many asperities on Clarabel's supernodal factorisation is the faster one.
 SUPERNODAL = 300
@@ -42,7 +48,7 @@ class Conic(ConeSolver):
     def formulation(self) -> str:
         return "conic"
 
-    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
+    def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
         """Clarabel's answer to the program in these boxes, not yet checked."""
         lifted = LiftedProgram.assemble(problem, boxes)
         raw = run_clarabel(
@@ -53,9 +59,9 @@ class Conic(ConeSolver):
             direct_solve_method="faer" if len(boxes.members) >= SUPERNODAL else "qdldl",
         )
         answer = lifted.invert(raw)
-        if raw.word not in STOPPED:
+        if raw.status not in STOPPED:
             raise SolverError(
-                f"clarabel stopped after {raw.iterations} steps with {raw.word}",
+                f"clarabel stopped after {raw.iterations} steps with {raw.status}",
                 solver=self.name,
                 advice="try more max_iterations, a larger tolerance, or Newton's method",
                 iterate=boxes.to_candidates(problem, answer.loads),
@@ -64,17 +70,17 @@ class Conic(ConeSolver):
 
 
 @dataclass(frozen=True, eq=False)
-class LiftedProgram(Reduction[ConeProgram, RawAnswer, Answer]):
+class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
     """The contact law in boxes (docs/theory/exact-cones.md, "The lifted program").
 
     The variables are p and then the lift, y2 to z (y1 to z), each a block of n.
     """
 
     problem: NormalProblem
-    boxes: Boxes
+    boxes: ConeBoxes
 
     @classmethod
-    def assemble(cls, problem: NormalProblem, boxes: Boxes) -> LiftedProgram:
+    def assemble(cls, problem: NormalProblem, boxes: ConeBoxes) -> LiftedProgram:
         n = len(boxes.members)
         checks.fits_in_memory("asperities of the cone program", n, 100, power=2)
         return cls(problem, boxes)
@@ -112,9 +118,9 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, Answer]):
         constant = np.concatenate((*right, power.constant))
         return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
 
-    def invert(self, raw: RawAnswer) -> Answer:
+    def invert(self, raw: RawAnswer) -> ProgramAnswer:
         """The program counts the approach from `approach_bound`: V'(L) = -multiplier."""
         approach = self.problem.approach
         if approach is None:
             approach = self.problem.approach_bound - float(raw.multipliers[0])
-        return Answer(raw.x[: len(self.boxes.members)], approach, raw.iterations)
+        return ProgramAnswer(raw.x[: len(self.boxes.members)], approach, raw.iterations)

@@ -16,8 +16,8 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.cone_boxes import Boxes, ConeSolver, judged
-from convexrough.solvers.programs import Answer, Reduction, load_library
+from convexrough.solvers.cone_boxes import ConeBoxes, ConeSolver, judged
+from convexrough.solvers.programs import ProgramAnswer, Reduction, load_library
 from convexrough.solvers.solution import Solution
 
 
@@ -62,10 +62,12 @@ class ConicCVXPY(ConeSolver):
         units; a solver not named in `OPTIONS` keeps its own
     max_iterations : of the solver; None for 200 of an interior-point method, 20,000 of SCS
     solver         : its name in CVXPY, in any case: `cvxpy.installed_solvers()`
+    verbose        : print what CVXPY and the solver say, with a table of iterations
     """
 
     max_iterations: int | None = None
     solver: str = "CLARABEL"
+    verbose: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -78,13 +80,13 @@ class ConicCVXPY(ConeSolver):
         default = self.solver == "CLARABEL"
         return "conic in CVXPY" if default else f"conic in CVXPY ({self.solver})"
 
-    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
+    def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
         """What the solver makes of the program in these boxes, not yet judged."""
         return LiftedModel.assemble(self, problem, boxes).answer()
 
     def model(self, problem: NormalProblem, *, five: bool = False) -> LiftedModel:
         """The program itself, with four cones or five: to read, to change, to solve again."""
-        return LiftedModel.assemble(self, problem, Boxes.choose(problem, five=five))
+        return LiftedModel.assemble(self, problem, ConeBoxes.choose(problem, five=five))
 
     def run(self, program: Any) -> Any:
         """A cvxpy.Problem, solved."""
@@ -97,7 +99,7 @@ class ConicCVXPY(ConeSolver):
         try:
             with warnings.catch_warnings():  # whether it is accurate is judged by the contact law
                 warnings.filterwarnings("ignore", message="Solution may be inaccurate")
-                program.solve(solver=self.solver, **options)
+                program.solve(solver=self.solver, verbose=self.verbose, **options)
         except cp.error.SolverError as error:
             what, advice = _missing(cp, self.solver) or (str(error), advice)
             raise SolverError(what, solver=self.name, advice=advice) from error
@@ -133,7 +135,7 @@ def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LiftedModel(Reduction[Any, Any, Answer]):
+class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
     """A compiled program: CVXPY objects, in the problem's own units.
 
     program  : cvxpy.Problem
@@ -145,7 +147,7 @@ class LiftedModel(Reduction[Any, Any, Answer]):
 
     settings: ConicCVXPY
     normal: NormalProblem
-    boxes: Boxes
+    boxes: ConeBoxes
     program: Any
     D0: Any
     p: Any
@@ -159,7 +161,7 @@ class LiftedModel(Reduction[Any, Any, Answer]):
         return f"LiftedModel: {asperities}, {sides}; `program` is the cvxpy.Problem"
 
     @classmethod
-    def assemble(cls, settings: ConicCVXPY, normal: NormalProblem, boxes: Boxes) -> LiftedModel:
+    def assemble(cls, settings: ConicCVXPY, normal: NormalProblem, boxes: ConeBoxes) -> LiftedModel:
         """Equation 1 of docs/theory/exact-cones.md; with five cones, 1 and 2."""
         cp = load_library("cvxpy", settings.name)
         i, n = boxes.members, len(boxes.members)
@@ -187,9 +189,9 @@ class LiftedModel(Reduction[Any, Any, Answer]):
     def apply(self) -> Any:
         return self.program
 
-    def invert(self, raw: Any) -> Answer:
+    def invert(self, raw: Any) -> ProgramAnswer:
         """CVXPY leaves its answer in its own variables."""
-        return Answer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
+        return ProgramAnswer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
 
     def solve(self, approach: float | None = None) -> Solution:
         """Solve, at another approach if given (own units; no larger than the boxes are made for).
@@ -205,7 +207,7 @@ class LiftedModel(Reduction[Any, Any, Answer]):
             normal = replace(normal, approach=approach)
         return judged(self.settings, normal, self.boxes, self.answer())
 
-    def answer(self) -> Answer:
+    def answer(self) -> ProgramAnswer:
         """Run the solver on the program as it stands."""
         return self.through(self.settings.run)
 

@@ -23,8 +23,7 @@ from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import refined_loads
-from convexrough.progress import LOGGER
-from convexrough.solvers.pressing import Pressed, Pressing, negligible, on_constraint
+from convexrough.solvers.pressing import Pressing, PressingState, negligible, on_constraint
 from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
@@ -89,7 +88,7 @@ class Newton:
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
     def _ended(
-        self, problem: NormalProblem, loads: Array, state: Pressed, iterations: int
+        self, problem: NormalProblem, loads: Array, state: PressingState, iterations: int
     ) -> Solution:
         """The answer; refined where the iteration ended as soon as what is left was linear."""
         if self._refines(problem):
@@ -107,21 +106,17 @@ class Newton:
         problem: NormalProblem,
         near: Indices,
         indentation: Array,
-    ) -> tuple[Pressed, int]:
+    ) -> tuple[PressingState, int]:
         """The solution of some of the candidates: all others carry nothing."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
-
-        def report(step: int, state: Pressed) -> None:
-            residual, touching = state.residual / state.scale, np.count_nonzero(state.forces)
-            LOGGER.info(f"step {step}, residual {residual:.1e}, {touching:,} touching")
 
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
             state = law.evaluate(indentation)
             if self._refines(problem):  # what is left then is linear
                 stopping = replace(stopping, linear=negligible(indentation))
-            return newton.solve(law, state, stopping, report=report)
+            return newton.solve(law, state, stopping)
         except SolverError as error:
             if error.iterate is not None:
                 error.iterate = among_zeros(error.iterate, near, len(problem))
@@ -147,7 +142,7 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
 
 
-def _everywhere(problem: NormalProblem, near: Indices, state: Pressed) -> tuple[Array, Array]:
+def _everywhere(problem: NormalProblem, near: Indices, state: PressingState) -> tuple[Array, Array]:
     """Loads and gaps of all candidates where those that are not near carry nothing."""
     loads = among_zeros(state.forces, near, len(problem))
     return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)

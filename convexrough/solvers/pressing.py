@@ -18,7 +18,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 NEGLIGIBLE = 88 * ROUNDOFF
 
 
-class Pressed(NamedTuple):
+class PressingState(NamedTuple):
     unknown: Array  # delta
     forces: Array  # P(delta)
     displacement: Array  # A P
@@ -43,7 +43,7 @@ class Pressing:
     solver: ClassVar[str] = "newton"
     unit: ClassVar[str] = "the approach"
 
-    def evaluate(self, unknown: Array) -> Pressed:
+    def evaluate(self, unknown: Array) -> PressingState:
         problem = self.problem
         indentation = np.maximum(on_constraint(problem, unknown), 0.0)
         ratio = indentation / problem.coefficients
@@ -64,7 +64,7 @@ class Pressing:
         displacement: Array,
         gap: Array,
         approach: float,
-    ) -> Pressed:
+    ) -> PressingState:
         energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
         if self.problem.load is not None:  # Phi has the gap less D0
             energy += approach * float(loads.sum())
@@ -72,7 +72,7 @@ class Pressing:
         touching = loads > 0
         unknown = np.where(touching, indentation, np.minimum(-gap, 0.0))
         defect = np.where(touching, gap, np.minimum(gap, 0.0))
-        return Pressed(
+        return PressingState(
             unknown,
             loads,
             displacement,
@@ -84,7 +84,7 @@ class Pressing:
             scale=abs(approach) + self.farthest,
         )
 
-    def direction(self, state: Pressed, left: float) -> Array:
+    def direction(self, state: PressingState, left: float) -> Array:
         loaded = state.forces > 0
         slopes = np.divide(1.5 * state.forces, state.unknown, out=state.forces * 0.0, where=loaded)
         return correct(
@@ -96,17 +96,17 @@ class Pressing:
             tolerance=left,
         )
 
-    def gradient(self, state: Pressed) -> Array:
+    def gradient(self, state: PressingState) -> Array:
         """The gap."""
         return state.gap
 
-    def energy_rounding(self, state: Pressed) -> float:
+    def energy_rounding(self, state: PressingState) -> float:
         return SAFETY * float(state.forces.sum()) * state.scale
 
-    def noise(self, state: Pressed) -> float:
+    def noise(self, state: PressingState) -> float:
         return self.problem.influence.rounding(state.forces).negligible(state.displacement)
 
-    def advice(self, state: Pressed) -> str:
+    def advice(self, state: PressingState) -> str:
         """By how crowded the contact is where it stopped."""
         number = self.problem.convexity_number(state.forces)
         if number < 1:

@@ -16,6 +16,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.errors import SolverError
+from convexrough.progress import log_step
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -115,10 +116,10 @@ class RawAnswer(NamedTuple):
     x: Array
     multipliers: Array  # of the rows of A
     iterations: int
-    word: str  # on how it ended
+    status: str  # on how it ended
 
 
-class Answer(NamedTuple):
+class ProgramAnswer(NamedTuple):
     """What a program says of a normal problem, not yet judged."""
 
     loads: Array  # of its members, in the problem's order and units
@@ -150,13 +151,26 @@ def run_clarabel(
         setattr(chosen, name, value)
     *data, equalities = program
     cones = [clarabel.ZeroConeT(equalities), *[clarabel.SecondOrderConeT(3)] * program.cones]
-    found = clarabel.DefaultSolver(*data, cones, chosen).solve()
+    method = clarabel.DefaultSolver(*data, cones, chosen)
+    method.set_termination_callback(_goes_on)
+    found = method.solve()
     raw = RawAnswer(np.array(found.x), np.array(found.z), int(found.iterations), str(found.status))
     return _of_numbers(raw, "Clarabel", solver)
 
 
+def _goes_on(info: Any) -> bool:
+    """Log a step of Clarabel, and do not stop it."""
+    residual = max(info.res_primal, info.res_dual, info.gap_rel)
+    log_step("clarabel", info.iterations, info.cost_primal, residual)
+    return False
+
+
 def run_osqp(
-    program: QuadraticProgram, solver: str, tolerance: float, max_iterations: int
+    program: QuadraticProgram,
+    solver: str,
+    tolerance: float,
+    max_iterations: int,
+    verbose: bool = False,
 ) -> RawAnswer:
     """OSQP, a first-order method that then solves the equations of the active set (polishing)."""
     osqp = load_library("osqp", solver)
@@ -167,7 +181,7 @@ def run_osqp(
     try:
         method.setup(
             *program,
-            verbose=False,
+            verbose=verbose,
             polishing=True,
             eps_abs=tolerance,
             eps_rel=tolerance,
@@ -191,7 +205,7 @@ def run_osqp(
 def _of_numbers(raw: RawAnswer, library: str, solver: str) -> RawAnswer:
     if not (np.isfinite(raw.x).all() and np.isfinite(raw.multipliers).all()):
         raise SolverError(
-            f"the answer of {library} is not a number, after {raw.iterations} steps ({raw.word})",
+            f"the answer of {library} is not a number, after {raw.iterations} steps ({raw.status})",
             solver=solver,
             advice="try a larger tolerance, or Newton's method",
         )

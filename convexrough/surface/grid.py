@@ -25,7 +25,7 @@ _LENGTH = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(\S*)")
 OFF_GRID = 0.05
 
 
-class Grid(NamedTuple):
+class HeightGrid(NamedTuple):
     """Heights as a file has them, holes as nan, and what it says of them; "" and None: nothing."""
 
     heights: Array
@@ -34,7 +34,7 @@ class Grid(NamedTuple):
     height_unit: str = ""
 
 
-def read_grid(path: Path) -> Grid:
+def read_grid(path: Path) -> HeightGrid:
     """A matrix of heights, a row of the map in each line; or columns x, y and height.
 
     Three columns are x, y and height, as no map is three pixels wide. A comment above a matrix may
@@ -88,7 +88,7 @@ def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array
     return np.array(rows)
 
 
-def _said(comments: Sequence[str], heights: Array) -> Grid:
+def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
     """The matrix, with what the comments say of its size and units."""
     said = {}
     for found in filter(None, map(_SAID.fullmatch, comments)):
@@ -96,15 +96,15 @@ def _said(comments: Sequence[str], heights: Array) -> Grid:
     sizes = [_LENGTH.fullmatch(said.get(name, "")) for name in ("width", "height")]
     value_unit = said.get("value unit", "")
     if sizes[0] is None or sizes[1] is None:
-        return Grid(heights, height_unit=value_unit)
+        return HeightGrid(heights, height_unit=value_unit)
     (width, unit_x), (height, unit_y) = (size.groups() for size in sizes if size)
     if unit_x != unit_y:
         raise InputError("units", found=f"{unit_x} and {unit_y}", expected="one along x and y")
     rows, columns = heights.shape
-    return Grid(heights, (float(width) / columns, float(height) / rows), unit_x, value_unit)
+    return HeightGrid(heights, (float(width) / columns, float(height) / rows), unit_x, value_unit)
 
 
-def _from_list(path: Path) -> Grid:
+def _from_list(path: Path) -> HeightGrid:
     """Columns x, y and height on a full or holed grid, in any order of the rows."""
     table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
                        also={"height": HEIGHTS}, holes=("height",),
@@ -122,7 +122,7 @@ def _from_list(path: Path) -> Grid:
     if len(np.unique(row * heights.shape[1] + column)) < len(z):
         raise InputError("x, y", found="a place twice", expected="each once", where=str(path))
     heights[row, column] = z
-    return Grid(heights, (dx, dy), units[0], units[2])
+    return HeightGrid(heights, (dx, dy), units[0], units[2])
 
 
 def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:

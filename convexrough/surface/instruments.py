@@ -9,12 +9,12 @@ from warnings import catch_warnings
 import numpy as np
 
 from convexrough.errors import FileError, InputError
-from convexrough.surface.grid import Grid
+from convexrough.surface.grid import HeightGrid
 
 
 def read_instrument(
     path: Path, pixel: float | tuple[float, float] | None, unit: str | None
-) -> Grid:
+) -> HeightGrid:
     """The first channel of heights of a file in any of the formats that SurfaceTopography knows.
 
     pixel, unit : for formats that do not hold them
@@ -52,4 +52,6 @@ def read_instrument(
             float(length) / count for length, count in zip(sizes, heights.shape, strict=True)
         )
     )
-    return Grid(heights.T.copy(), size, str(topography.unit or ""), str(topography.unit or ""))
+    return HeightGrid(
+        heights.T.copy(), size, str(topography.unit or ""), str(topography.unit or "")
+    )

@@ -169,11 +169,11 @@ def _pressed(summits: Summits, press: Press) -> tuple[int, int, str, float, floa
     except SolverError:
         unknown = float("nan")
         return 0, len(summits), "failed", unknown, unknown, unknown, unknown
-    words, proof = contact.status, contact.certificate
-    touching = np.count_nonzero(contact.loads if proof.scope == "none" else words == "contact")
+    statuses, proof = contact.status, contact.certificate
+    touching = np.count_nonzero(contact.loads if proof.scope == "none" else statuses == "contact")
     return (
         int(touching),
-        int(np.count_nonzero(words == "undecided")),
+        int(np.count_nonzero(statuses == "undecided")),
         proof.scope,
         contact.crowding,
         contact.model_error,

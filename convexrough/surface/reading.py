@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.surface.detrend import Trend
-from convexrough.surface.grid import Grid, read_grid
+from convexrough.surface.grid import HeightGrid, read_grid
 from convexrough.surface.holes import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import named_arrays, reading
@@ -69,7 +69,7 @@ def read(
 
 def _surface(
     path: Path,
-    grid: Grid,
+    grid: HeightGrid,
     pixel: float | tuple[float, float] | None,
     unit: str | None,
     height_unit: str | None,
@@ -124,7 +124,7 @@ def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
     return filled(heights), holes
 
 
-def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | None) -> Grid:
+def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | None) -> HeightGrid:
     """What is in a file, by its kind."""
     kind = path.suffix.lower()
     with reading(path):
@@ -137,11 +137,11 @@ def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | Non
         return read_instrument(path, pixel, unit)
 
 
-def _arrays(path: Path) -> Grid:
+def _arrays(path: Path) -> HeightGrid:
     """The map of a file of arrays."""
     named = {name: np.asarray(values) for name, values in named_arrays(path).items()}
     if "" in named:
-        return Grid(_numbers(named[""]))
+        return HeightGrid(_numbers(named[""]))
     maps = [name for name, values in named.items() if values.ndim == 2]
     chosen = next((name for name in HEIGHTS if name in named), maps[0] if len(maps) == 1 else None)
     if chosen is None:
@@ -149,8 +149,8 @@ def _arrays(path: Path) -> Grid:
         raise InputError("arrays", found=found, expected='one called "heights"', where=str(path))
     size = np.atleast_1d(named["pixel"]).tolist() if "pixel" in named else None
     both = None if size is None else checked_pixel(tuple(size) if len(size) > 1 else size[0])
-    words = [str(named[name]) if name in named else "" for name in ("unit", "height_unit")]
-    return Grid(_numbers(named[chosen]), both, *words)
+    units = [str(named[name]) if name in named else "" for name in ("unit", "height_unit")]
+    return HeightGrid(_numbers(named[chosen]), both, *units)
 
 
 def _numbers(values: NDArray[np.generic]) -> Array:

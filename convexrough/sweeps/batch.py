@@ -41,7 +41,7 @@ class Batch:
         return f"{self.numbers[0]} to {self.numbers[-1]}"
 
 
-class Rows(NamedTuple):
+class BatchRows(NamedTuple):
     """The rows of a batch, and the versions of the programs that computed them."""
 
     columns: Columns
@@ -55,7 +55,7 @@ def different(versions: Mapping[str, str]) -> str:
     return ", ".join(said)
 
 
-def compute(batch: Batch) -> Rows:
+def compute(batch: Batch) -> BatchRows:
     """The rows of a batch: each depends on its scene alone, and says why where that fails."""
     with one_thread:
         ask, asked, rows = batch.source.opened(), dict[int, Asked](), dict[int, Row]()
@@ -67,7 +67,7 @@ def compute(batch: Batch) -> Rows:
         known = measured_together(asked, batch.columns)
         for number, each in asked.items():
             rows[number] = _row(each, known.get(number), batch.columns)
-    return Rows(table(batch, [rows[number] for number in batch.numbers]), VERSIONS)
+    return BatchRows(table(batch, [rows[number] for number in batch.numbers]), VERSIONS)
 
 
 def _row(asked: Asked, known: tuple[Numbers, str] | None, columns: tuple[Column, ...]) -> Row:

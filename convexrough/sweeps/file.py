@@ -13,7 +13,7 @@ from convexrough.errors import SceneFileError
 from convexrough.run.scene_file import MOST_BYTES, digest, parsed
 from convexrough.run.study import Study, validate, validate_table
 from convexrough.run.tables import read_text
-from convexrough.run.values import Mistake, Table, expected
+from convexrough.run.values import FileTable, Mistake, expected
 from convexrough.sweeps.grid import Axis, Draw, Grid, Law
 from convexrough.sweeps.plan import Plan, planned
 from convexrough.sweeps.scenes import Tables
@@ -60,7 +60,7 @@ _Laws = Annotated[
 _KEYS = expected('a table of keys of the scene file, such as "asperities.height_std"')
 
 
-class Keys(Table):
+class Keys(FileTable):
     """The table [sweep]: what varies, and what is measured."""
 
     measure: _Names = Field(default_factory=list)

@@ -23,7 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from convexrough.errors import ExtraError, InputError, WorkerError
-from convexrough.sweeps.batch import VERSIONS, Batch, Columns, Rows, compute, different
+from convexrough.sweeps.batch import VERSIONS, Batch, BatchRows, Columns, compute, different
 from convexrough.threads import cores
 
 #: Batches that an executor is given at once; for each process here: more are lost with one.
@@ -53,7 +53,7 @@ def _together(
 ) -> Generator[Columns, None, list[Batch]]:
     """The rows of batches, in any order; and those whose workers died."""
     most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
-    pending: dict[Future[Rows], Batch] = {}
+    pending: dict[Future[BatchRows], Batch] = {}
     lost: list[Batch] = []
     try:
         while True:

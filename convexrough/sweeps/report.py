@@ -40,7 +40,7 @@ def describe(summary: Summary) -> list[str]:
     """Aligned lines."""
     it = summary["sweep"]
     lines = [("scenes", f"{it['scenes']:,}"), ("rows", f"{it['rows']:,}")]
-    lines += [(f"  {word}", f"{it[word]:,}") for word in ("certified", "undecided", "failed")]
+    lines += [(f"  {status}", f"{it[status]:,}") for status in ("certified", "undecided", "failed")]
     if "computed" in it:
         rate = it["computed"] / it["seconds"]
         said = f"{it['computed']:,} in {it['seconds']:,.0f} s, {rate:,.3g} a second"

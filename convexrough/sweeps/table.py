@@ -13,7 +13,7 @@ import numpy as np
 
 from convexrough import checks, frames
 from convexrough.errors import ExtraError, InputError
-from convexrough.record import Record, in_words
+from convexrough.record import Record, in_text
 from convexrough.sweeps.batch import Columns
 from convexrough.sweeps.folder import Folder, open_folder
 
@@ -122,11 +122,11 @@ class SweepTable(Record):
 
     def counts(self) -> dict[str, int]:
         """How many rows have each status."""
-        words = dict.fromkeys(("certified", "undecided", "failed"), 0)
+        counts = dict.fromkeys(("certified", "undecided", "failed"), 0)
         for block in self.blocks(["status"]):
-            for word in words:
-                words[word] += int(np.count_nonzero(block["status"] == word))
-        return words
+            for status in counts:
+                counts[status] += int(np.count_nonzero(block["status"] == status))
+        return counts
 
     def to_dataframe(self, columns: Sequence[str] | None = None) -> pandas.DataFrame:
         """A data frame of pandas, of some columns or all.
@@ -209,9 +209,9 @@ class SweepTable(Record):
     def _said(self, name: str) -> str:
         """A column in words, with its unit."""
         table, _, key = name.rpartition(".") if name in self.swept else ("", "", name)
-        words = (f"{table}: {key}" if table else key).replace("_", " ")
+        label = (f"{table}: {key}" if table else key).replace("_", " ")
         unit = self.manifest["units"].get(name, "")
-        return f"{words} ({unit})" if unit else words
+        return f"{label} ({unit})" if unit else label
 
     def _parts(self) -> list[range]:
         assert self.folder is not None  # or it is held
@@ -225,11 +225,11 @@ class SweepTable(Record):
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "rows", f"{len(self):,} of {self.scenes:,} scenes"
-        yield "status", ", ".join(f"{n:,} {word}" for word, n in self.counts().items() if n)
-        yield "swept", in_words(", ".join(self.swept))
-        yield "measured", in_words(", ".join(self.measured))
-        yield "source", in_words(self.manifest["source"])
-        yield "folder", in_words("none" if self.folder is None else self.folder.path)
+        yield "status", ", ".join(f"{n:,} {status}" for status, n in self.counts().items() if n)
+        yield "swept", in_text(", ".join(self.swept))
+        yield "measured", in_text(", ".join(self.measured))
+        yield "source", in_text(self.manifest["source"])
+        yield "folder", in_text("none" if self.folder is None else self.folder.path)
 
 
 def _frame(folder: Folder, names: Sequence[str], part: range) -> pandas.DataFrame:

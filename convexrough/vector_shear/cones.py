@@ -134,7 +134,7 @@ class FrictionConic:
                     total, scale * q, scale * displacement, scale * slips, state.iterations
                 )
         raise SolverError(
-            f"clarabel stopped after {raw.iterations} steps with {raw.word}, at an energy proved "
+            f"clarabel stopped after {raw.iterations} steps with {raw.status}, at an energy proved "
             f"to be within {gap:.3g} of the least, relatively, and a residual of {residual:.3g}; "
             f"accepted are {self.accepted:g} and {SLIPS * self.accepted:g}",
             solver=solver,

@@ -17,7 +17,7 @@ from convexrough.verdict.report import Verified
 from convexrough.verdict.verdict import verify_on
 
 #: What a file may call an asperity under shear. "undecided" claims nothing: then the force does.
-WORDS = ("sliding", "partial", "sticking", "open", "undecided")
+STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
 
 
 def verify_files(
@@ -57,8 +57,8 @@ def _claimed_to_slide(path: Path, forces: Claimed, contact: Contact) -> NDArray[
     if forces.status is None:
         return None
     said = np.char.lower(np.char.strip(forces.status))
-    if len(unknown := np.unique(said[~np.isin(said, WORDS)])):
-        valid = ", ".join(WORDS)
+    if len(unknown := np.unique(said[~np.isin(said, STATUSES)])):
+        valid = ", ".join(STATUSES)
         named = [repr(str(each)) for each in unknown[:10]]
         mistakes = [f"column status: found {each}, expected {valid}" for each in named]
         raise TableError(str(path), mistakes)

@@ -83,8 +83,8 @@ def allowed(loads: Array, gaps: Array) -> bool:
 CASES: list[tuple[int, ...]] = [(), (0,), (1,), (0, 1)]
 for case in CASES:
     loads, gaps = solve_case(case, D)
-    words = "allowed" if allowed(loads, gaps) else ""
-    print(f"touching {[i + 1 for i in case]!s:7} loads {loads}  gaps {gaps}  {words}")
+    label = "allowed" if allowed(loads, gaps) else ""
+    print(f"touching {[i + 1 for i in case]!s:7} loads {loads}  gaps {gaps}  {label}")
 
 answers = [solve_case(case, D)[0] for case in CASES if allowed(*solve_case(case, D))]
 assert len(answers) == 1
@@ -135,8 +135,8 @@ for (row, D2), (column, D1) in itertools.product(enumerate(asked), enumerate(ask
     held = [k for k, case in enumerate(CASES) if allowed(*solve_case(case, np.array([D1, D2])))]
     region[row, column] = held[0]
 right.contourf(asked, asked, region, [-0.5, 0.5, 1.5, 2.5, 3.5], cmap="Greys", alpha=0.6)
-for at, words in [((-0.3, -0.3), "none"), ((0.7, -0.1), "1 only"), ((-0.2, 0.7), "2 only")]:
-    right.text(*at, words, ha="center")
+for at, label in [((-0.3, -0.3), "none"), ((0.7, -0.1), "1 only"), ((-0.2, 0.7), "2 only")]:
+    right.text(*at, label, ha="center")
 right.text(0.75, 0.85, "both", ha="center", color="white")
 right.plot(*D, "ko", ms=8)
 right.set(xlabel="asked of 1: $D_1$ [length]", ylabel="asked of 2: $D_2$ [length]")

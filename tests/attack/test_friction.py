@@ -100,9 +100,9 @@ def test_no_false_word_near_gross_sliding() -> None:
     force = (1 - 1e-12) * 0.5 * contact.load
     assert Bristles(contact).to(np.linspace(0, 0.495 * contact.load, 401)[1:]).bent[1].min() > 0
     # The small one has turned and slides forward, as it does from here on.
-    words = cr.shear(contact, force=force).status
-    assert words[0] != "sliding"
-    assert words[1] != "partial"
+    statuses = cr.shear(contact, force=force).status
+    assert statuses[0] != "sliding"
+    assert statuses[1] != "partial"
 
 
 def test_no_false_word_of_given_forces() -> None:
@@ -110,8 +110,8 @@ def test_no_false_word_of_given_forces() -> None:
     force = 0.99 * 0.5 * contact.load
     true = Bristles(contact).to(np.linspace(0, force, 801)[1:])
     assert (np.abs(true.forces) < 0.999 * 0.5 * contact.loads).all()  # so both stick
-    words = cr.certify_shear(contact, cr.shear(contact, force=force).forces, force=force).status
-    assert (words != "sliding").all()
+    statuses = cr.certify_shear(contact, cr.shear(contact, force=force).forces, force=force).status
+    assert (statuses != "sliding").all()
 
 
 def test_no_slip_of_what_does_not_touch() -> None:

@@ -48,7 +48,7 @@ NO_LOADS: dict[str, Spoil] = {
     "one too many": lambda loads, rng: np.append(loads, 0.0),
     "huge": lambda loads, rng: loads * 1e300,
     "complex": lambda loads, rng: loads * (1 + 1j),
-    "words": lambda loads, rng: np.full(len(loads), "optimal"),
+    "statuses": lambda loads, rng: np.full(len(loads), "optimal"),
 }
 
 WRONG: dict[str, Spoil] = {
@@ -86,9 +86,9 @@ def test_wrong_loads_are_never_called_right(name: str, kind: str, control: Any) 
         proof = contact.certificate
         tally.compare("dense", "load", proof.load_errors, contact.loads, exact.loads)
         tally.compare("dense", "gap", proof.gap_errors, proof.gaps, exact.gaps)
-        for word, load, gap in zip(proof.status, exact.loads, exact.gaps, strict=True):
-            require(word != "contact" or load > 0, "contact of an open asperity")
-            require(word != "open" or gap > 0, "open of one that touches")
+        for status, load, gap in zip(proof.status, exact.loads, exact.gaps, strict=True):
+            require(status != "contact" or load > 0, "contact of an open asperity")
+            require(status != "open" or gap > 0, "open of one that touches")
 
 
 @pytest.mark.sample(4)

@@ -1,4 +1,4 @@
-"""The word audit: twenty-five fresh scenes by default, ten thousand with --full."""
+"""The status audit: ten fresh scenes by default, ten thousand with --full."""
 
 from dataclasses import replace
 from typing import Any
@@ -11,21 +11,21 @@ from status_audit import Wrong, audit, report
 import convexrough as cr
 
 
-def test_every_word_and_bound(pytestconfig: pytest.Config) -> None:
+def test_every_status_and_bound(pytestconfig: pytest.Config) -> None:
     first, full = 1_000_000 * pytestconfig.option.seed, pytestconfig.option.full
-    tally = audit(range(10_000) if full else range(first, first + 25))
+    tally = audit(range(10_000) if full else range(first, first + 10))
     if not full:
         return
     judged = tally.scenes - tally.refused - tally.unsolved
     assert judged > 0.75 * tally.scenes
-    assert {kind for kind, _, _ in tally.words} == {*status_audit.KINDS, "limit"}
+    assert {kind for kind, _, _ in tally.statuses} == {*status_audit.KINDS, "limit"}
     usual = [
         seen
-        for (kind, _, stage), seen in tally.words.items()
+        for (kind, _, stage), seen in tally.statuses.items()
         if kind in ("usual", "units") and stage != "vector"
     ]
-    words, undecided = np.sum(usual, axis=0)
-    assert undecided <= 0.01 * words
+    statuses, undecided = np.sum(usual, axis=0)
+    assert undecided <= 0.01 * statuses
     assert report(tally).count("|") > 100
 
 
@@ -43,16 +43,16 @@ def test_the_audit_finds_wrong_losses(monkeypatch: pytest.MonkeyPatch, kind: str
         audit(range(24))
 
 
-@pytest.mark.parametrize("kind", ["word", "load", "approach"])
+@pytest.mark.parametrize("kind", ["status", "load", "approach"])
 def test_the_audit_finds_what_is_wrong(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     press = cr.press
 
     def lying(*arguments: Any, **options: Any) -> cr.Contact:
         contact = press(*arguments, **options)
         proof = contact.certificate
-        if kind == "word":
-            words = np.where(proof.status == "contact", "open", proof.status)
-            proof = replace(proof, status=words)
+        if kind == "status":
+            statuses = np.where(proof.status == "contact", "open", proof.status)
+            proof = replace(proof, status=statuses)
         elif kind == "load":
             proof = replace(proof, load_errors=1e-4 * proof.load_errors)
         else:

@@ -15,7 +15,7 @@ import numpy as np
 import convexrough as cr
 
 a = cr.Asperities.hexagonal(
-    spacing=0.0006, tip_radius=0.005, within=0.0102, height_std=1e-6, seed=3
+    spacing=0.001, tip_radius=0.008, within=0.0102, height_std=1e-6, seed=3
 )
 contact = cr.press(
     cr.Scene(1.0, a, cr.Material(1.0, 0.3), 0.5), approach=5e-5, influence=sys.argv[1]
@@ -23,8 +23,8 @@ contact = cr.press(
 state = cr.shear(contact, force=0.25 * contact.load)
 np.savez(
     sys.argv[2], loads=contact.loads, load_errors=contact.certificate.load_errors,
-    words=contact.status, forces=state.forces, force_errors=state.certificate.force_errors,
-    shear_words=state.status,
+    statuses=contact.status, forces=state.forces, force_errors=state.certificate.force_errors,
+    shear_statuses=state.status,
 )
 """
 
@@ -46,5 +46,5 @@ def test_one_thread_and_two(tmp_path: Path, influence: str) -> None:
     for name in ("load", "force"):
         apart = np.abs(one[f"{name}s"] - two[f"{name}s"])
         assert (apart <= one[f"{name}_errors"] + two[f"{name}_errors"]).all()
-    assert (one["words"] == two["words"]).all()
-    assert (one["shear_words"] == two["shear_words"]).all()
+    assert (one["statuses"] == two["statuses"]).all()
+    assert (one["shear_statuses"] == two["shear_statuses"]).all()

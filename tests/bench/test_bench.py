@@ -10,7 +10,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from figure_checks import words
+from figure_checks import texts
 from matplotlib.text import Text
 
 import convexrough as cr
@@ -20,7 +20,7 @@ from convexrough.bench.measure import Attempt
 from convexrough.bench.profile import Profile, profile_of
 from convexrough.bench.reference import reference
 from convexrough.bench.rows import Bench, Row, better_than_default, exponent, frontier
-from convexrough.bench.scenes import APPROACH, REFINEMENTS, scene
+from convexrough.bench.scenes import APPROACH, scene
 from convexrough.solvers import BristleQP, Conic, Newton
 
 ROOT = Path(__file__).parent.parent.parent
@@ -60,12 +60,6 @@ def test_reference_against_50_digits(family: Any) -> None:
     assert found.error(found.loads * 1.001) == pytest.approx(1e-3, rel=1e-6)
 
 
-def test_loads_that_are_not_proved_are_no_reference(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("convexrough.bench.reference.ACCURATE", 1e-20)
-    with pytest.raises(cr.SolverError, match=r"reference: loads proved to .* only"):
-        reference(scene("lattice", 1.0), APPROACH)
-
-
 # What is measured, and what is said of it.
 
 
@@ -80,19 +74,6 @@ def test_rows_of_those_that_do_not_answer() -> None:
     ):
         row = measure.measure_attempt("lattice", each, attempt, None, 0.0)
         assert (row.outcome, message in row.message) == (outcome, True)
-
-
-@pytest.mark.parametrize("quick", [True, False])
-def test_attempts(quick: bool) -> None:
-    found = suite.attempts(quick)
-    assert len({(each.solver, each.setting) for each in found}) == len(found)
-    names = {type(each.settings).__name__ for each in found}
-    assert names == {"Newton", "Conic", "ConicCVXPY", "BristleQP"}
-
-
-@pytest.mark.parametrize("size", [61, 700, 8_400])
-def test_sizes_are_what_they_say(size: int) -> None:
-    assert len(scene("lattice", REFINEMENTS[size])) == pytest.approx(size, rel=0.05)
 
 
 def row(name: str, seconds: float, error: float, setting: str = "default") -> Row:
@@ -255,7 +236,7 @@ def test_figures() -> None:
             assert figure.bbox.padded(1).contains(box.x0, box.y0), text
             assert figure.bbox.padded(1).contains(box.x1, box.y1), text
     work = bench_figures(tiny())["work-precision"]
-    labels = {text.get_text() for text in words(work)}
+    labels = {text.get_text() for text in texts(work)}
     assert {"newton (default)", "conic", "bristles", "frontier", "seconds"} <= labels
     assert bench_figures(replace(tiny(), rows=()))
 
@@ -263,8 +244,8 @@ def test_figures() -> None:
 def test_a_performance_profile() -> None:
     """Parts of the cases by time over the least; nothing that is not right counts."""
     seconds = np.array([[1.0, 2.0, np.inf, np.inf], [4.0, 1.0, 3.0, np.inf]])
-    words = (("right", "right", "wrong", "failed"), ("right", "right", "right", "refused"))
-    found = Profile(("a", "b"), ("1", "2", "3", "4"), seconds, words)
+    texts = (("right", "right", "wrong", "failed"), ("right", "right", "right", "refused"))
+    found = Profile(("a", "b"), ("1", "2", "3", "4"), seconds, texts)
     assert found.part(1.0).tolist() == [0.25, 0.5]
     assert found.part(2.0).tolist() == [0.5, 0.5]
     assert found.part(4.0).tolist() == [0.5, 0.75]

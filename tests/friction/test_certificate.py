@@ -33,7 +33,7 @@ def test_an_asperity_that_nearly_touches_is_decided(fraction: float, ulps: int) 
 def test_at_the_limit_all_slide(control: str) -> None:
     """Q that is f P to rounding is f P: each asperity carries all that it can.
 
-    The highest still touches its partner at the level 0, so of it no word is proved.
+    The highest still touches its partner at the level 0, so of it no status is proved.
     """
     contact = pressed("paper", "dense", control)
     for off in (0.0, 1e-15, -1e-15):
@@ -43,7 +43,7 @@ def test_at_the_limit_all_slide(control: str) -> None:
         np.testing.assert_allclose(state.forces, FRICTION * contact.loads, rtol=1e-15)
         assert not state.stick_radii.any()
         assert state.certificate.order == "proved"
-        assert not state.certificate.holds  # as one word is open
+        assert not state.certificate.holds  # as one status is open
 
 
 def test_just_before_gross_sliding_the_last_one_sticks() -> None:
@@ -69,7 +69,7 @@ def test_a_crowded_contact_against_the_vector_program(fraction: float) -> None:
     assert (np.abs(state.forces - truth.forces[:, 0]) <= errors).all()
 
 
-def test_an_uncertified_contact_gets_no_word() -> None:
+def test_an_uncertified_contact_gets_no_status() -> None:
     scene, load = twins()
     contact = cr.press(scene, load=load)
     assert contact.certificate.scope == "none"

@@ -1,4 +1,4 @@
-"""Shear forces from anywhere: right ones are proved, wrong ones never get a wrong word or bound."""
+"""Shear forces from anywhere: right ones are proved, no wrong ones get a wrong status or bound."""
 
 from typing import Any
 
@@ -43,7 +43,7 @@ def spoiled(forces: Any, limits: Any, kind: str, rng: Any) -> Any:
 
 
 def assert_covers(judged: cr.ShearCertificate, forces: Any, truth: Any) -> None:
-    """No bound is too small and no word is wrong, by 80 digits."""
+    """No bound is too small and no status is wrong, by 80 digits."""
     for i, true in enumerate(truth.forces):
         assert off(forces[i], true) <= judged.force_errors[i]
         assert judged.status[i] != ("partial" if truth.slips[i] > 0 else "sliding")
@@ -70,7 +70,7 @@ def test_right_forces_are_proved(name: str, influence: Any, fraction: float) -> 
 @pytest.mark.parametrize("digits", [4, 6, 9])
 @pytest.mark.parametrize("fraction", [1e-6, 0.1, 0.35, 0.5, 0.9, 0.999])
 @pytest.mark.parametrize("name", NAMES)
-def test_few_digits_are_enough_for_the_words(name: str, fraction: float, digits: int) -> None:
+def test_few_digits_are_enough_for_the_statuses(name: str, fraction: float, digits: int) -> None:
     """And the bounds are of the size of what was rounded off."""
     contact, truth = pressed(name), exact(name, fraction)
     force = fraction * FRICTION * contact.load

@@ -1,4 +1,4 @@
-"""Many scenes at once against the same ones one by one: word by word, digit by digit."""
+"""Many scenes at once against the same ones one by one: status by status, digit by digit."""
 
 import pickle
 from dataclasses import replace

@@ -12,7 +12,7 @@ from scenes import random_scenes
 
 import convexrough as cr
 from convexrough.friction import conic_step
-from convexrough.friction.conic_pieces import Piece, pieces_of
+from convexrough.friction.conic_pieces import ConePiece, pieces_of
 from convexrough.friction.curve import MemoryCurve
 from convexrough.solvers.programs import RawAnswer
 
@@ -120,7 +120,7 @@ def test_the_pieces_cover_all_that_friction_bears() -> None:
     ends = np.array([piece.forces() for piece in pieces])
     assert ends.min() == pytest.approx(-1.0)
     assert ends.max() == pytest.approx(1.0)
-    assert isinstance(pieces[0], Piece)
+    assert isinstance(pieces[0], ConePiece)
 
 
 def test_gross_sliding_is_left_to_the_curve() -> None:

@@ -168,10 +168,10 @@ def test_random_scenes(drawn: tuple[cr.Scene, float], fraction: float, nu: float
     if (reduced.loads <= contact.loads).all():
         difference = FRICTION * (contact.loads - reduced.loads)
         assert_allclose(state.forces, difference, rtol=1e-9, atol=1e-11 * FRICTION * contact.load)
-        for i, word in enumerate(state.status):
-            if word == "sliding":
+        for i, status in enumerate(state.status):
+            if status == "sliding":
                 assert reduced.status[i] != "contact"
-            if word == "partial":
+            if status == "partial":
                 assert reduced.status[i] != "open"
 
 

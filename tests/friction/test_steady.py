@@ -38,8 +38,8 @@ def test_the_octagon() -> None:
     assert found.order == "proved"
     assert found.loss_error < 1e-10 * found.loss
     assert found.asperity_losses.sum() == pytest.approx(found.loss, rel=1e-3, abs=0.0)
-    words, counts = np.unique(found.status, return_counts=True)
-    assert dict(zip(words.tolist(), counts.tolist(), strict=True)) == {
+    statuses, counts = np.unique(found.status, return_counts=True)
+    assert dict(zip(statuses.tolist(), counts.tolist(), strict=True)) == {
         "intermittent": 6,
         "open": 24,
         "partial": 19,

@@ -12,7 +12,7 @@ import gallery_answers
 import multiprecision
 import numpy as np
 import pytest
-from gallery_answers import true_words
+from gallery_answers import true_statuses
 from scenes import operators, solve_exactly
 
 import convexrough as cr
@@ -67,10 +67,10 @@ def within(values: Any, digits: Any, bounds: Any) -> bool:
     )
 
 
-def true_shear_words(case: cr.gallery.HardCase, words: Any) -> bool:
+def true_shear_statuses(case: cr.gallery.HardCase, statuses: Any) -> bool:
     slides = np.array([each != "0" for each in case.slips])
     allowed = np.where(slides, "sliding", np.where(case.touching, "partial", "open"))
-    return bool(((words == allowed) | (words == "undecided")).all())
+    return bool(((statuses == allowed) | (statuses == "undecided")).all())
 
 
 @pytest.mark.sample(8)
@@ -115,10 +115,10 @@ def test_cases_are_as_near_as_their_names_say() -> None:
 
 @pytest.mark.sample(16)
 @each_operator
-def test_words_and_bounds_when_pressed(name: str, operator: Any) -> None:
+def test_statuses_and_bounds_when_pressed(name: str, operator: Any) -> None:
     case, contact = gallery.case(name), pressed(name, operator)
     proof = contact.certificate
-    assert true_words(case, contact.status)
+    assert true_statuses(case, contact.status)
     assert case.judge(contact.loads, floor=1e-12 * contact.loads.max()).error < 1e-12
     assert within(contact.loads, case.loads, proof.load_errors)
     assert within(proof.gaps, case.gaps, proof.gap_errors)
@@ -159,7 +159,7 @@ def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
         said = str(refused)
         assert re.search("residual of .* accepted", said)
         return
-    assert true_words(case, contact.status)
+    assert true_statuses(case, contact.status)
     assert within(contact.loads, case.loads, contact.certificate.load_errors)
     assert case.judge(contact.loads).error < SQUARED
 
@@ -176,7 +176,7 @@ def test_sheared_and_cycled(name: str) -> None:
         return
     proof = state.certificate
     assert case.judge_shear(state.forces).error < 1e-12
-    assert true_shear_words(case, state.status)
+    assert true_shear_statuses(case, state.status)
     assert within(state.forces, case.forces, proof.force_errors)
     assert within(state.slips, case.slips, proof.slip_errors)
     assert within(state.displacement, [case.displacement], proof.displacement_error)
@@ -194,7 +194,7 @@ def test_sheared_with_vectors(name: str) -> None:
     smooth = dataclasses.replace(scene, material=cr.Material(scene.material.contact_modulus, 0.0))
     state = cr.shear_vector(dataclasses.replace(contact, scene=smooth), force=case.shear_force)
     if case.forces:
-        assert true_shear_words(case, state.status)
+        assert true_shear_statuses(case, state.status)
         assert within(state.forces[:, 0], case.forces, state.certificate.force_errors)
 
 
@@ -272,7 +272,7 @@ def test_verify_is_not_fooled(name: str) -> None:
     loads = np.array([float(each) for each in case.loads])
     right = cr.verify(case.scene, loads, **case.control)
     assert right.holds
-    assert true_words(case, right.status)
+    assert true_statuses(case, right.status)
     least = int(np.argmin(np.where(case.touching, loads, np.inf)))
     forgotten = loads.copy()
     forgotten[least] = 0.0
@@ -288,7 +288,7 @@ def test_verify_is_not_fooled(name: str) -> None:
     for wrong in tries:
         verdict = cr.verify(case.scene, wrong, **case.control)
         assert not verdict.holds
-        assert true_words(case, verdict.status)
+        assert true_statuses(case, verdict.status)
 
 
 @pytest.mark.sample(4)
@@ -300,8 +300,8 @@ def test_proofs_are_accepted_or_refused(name: str) -> None:
         with pytest.raises(cr.ProofError):
             contact.proof()
         return
-    words = contact.proof().document["claims"]["status"]
-    assert true_words(case, np.array(words))
+    statuses = contact.proof().document["claims"]["status"]
+    assert true_statuses(case, np.array(statuses))
 
 
 def test_wrong_answers_are_judged_wrong() -> None:

@@ -11,7 +11,7 @@ import picos
 import pytest
 import qpsolvers
 import scs
-from gallery_answers import true_words
+from gallery_answers import true_statuses
 from picos.modeling.file_in import import_cbf
 from scipy import sparse
 
@@ -38,13 +38,13 @@ def index(pack: Path) -> Any:
 
 
 def judged(name: str, about: Any, x: Any, near: float) -> None:
-    """As the index says how, and by the certificate, whose words are held against the answer."""
+    """As the index says how, and by the certificate, whose statuses are held against the answer."""
     case = gallery.case(name)
     loads = np.zeros(len(case))
     members = about["asperities"]
     loads[members] = np.maximum(about["force_unit"] * np.array(x[: len(members)]), 0.0)
     assert case.judge(loads).error < near
-    assert true_words(case, cr.certify(case.scene, loads, **case.control).status)
+    assert true_statuses(case, cr.certify(case.scene, loads, **case.control).status)
 
 
 def program(index: Any, name: str, ending: str) -> Any:

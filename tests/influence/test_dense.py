@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import paper, rough, scattered
 
-from convexrough.influence import sliced_matrix
 from convexrough.influence.choice import couple
-from convexrough.influence.coupling import error_reach, inverse_distances
+from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.shells import shells
 from convexrough.numbers.pairs import Pair
@@ -108,22 +107,6 @@ def test_sums_are_known(
         assert found.radius.max() <= (1e-25 if kind == "uneven" else 1e-26) * most
 
 
-def test_sums_of_many_loads_and_of_many_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stack at once, and rows that are not kept: the same, to what is said of them."""
-    points = rough().contact_points
-    loads = np.random.default_rng(1).random((3, len(points)))
-    one = [DenseInfluence.assemble(points, 1.0).sums(Pair.exact(each)) for each in loads]
-    stack = DenseInfluence.assemble(points, 1.0).sums(Pair.exact(loads))
-    monkeypatch.setattr(sliced_matrix, "KEPT", 20)
-    few = DenseInfluence.assemble(points, 1.0).sums(Pair.exact(loads))
-    for k, each in enumerate(one):
-        for other in (stack[k], few[k]):
-            off = (each - other).size
-            assert (off <= 2.1 * (each.radius + other.radius)).all()
-            assert (other.radius < 1e-25 * other.value).all()
-    assert DenseInfluence.assemble(points[:0], 1.0).sums(Pair.exact(loads[0, :0])).shape == (0,)
-
-
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("made", [False, True])
 @pytest.mark.parametrize("count", [20, 61, 300, 700])
@@ -214,34 +197,6 @@ def test_elsewhere(geometry: Any) -> None:
         assert_allclose(coupling.falloff(loads, power), (rows / SCALE) ** power @ loads, rtol=1e-11)
         assert (coupling.falloff(loads, power) >= (rows / SCALE) ** power @ loads).all()
     assert len(operator.onto(others[:0]).apply(loads)) == 0
-
-
-def test_matrix_spread_and_falloff() -> None:
-    points = paper().contact_points
-    operator = DenseInfluence.assemble(points, SCALE)
-    loads = np.random.default_rng(1).random(len(points))
-    assert operator.name == "dense"
-    assert_allclose(operator.matrix, operator.matrix.T)
-    assert (np.diag(operator.matrix) == 0).all()
-    assert_allclose(error_reach(operator, SCALE, loads), np.sqrt(operator.matrix**2 @ loads))
-    inverse = inverse_distances(points, points)
-    for power in (2, 3):
-        sums = inverse**power @ loads
-        assert_allclose(operator.falloff(loads, power), sums, rtol=1e-12)
-        assert (operator.falloff(loads, power) >= sums).all()
-
-
-def test_among_some() -> None:
-    points = rough().contact_points
-    operator = DenseInfluence.assemble(points, SCALE, 1e-12)
-    which = np.array([7, 3, 88])
-    part = operator.restricted(which)
-    assert (part.matrix == operator.matrix[np.ix_(which, which)]).all()
-    assert (part.points == points[which]).all()
-    assert part.point_error == operator.point_error
-    assert part.entry_error == operator.entry_error
-    assert_allclose(part.separations(), DenseInfluence.assemble(points[which], 1).separations())
-    assert (part.separations() < DenseInfluence.assemble(points[which], 1).separations()).all()
 
 
 def test_crowding() -> None:

@@ -7,19 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 from extended import inverse_sums
-from flint import acb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-from scenes import paper, rough, steel
+from scenes import rough
 
-import convexrough as cr
-from convexrough.influence.convolution import Box, _pass_roundoffs
+from convexrough.influence.convolution import SiteBox
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
-from convexrough.influence.shells import fitted_shells, shells
+from convexrough.influence.shells import fitted_shells
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import SITE_ERROR, Lattice
 
@@ -91,14 +89,6 @@ def test_a_lattice_is_found(name: str, count: int, angle: float, shift: float, s
     assert len(np.unique(sites, axis=0)) == len(points)
 
 
-@pytest.mark.parametrize("scene", [paper(), rough(), steel(), paper("closest")])
-def test_named_scenes_are_on_lattices(scene: cr.Scene) -> None:
-    assert scene.lattice is not None
-    shrunk = 1.0 if scene.geometry == "summit" else 1 / 1.02
-    spacing = 25e-6 if scene.sphere_radius < 1 else 0.0025
-    assert scene.lattice.spacing == pytest.approx(spacing * shrunk, rel=1e-13)
-
-
 def test_unequal_tip_radii_move_contact_points_off_a_lattice() -> None:
     assert rough("closest").lattice is None
     assert rough("closest").asperities.lattice is not None
@@ -168,21 +158,6 @@ def test_what_is_no_lattice_is_refused() -> None:
         assert Lattice.through(np.outer(np.arange(9), line)) is None
     far = np.concatenate((points, [[1e5, 2e5]]))  # far too many sites for the points
     assert Lattice.through(far) is None
-
-
-def test_sites() -> None:
-    points = patch(np.array(BASES["hexagonal"]), 60) + np.array([3.0, 4.0])
-    lattice = Lattice.through(points)
-    assert lattice is not None
-    more = patch(np.array(BASES["hexagonal"]), 200) + np.array([3.0, 4.0])
-    sites = lattice.sites(more)
-    assert sites is not None
-    assert_allclose(lattice.origin + sites @ lattice.basis, more, atol=1e-13)
-    more[150, 0] += 1e-9
-    assert lattice.sites(more) is None
-    empty = lattice.sites(more[:0])
-    assert empty is not None
-    assert len(empty) == 0
 
 
 # Products.
@@ -277,20 +252,6 @@ def test_falloff(name: str, count: int) -> None:
     assert (A.falloff(np.zeros(count), 3) == 0).all()
 
 
-def test_the_matrix_is_the_dense_one() -> None:
-    points = patch(np.array(BASES["hexagonal"]), 90)
-    A, dense = operator(points), DenseInfluence.assemble(points, SCALE)
-    assert (A.matrix == dense.matrix).all()
-    assert A.entry_error >= dense.entry_error * (1 - 1e-12)
-    assert A.name == "lattice"
-    assert (A.separations() <= dense.separations()).all()
-    assert_allclose(A.separations(), dense.separations(), rtol=1e-12)
-    assert_allclose(shells(A), shells(dense), rtol=1e-12)
-    assert A.restricted(np.array([5])).separations() == np.inf
-    with pytest.raises(ValueError, match="off the lattice"):
-        LatticeInfluence.assemble(points + 0.1, A.lattice, SCALE)
-
-
 @settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from(sorted(BASES)),
@@ -332,35 +293,13 @@ def test_fitted_shells_do_not_overlap(
 # Rounding of the transforms.
 
 
-def test_passes_of_the_transforms() -> None:
-    """Each length's bound covers what is lost, in the 2-norm."""
-    from scipy import fft
-
-    def lost(found: Any, x: Any, inverse: bool = False) -> float:
-        with ctx.workprec(90):
-            exact = acb.dft([acb(complex(each)) for each in x], inverse)[: len(found)]
-            off = [complex(acb(complex(a)) - b) for a, b in zip(found, exact, strict=True)]
-            return float(np.linalg.norm(off) / np.linalg.norm([complex(each) for each in exact]))
-
-    rng = np.random.default_rng(0)
-    for length in [n for n in range(2, 1500) if fft.next_fast_len(n) == n][::9]:
-        bound = _pass_roundoffs(length) * ROUNDOFF
-        noise = rng.standard_normal(length) + 1j * rng.standard_normal(length)
-        smooth = np.exp(-(np.linspace(-3, 3, length) ** 2))
-        for x in (noise, smooth + 0j):
-            assert lost(fft.fft(x), x) <= bound
-            assert lost(fft.ifft(x), x, inverse=True) <= bound
-        for y in (noise.real, smooth):
-            assert lost(fft.rfft(y), y) <= bound
-
-
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (8, 1), (2, 3), (33, 47), (50, 31)])
 @pytest.mark.parametrize("power", [1, 2, 3])
 def test_convolutions(shape: tuple[int, int], power: int) -> None:
     """Also on a box of one row, or one site; and what they lose stays below the bounds."""
     basis = turned(BASES["hexagonal"], 0.4)
-    box = Box(shape, basis)
+    box = SiteBox(shape, basis)
     assert all(p >= 2 * n - 1 for p, n in zip(box.padded, shape, strict=True))
     sites = np.stack(np.unravel_index(np.arange(shape[0] * shape[1]), shape), axis=1) @ basis
     inverse = inverse_distances(sites, sites) ** power
@@ -384,41 +323,3 @@ def test_convolutions(shape: tuple[int, int], power: int) -> None:
 
 
 # The smoother.
-
-
-def roots(points: Array, kind: str) -> Array:
-    """W of contacts in the convex range, smooth or not, touching everywhere or not."""
-    rng = np.random.default_rng(3)
-    squares = (points**2).sum(axis=1)
-    smooth = np.sqrt(np.maximum(1.0 - squares / (0.8 * squares.max()), 0.0))
-    if kind != "smooth":
-        smooth = smooth * (rng.random(len(points)) < float(kind))
-    return np.sqrt(smooth)
-
-
-@pytest.mark.sample(4)
-@pytest.mark.parametrize("kind", ["smooth", "0.01", "0.05", "0.2", "0.5"])
-@pytest.mark.parametrize("scale", [0.4, 4.0])
-@pytest.mark.parametrize("name", BASES)
-def test_smoother(name: str, scale: float, kind: str) -> None:
-    """Symmetric and positive definite on the support of W, and zero elsewhere.
-
-    Also, for the greater scale, where I + W A W itself is not positive definite.
-    """
-    points = patch(np.array(BASES[name]), 400)
-    A, root = operator(points, scale), roots(points, kind)
-    root[5] = 0.7  # never without any contact
-    smooth = A.smoother(root)
-    support = np.flatnonzero(root)
-    columns = []
-    for i in support:
-        column, left = smooth(np.eye(400, dtype=np.float32)[i])
-        assert column.dtype == np.float32
-        assert left >= 0
-        assert (column[root == 0] == 0).all()
-        columns.append(column[support].astype(float))
-    anywhere = np.random.default_rng(0).random(400).astype(np.float32)
-    assert (smooth(anywhere)[0][root == 0] == 0).all()
-    matrix = np.array(columns)
-    assert_allclose(matrix, matrix.T, atol=1e-5)
-    assert np.linalg.eigvalsh((matrix + matrix.T) / 2).min() > 1e-3

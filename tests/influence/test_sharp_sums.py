@@ -26,7 +26,6 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
-from convexrough.roundoff import ROUNDOFF
 from convexrough.solvers import Newton
 
 Array = NDArray[np.float64]
@@ -83,25 +82,6 @@ def weight(place: float, node: int, order: int) -> Fraction:
         if other != node:
             result *= (Fraction(place) - other) / (node - other)
     return result
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("power", [1, 2, 3])
-@pytest.mark.parametrize("order", [4, 12, 26])
-def test_roundoffs_of_the_smooth_part(order: int, power: int) -> None:
-    """Of squares that are off by 4 roundoffs themselves; and of what is left to near pairs."""
-    kernel = Softened(power, order, 0.43)
-    rng = np.random.default_rng(order)
-    squares = (0.43 * np.append(rng.random(150), [1e-9, 0.1, 0.999])) ** 2
-    with ctx.workprec(300):
-        for off in (-4, 0, 4):
-            moved = squares * (1 + off * ROUNDOFF)
-            smooth, local = kernel.smooth(moved), kernel.local(moved)
-            for s, m, n in zip(squares.tolist(), smooth.tolist(), local.tolist(), strict=True):
-                true, plain = soft(kernel, Fraction(s)), 1 / arb(s).sqrt() ** power
-                assert abs(arb(m) - true) <= kernel.roundoffs * ROUNDOFF * true
-                allowed = kernel.beyond_roundoffs + kernel.roundoffs + 8
-                assert abs(arb(n) - (plain - true)) <= allowed * ROUNDOFF * plain
 
 
 @pytest.mark.sample(3)

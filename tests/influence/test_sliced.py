@@ -7,18 +7,16 @@ import multiprecision
 import numpy as np
 import pytest
 from flint import arb, ctx
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import convexrough as cr
-from convexrough.influence.convolution import Box, through_waves
+from convexrough.influence.convolution import SiteBox, through_waves
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.sliced import Distances, Sliced, cut
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
 from convexrough.numbers.balls import Ball
-from convexrough.numbers.pairs import Pair, two_sum
+from convexrough.numbers.pairs import Pair
 from convexrough.scene.lattice import Lattice
 
 Array = NDArray[np.float64]
@@ -77,26 +75,6 @@ def test_values_of_the_kernel(name: str, size: str, largest: int) -> None:
             assert abs(value - exact) <= arb(distances.error) * exact
 
 
-@settings(max_examples=100, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.integers(-5, 40), st.integers(1, 30), st.integers(2, 5))
-def test_slices(seed: int, bits: int, more: int, count: int) -> None:
-    """Whole numbers of few bits, which with the rest are the pair but for one rounding."""
-    high, low = two_sum(*np.random.default_rng(seed).uniform(-1, 1, (2, 9)) * [[1.0], [2.0**-54]])
-    slices = cut(Pair(high, low), bits, more, count)
-    for each in slices[:-1]:
-        assert (each == np.rint(each)).all()
-    for each in slices[1:]:
-        assert (np.abs(each) <= 2.0 ** (more - 1)).all()
-    for m in range(9):
-        total = sum(
-            Fraction(float(each[m])) / Fraction(2) ** (bits + s * more)
-            for s, each in enumerate(slices)
-        )
-        off = abs(total - Fraction(float(high[m])) - Fraction(float(low[m])))
-        last = Fraction(float(abs(slices[-1][m]))) / Fraction(2) ** (bits + (count - 1) * more)
-        assert off <= Fraction(2.0**-53) * last
-
-
 @pytest.mark.sample(8)
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("count", [2, 3, 4, 5])
@@ -104,7 +82,7 @@ def test_slices(seed: int, bits: int, more: int, count: int) -> None:
 def test_levels_are_exact(name: str, count: int, shape: tuple[int, int]) -> None:
     """Against long integers, bit for bit, with so much to spare that rounding is sure."""
     basis, unit = taken(name, "one")
-    box = Box(shape, basis / np.hypot(*basis[0]))
+    box = SiteBox(shape, basis / np.hypot(*basis[0]))
     distances = Distances.of(exactly(basis, unit), max(shape))
     sliced = Sliced.of(box, distances, box.kernel(1, np.float64).norm, unit, count)
     loads = Pair.exact(np.random.default_rng(1).random(shape[0] * shape[1]) ** 3)
@@ -154,7 +132,7 @@ def test_sums_against_ball_arithmetic(name: str, size: str, kind: str, count: in
     basis, unit = taken(name, size)
     shape = (17, 23)
     loads = loadings(kind, shape)
-    box = Box(shape, basis / np.hypot(*basis[0]))
+    box = SiteBox(shape, basis / np.hypot(*basis[0]))
     distances = Distances.of(exactly(basis, unit), max(shape))
     norm = box.kernel(1, np.float64).norm * unit / float(np.hypot(*basis[0]))
     sliced = Sliced.of(box, distances, norm, unit, count)
@@ -170,16 +148,6 @@ def test_sums_against_ball_arithmetic(name: str, size: str, kind: str, count: in
                     exact += (arb(float(loads.high[k])) + arb(float(loads.low[k]))) / r
             assert among(found, 23 * m + n).contains(exact)
     assert found.radius.max() < good * float(np.abs(loads.high).sum()) / unit
-
-
-def test_nothing_to_add_up() -> None:
-    basis, unit = taken("turned", "one")
-    distances = Distances.of(exactly(basis, unit), 4)
-    sliced = Sliced.of(Box((3, 4), basis), distances, 3.0, unit)
-    nothing = Pair.exact(np.zeros(12))
-    found = sliced.sums(nothing, np.arange(12), np.zeros(12), 0.0)
-    assert not found.value.any()
-    assert not found.radius.any()
 
 
 def perturbed(seed: int, count: int) -> Array:

@@ -79,16 +79,6 @@ def test_as_far_as_growing_step_by_step(
     assert bound == pytest.approx(highest_approach(scene, load), rel=1e-11)
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("k", [3.0, 6.0])
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
-def test_fine_lattices_as_growing_step_by_step(geometry: Any, k: float) -> None:
-    """Nearly a smooth sphere: no further than the first guess."""
-    make = maker(cr.Asperities.hexagonal, geometry, k)
-    scene, _ = all_that_could_touch(*make, 2e-7)
-    assert_same(scene, grown_step_by_step(make, 2e-7))
-
-
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("rough", ROUGHNESS)
 @pytest.mark.parametrize("load", [1e-9, 2e-7])

@@ -21,7 +21,7 @@ def pressed(base: Any) -> cr.Contact:
     )
 
 
-def words(figure: Any) -> str:
+def texts(figure: Any) -> str:
     return " ".join(text.get_text() for text in figure.findobj(lambda it: hasattr(it, "get_text")))
 
 
@@ -48,14 +48,14 @@ def test_an_ellipse_beside_the_contact() -> None:
         line for line in figures["pressure"].axes[1].lines if line.get_label() == "smooth ellipsoid"
     )
     assert_allclose(profile.get_xdata().max(), axes[0])
-    assert "smooth sphere" not in "".join(map(words, figures.values()))
+    assert "smooth sphere" not in "".join(map(texts, figures.values()))
 
 
 @pytest.mark.parametrize("base", [np.inf, (1.0, np.inf)])
 def test_no_smooth_reference(base: Any) -> None:
     contact = pressed(base)
     figures = all_figures(contact)
-    said = "".join(map(words, figures.values()))
+    said = "".join(map(texts, figures.values()))
     assert "smooth sphere" not in said
     assert "a_H" not in said
     assert "r_c" in said

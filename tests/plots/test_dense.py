@@ -40,7 +40,7 @@ def test_a_dense_stick_slip_map_is_a_mosaic() -> None:
     figure = plots.shear_figures([state])["stick_slip"]
     fits(figure)
     (axes,) = figure.axes
-    assert not any(discs(axes, word) for word in ("sliding", "stick", "partial"))
+    assert not any(discs(axes, status) for status in ("sliding", "stick", "partial"))
     (image,) = axes.images
     colours = np.asarray(image.get_array())
     shown = colours[..., 3] > 0.5
@@ -55,8 +55,8 @@ def test_a_dense_profile_is_density_and_median() -> None:
     for figure in figures.values():
         fits(figure)
     _, profile, _ = figures["pressure"].axes
-    words = {line.get_label() for line in profile.lines}
-    assert words == {"their median", "smooth sphere"}
+    texts = {line.get_label() for line in profile.lines}
+    assert texts == {"their median", "smooth sphere"}
     (axes,) = figures["loads"].axes
     (median,) = [line for line in axes.lines if line.get_label() == "their median"]
     r, share = (np.asarray(v, dtype=float) for v in median.get_data())

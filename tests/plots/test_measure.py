@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figure_checks import fits, words
+from figure_checks import fits, texts
 from matplotlib.figure import Figure
 
 import convexrough as cr
@@ -86,7 +86,7 @@ def test_fretting_is_drawn_with_units() -> None:
     worn = cr.fretting(cycle)
     figure = plots.fretting_figures(worn, length_unit="mm", force_unit="N")["fretting"]
     fits(figure)
-    said = " ".join(text.get_text() for text in words(figure))
+    said = " ".join(text.get_text() for text in texts(figure))
     for unit in ("nm]", "nJ]", "GPa]"):
         assert unit in said, said
     assert worn.plot().get_title(loc="left") == "slip amplitude at the rim"
@@ -109,5 +109,5 @@ def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("form", "dpi"), [("eps", 200), ("png", 601), ("png", 10)])
 def test_other_formats_are_refused(tmp_path: Path, form: str, dpi: Any) -> None:
-    with pytest.raises(cr.InputError, match=r"formats|dpi"):
+    with pytest.raises(cr.InputError, match=r"form|dpi"):
         plots.save(Figure(), tmp_path / "a", form, dpi)

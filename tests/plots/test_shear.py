@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figure_checks import discs, fits, words
+from figure_checks import discs, fits, texts
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
@@ -94,7 +94,7 @@ def test_figures_of_the_paper_fit_to_print(name: str) -> None:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["paper", "rough"])
-def test_a_disc_for_every_word(name: str) -> None:
+def test_a_disc_for_every_status(name: str) -> None:
     shown = states(name, [0.1, 0.37, 0.5, 0.7])
     figure = plots.shear_figures(shown)["stick_slip"]
     for axes, state in zip(figure.axes, shown, strict=True):
@@ -145,19 +145,6 @@ def test_drawn_loops_close_on_the_loss(maximum: float, minimum: float) -> None:
         x, q = np.asarray(line.get_data(), dtype=float)
         assert_allclose([x[0], q[0]], [x[-1], q[-1]], atol=1e-12)
         assert np.trapezoid(q, x) == pytest.approx(unit * loss, rel=2e-3)
-
-
-def test_chosen_asperities_are_named_by_distance() -> None:
-    cycles = steady("paper", [0.5, 0.3])
-    legend: Any = plots.cycle_figures(cycles)["hysteresis"].axes[2].get_legend()
-    names = [text.get_text() for text in legend.get_texts()]
-    assert names == ["0", "0.386", "0.669", "0.773", "1.02", "1.16"]
-    figures = plots.cycle_figures(cycles, asperities=[0, 36])
-    single = figures["hysteresis"].axes[2]
-    assert single.get_title(loc="left") == "asperities, $Q/(fP)$ = ±0.5"  # the widest
-    force = np.asarray(single.lines[1].get_ydata(), dtype=float)
-    assert_allclose([force.max(), force.min()], [1, -1], rtol=1e-12)  # ring A slides
-    assert np.asarray(single.lines[0].get_ydata(), dtype=float).max() < 0.5
 
 
 def test_the_loss_is_that_of_the_cycles() -> None:
@@ -224,19 +211,6 @@ def test_the_traction_drawn_is_the_field() -> None:
     assert_allclose(q[slipping], fp[slipping], rtol=1e-9)
 
 
-def test_each_ring_stops_where_it_slides() -> None:
-    left, right = of_paper("paper")["fig7_asperities"].axes
-    onsets = cr.onset_of_sliding(contact("paper")) / limit("paper")
-    loads = contact("paper").loads / contact("paper").load
-    dots = [line for line in left.lines if line.get_label() == "_onset"]
-    at = np.array([np.asarray(dot.get_data(), dtype=float).ravel() for dot in dots])
-    firsts = [0, 1, 7, 13, 19, 31]
-    assert_allclose(at[:, 0], onsets[firsts], rtol=1e-12)
-    assert_allclose(at[:, 1], 100 * loads[firsts], rtol=1e-6)
-    assert [text.get_text() for text in left.texts] == list("ABCDEF")
-    assert [text.get_text() for text in right.texts] == list("FEDCBA")
-
-
 def test_the_crossing_is_marked_where_it_is() -> None:
     _, zoom = of_paper("paper")["fig9_energy"].axes
     (mark,) = [line for line in zoom.lines if line.get_label() == "_crossing"]
@@ -264,5 +238,5 @@ def test_no_contact_is_said() -> None:
     )
     assert len(figures) == 10
     for figure in figures.values():
-        assert "no contact" in {text.get_text() for text in words(figure)}
+        assert "no contact" in {text.get_text() for text in texts(figure)}
         fits(figure)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from figure_checks import discs, fits, words
+from figure_checks import discs, fits, texts
 from numpy.testing import assert_allclose
 from scenes import MATERIAL
 
@@ -18,7 +18,7 @@ def press(asperities: cr.Asperities, load: float = 300.0) -> cr.Contact:
 
 
 def said(figure: object) -> set[str]:
-    return {text.get_text() for text in words(figure)}  # type: ignore[arg-type]
+    return {text.get_text() for text in texts(figure)}  # type: ignore[arg-type]
 
 
 @pytest.mark.sample(1)

@@ -55,13 +55,13 @@ def honest() -> list[Any]:
     documents.append(by_cholesky)
     assert {document["argument"]["shells"] is None for document in documents} == {True, False}
     assert {document["claims"]["scope"] for document in documents} == {"global", "local"}
-    words = {word for document in documents for word in words_of(document["claims"])}
-    assert words == {"contact", "open", "undecided", "sliding", "partial"}
+    statuses = {status for document in documents for status in statuses_in(document["claims"])}
+    assert statuses == {"contact", "open", "undecided", "sliding", "partial"}
     return documents
 
 
-def words_of(claims: Any) -> set[str]:
-    return {word for table in (claims, *claims["shear"]) for word in table["status"]}
+def statuses_in(claims: Any) -> set[str]:
+    return {status for table in (claims, *claims["shear"]) for status in table["status"]}
 
 
 def grazing() -> cr.Contact:
@@ -148,17 +148,18 @@ def tighter_bound(rng: random.Random, document: Any) -> Any:
     return document
 
 
-def one_word(rng: random.Random, document: Any) -> Any:
-    words = ("contact", "open", "undecided", "sliding", "partial", "global", "local", *ORDERS, "")
+def one_status(rng: random.Random, document: Any) -> Any:
+    statuses = ("contact", "open", "undecided", "sliding", "partial")
+    claimed = (*statuses, "global", "local", *ORDERS, "")
     claims = document["claims"]
-    path = rng.choice([p for p in leaves(claims) if look(claims, p) in words])
-    put(claims, path, rng.choice(words))
+    path = rng.choice([p for p in leaves(claims) if look(claims, p) in claimed])
+    put(claims, path, rng.choice(claimed))
     return document
 
 
-def several_words(rng: random.Random, document: Any) -> Any:
-    words = document["claims"]["status"]
-    rng.shuffle(words)
+def several_statuses(rng: random.Random, document: Any) -> Any:
+    statuses = document["claims"]["status"]
+    rng.shuffle(statuses)
     return document
 
 
@@ -271,8 +272,8 @@ FORGED: tuple[Forgery, ...] = (
     one_number,
     one_claim,
     tighter_bound,
-    one_word,
-    several_words,
+    one_status,
+    several_statuses,
     swapped_scene,
     changed_scene,
     changed_control,

@@ -60,7 +60,7 @@ def test_friction_states_and_losses_are_proved(name: str) -> None:
 
 
 def test_random_scenes() -> None:
-    """Where there is a certificate there is a proof, and no word of it is lost."""
+    """Where there is a certificate there is a proof, and no status of it is lost."""
     proved = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
@@ -74,7 +74,7 @@ def test_random_scenes() -> None:
                 continue
             try:
                 proof = contact.proof()
-            except cr.ProofError:  # the certificate alone has a word for crowded contacts
+            except cr.ProofError:  # the certificate alone has a status for crowded contacts
                 assert contact.certificate.fixed_open or contact.crowding > 1
                 continue
             claims = judged(proof)
@@ -131,7 +131,7 @@ def test_nothing_touches() -> None:
 
 
 def test_crowded_contacts_are_proved_with_others_held_open() -> None:
-    """Where the certificate has a word there is a proof, by shells that overlap or by Cholesky."""
+    """Where the certificate has a status there is a proof, by overlapping shells or by Cholesky."""
     for drawn in ((9, 12, 3.0, 0.5), (2, 40, 2.5, 0.3), (9, 12, 4.0, 0.0)):
         scene, approach = scenes.scattered(*drawn)
         contact = cr.press(scene, approach=approach)

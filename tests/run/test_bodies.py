@@ -153,19 +153,3 @@ def test_the_slider_page_is_of_spheres(command: Any, tmp_path: Path) -> None:
     outcome = command("run", "scene.toml", "--no-figures", "--html")
     assert "slider page: found a flat base, expected a scene whose base is a sphere" in outcome.err
     assert outcome.status == 2
-
-
-def test_losses_against_phase_beside_a_smooth_ellipsoid_or_none() -> None:
-    from scenes import MATERIAL, paper
-
-    array = paper().asperities
-
-    def losses(base: Any, **more: Any) -> Any:
-        scene = cr.Scene(base, array, MATERIAL, friction=0.5, geometry="summit")
-        swing: Any = dict(load_amplitude=6e-8, force_amplitude=2e-8, phases=[1.0], chords=6)
-        return cr.phase_losses(scene, load=3e-7, **swing)
-
-    assert (losses((1.0, 2.0)).smooth > 0).all()
-    flat = losses(INF)
-    assert (flat.losses > 0).all()
-    assert (flat.smooth != flat.smooth).all()  # no number

@@ -39,18 +39,6 @@ def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
     assert command("new", "no/such/folder.toml").status == 2
 
 
-def test_what_new_comments_out_is_valid_too(command: Any, tmp_path: Path) -> None:
-    command("new", "new.toml")
-    text = (tmp_path / "new.toml").read_text()
-    tables = text[text.index("# [units]") :]
-    active = "\n".join(line.removeprefix("# ") for line in tables.splitlines())
-    rough = re.sub(r"^# (height_std|tip_radius_cv|seed|within|hardness)", r"\1", text, flags=re.M)
-    (tmp_path / "all.toml").write_text(rough.replace(tables, active))
-    outcome = command("run", "all.toml", "--no-figures")
-    assert outcome.status == 0
-    assert "approach          5e-05 mm\n" in outcome.out
-
-
 def test_json_is_one_object_and_the_summary(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + "within = 0.0102"))
     ran = command("run", "a.toml", "--json", "--no-figures", "--out", "deep/er")
@@ -383,3 +371,15 @@ def test_usage_errors(command: Any, arguments: tuple[str, ...]) -> None:
     outcome = command(*arguments)
     assert (outcome.status, outcome.out) == (2, "")
     assert "Usage: convexrough" in outcome.err
+
+
+def test_what_new_comments_out_is_valid_too(command: Any, tmp_path: Path) -> None:
+    command("new", "new.toml")
+    text = (tmp_path / "new.toml").read_text()
+    tables = text[text.index("# [units]") :]
+    active = "\n".join(line.removeprefix("# ") for line in tables.splitlines())
+    rough = re.sub(r"^# (height_std|tip_radius_cv|seed|within|hardness)", r"\1", text, flags=re.M)
+    (tmp_path / "all.toml").write_text(rough.replace(tables, active))
+    outcome = command("run", "all.toml", "--no-figures")
+    assert outcome.status == 0
+    assert "approach          5e-05 mm\n" in outcome.out

@@ -188,14 +188,6 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
     ]
 
 
-def test_a_list_of_tip_radii_of_the_wrong_length(tmp_path: Path) -> None:
-    text = HEXAGONAL.replace("0.02", "[0.02, 0.03]") + "within = 0.003"
-    (line,) = mistakes(tmp_path, text)
-    assert line == "[asperities] tip_radius: found shape (2,), expected 7 values, one per asperity"
-    (line,) = mistakes(tmp_path, HEXAGONAL.replace("0.02", "[0.02]"), "load = 1e-8")
-    assert line.startswith("[asperities] within: missing")
-
-
 def test_an_endless_lattice_is_counted_not_built(tmp_path: Path) -> None:
     (line,) = mistakes(tmp_path, HEXAGONAL.replace("0.0025", "1e-9"))
     assert line.startswith("[asperities] spacing: found 3.63e+14 asperities")
@@ -244,16 +236,6 @@ def test_the_default_within_loses_no_asperity(
     assert not far.loads[n:].any()
 
 
-def test_the_default_within_reaches_as_far_as_the_tallest_asperity_could(tmp_path: Path) -> None:
-    rough = "height_std = 4e-6\ntip_radius_cv = 0.5\nseed = 5"
-    file = read(tmp_path, HEXAGONAL.replace("summit", "closest") + rough, "approach = 2e-5")
-    width = np.sqrt(np.log1p(0.5**2))
-    tip_radius = 0.02 * np.exp(6 * width - width**2 / 2)  # the largest that is drawn
-    within = np.sqrt(2 * (1 + tip_radius) * (2e-5 + 6 * 4e-6))
-    expected = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within)
-    assert np.array_equal(file.scene.asperities.positions, expected.positions)
-
-
 # Results
 
 
@@ -279,18 +261,6 @@ def test_results_read_back_the_same(tmp_path: Path, contact: cr.Contact) -> None
     normal = json.loads((tmp_path / "summary.json").read_text())["normal"]
     assert normal["contact"] == int((contact.status == "contact").sum())
     assert normal["certificate"]["load_error"] == contact.certificate.load_error
-
-
-def test_many_asperities_go_to_npz(
-    tmp_path: Path, contact: cr.Contact, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(results, "MOST_CSV_ROWS", len(contact.loads) - 1)
-    assert written(tmp_path, contact) == ["summary.json", "asperities.npz"]
-    path = tmp_path / "asperities.npz"
-    with np.load(path) as arrays:
-        assert tuple(arrays) == COLUMNS
-        assert arrays["status"].tolist() == contact.status.tolist()
-    assert np.array_equal(read_loads(path, contact.scene, Manner()).values, contact.loads)
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -354,3 +324,15 @@ def test_a_folder_is_claimed_before_computing(tmp_path: Path) -> None:
 def test_json_has_no_infinities() -> None:
     summary: Any = {"a": {"b": [1.0, float("inf")]}, "c": float("nan"), "d": -float("inf")}
     assert json.loads(to_json(summary)) == {"a": {"b": [1.0, None]}, "c": None, "d": None}
+
+
+def test_many_asperities_go_to_npz(
+    tmp_path: Path, contact: cr.Contact, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(results, "MOST_CSV_ROWS", len(contact.loads) - 1)
+    assert written(tmp_path, contact) == ["summary.json", "asperities.npz"]
+    path = tmp_path / "asperities.npz"
+    with np.load(path) as arrays:
+        assert tuple(arrays) == COLUMNS
+        assert arrays["status"].tolist() == contact.status.tolist()
+    assert np.array_equal(read_loads(path, contact.scene, Manner()).values, contact.loads)

@@ -44,8 +44,8 @@ def test_a_run(command: Any) -> None:
         rows = list(csv.DictReader(file))
     assert [float(row["loss"]) for row in rows] == summary["path"]["loss"]
     with Path("out/path_asperities.csv").open() as file:
-        words = [row["status"] for row in csv.DictReader(file)]
-    assert (len(words), words.count("sliding")) == (4 * 61, 18)
+        statuses = [row["status"] for row in csv.DictReader(file)]
+    assert (len(statuses), statuses.count("sliding")) == (4 * 61, 18)
     for name in ("steady", "shakedown"):
         with Path(f"out/{name}.csv").open() as file:
             assert len(list(csv.DictReader(file))) == 61
@@ -173,19 +173,3 @@ def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
             doubtful = replace(result, found=tuple(several))
             assert not doubtful.certified
             assert f"[{result.name}]" in " ".join(doubtful.doubts())
-
-
-def test_losses_against_phase(command: Any) -> None:
-    asked = "chords = 12 }\nphases = [0.0, 1.2]\nfactors = [0.5, 1.0]"
-    Path("scene.toml").write_text(SCENE + PATHS.replace("chords = 12 }", asked))
-    outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
-    assert outcome.status == 0, outcome.err
-    assert "loss against phase" in outcome.out
-    summary = json.loads(Path("out/summary.json").read_text())["steady"]["phase_losses"]
-    with Path("out/phase_losses.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert [float(row["loss"]) for row in rows] == summary["loss"]
-    assert [float(row["factor"]) for row in rows] == [0.5, 0.5, 1.0, 1.0]
-    assert all(float(row["loss_error"]) >= 0 for row in rows)
-    steady = json.loads(Path("out/summary.json").read_text())["steady"]["loss"]
-    assert summary["loss"][2] == pytest.approx(steady, rel=1e-12, abs=0.0)  # the ellipse itself

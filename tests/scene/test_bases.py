@@ -42,14 +42,6 @@ def test_two_equal_radii_are_a_sphere() -> None:
     )  # type: ignore[arg-type]
 
 
-@each_geometry
-def test_nearly_equal_radii_are_nearly_a_sphere(geometry: Any) -> None:
-    """Only what is summed by axes differs."""
-    sphere, other = (cr.press(on(R, geometry), load=3e-7) for R in (1.0, (1.0, 1.0 + 1e-12)))
-    assert_allclose(other.loads, sphere.loads, rtol=1e-9)
-    assert other.approach == pytest.approx(sphere.approach, rel=1e-11)
-
-
 @pytest.mark.parametrize("base", [0.9, (0.7, 3.0), (INF, 0.4), INF])
 def test_closest_points_by_minimisation(base: Any) -> None:
     """The contact point and drop of "closest" minimise the gap of the two paraboloids."""

@@ -34,12 +34,6 @@ def test_hexagonal_lattice() -> None:
     assert ((apart < 0.5001).sum(axis=0)[:7] == 6).all()
 
 
-def test_square_lattice() -> None:
-    lattice = cr.Asperities.square(spacing=2.0, tip_radius=1, within=4.0)
-    assert len(lattice) == 13
-    assert {tuple(p) for p in lattice.positions} >= {(0, 0), (4, 0), (-2, 2), (0, -4)}
-
-
 @pytest.mark.parametrize("pattern", [cr.Asperities.hexagonal, cr.Asperities.square])
 @pytest.mark.parametrize("within", [1.0, 3.0, 20.0])
 def test_what_is_made_on_a_lattice_need_not_be_looked_for(pattern: Any, within: float) -> None:
@@ -57,25 +51,6 @@ def test_what_is_made_on_a_lattice_need_not_be_looked_for(pattern: Any, within: 
     assert (made.order == np.lexsort(sites.T[::-1])).all()
     found = Layout(made.points)
     assert len(made.points) < 7 or (found.order is not None and found.sites is not None)
-
-
-def test_scenes_on_one_array_share_what_follows_from_positions() -> None:
-    array = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    heights = 1e-6 * np.random.default_rng(2).standard_normal(len(array))
-    rough = array.with_tips(0.03, heights)
-    assert rough.layout is array.layout
-    assert (rough.tip_radii == 0.03).all()
-    assert (rough.heights == heights).all()
-    assert (array.heights == 0).all()
-    alone = cr.Asperities(array.positions, 0.03, heights)
-    shared, own = (
-        cr.press(cr.Scene(1.0, each, MATERIAL, geometry="summit"), approach=5e-5)
-        for each in (rough, alone)
-    )
-    assert (shared.loads == own.loads).all()
-    assert (shared.certificate.load_errors == own.certificate.load_errors).all()
-    with pytest.raises(cr.InputError, match="tip_radii"):
-        array.with_tips([1.0, 2.0])
 
 
 def test_a_larger_region_keeps_what_was_there() -> None:

@@ -57,14 +57,6 @@ def test_every_scene(name: str, control: str) -> None:
         assert contact.load == pytest.approx(reference.load, rel=limit)
 
 
-@pytest.mark.parametrize("bristles", [1, 2, 5])
-def test_exact_where_the_contact_ends_on_an_edge(bristles: int) -> None:
-    """A single asperity fills its box, and the force on each cell is then the mean of Hertz's."""
-    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], tip_radii=0.02), MATERIAL, geometry="summit")
-    reference, prescribed = pressed(scene, PAPER_APPROACH, "approach")
-    assert abs(errors(reference, prescribed, BristleQP(bristles, False))[0]) < 1e-10
-
-
 @pytest.fixture
 def matrices(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The matrices that OSQP is given."""

@@ -15,8 +15,8 @@ from scenes import MATERIAL, NAMED, PAPER_APPROACH, paper, random_scenes, refere
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Conic, ConicCVXPY, Newton, Solution, TooDenseError
-from convexrough.solvers.cone_boxes import Boxes, judged, solve_in
-from convexrough.solvers.programs import Answer
+from convexrough.solvers.cone_boxes import ConeBoxes, judged, solve_in
+from convexrough.solvers.programs import ProgramAnswer
 
 SOLVERS = [Conic(), ConicCVXPY()]
 RAW = [Conic(newton_step=False), ConicCVXPY(newton_step=False)]
@@ -105,35 +105,6 @@ def test_gaps_and_approach_from_the_multipliers(name: str, control: str) -> None
     assert_allclose(y2, area, atol=1e-6)
 
 
-@pytest.mark.parametrize("five", [False, True])
-@pytest.mark.parametrize("control", CONTROLS)
-def test_the_model_is_convex_by_the_rules(five: bool, control: str) -> None:
-    model = ConicCVXPY().model(problem_of(paper(), PAPER_APPROACH, control), five=five)
-    assert model.program.is_dcp()
-    assert model.program.is_dpp()
-    names = ["p", *(f"y{power}" for power in range(1 if five else 2, 6)), "z"]
-    assert sorted(model.variables) == names
-    expected = Newton().solve(model.normal)
-    assert disagreement(model.solve(), expected) < 1e-12
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("solver", [ConicCVXPY(), *OTHERS], ids=by_name)
-def test_a_model_is_solved_again_at_another_approach(solver: ConicCVXPY) -> None:
-    problem = problem_of(paper(), PAPER_APPROACH)
-    model = solver.model(problem)
-    for part in (1.0, 0.9, 0.2, 0.7):
-        expected = cr.press(paper(), approach=part * PAPER_APPROACH)
-        found = model.solve(part * problem.approach_bound)
-        assert_allclose(
-            problem.to_scene(found.loads) * problem.units.force,
-            expected.loads,
-            atol=1e-12 * expected.loads.max(),
-        )
-    with pytest.raises(cr.InputError, match="approach: found"):
-        model.solve(1.01 * problem.approach_bound)
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("solver", [*SOLVERS, OTHERS[1]], ids=by_name)  # SCS takes many steps
 @pytest.mark.parametrize("control", CONTROLS)
@@ -143,7 +114,7 @@ def test_five_cones_where_four_do_not_reach(solver: Any, control: str) -> None:
     problem = problem_of(scene, PAPER_APPROACH, control)
     expected = Newton().solve(problem)
     assert 0.84 < problem.convexity_number(expected.loads) < 1
-    four = Boxes.choose(problem)
+    four = ConeBoxes.choose(problem)
     assert four.S.max() == pytest.approx(21 / 25)
     with pytest.raises(TooDenseError, match=r"asperity: 0 \(0\.9.*less than 0.84"):
         solve_in(solver, problem, four)
@@ -154,15 +125,6 @@ def test_five_cones_where_four_do_not_reach(solver: Any, control: str) -> None:
     contact = cr.press(scene, approach=PAPER_APPROACH, solver=solver)
     assert contact.certificate.scope == "local"
     assert contact.certificate.holds
-
-
-@pytest.mark.parametrize("control", CONTROLS)
-def test_cut_boxes_that_stop_nobody(control: str) -> None:
-    """A priori up to S = 1.4, at the solution 0.6: four cones suffice, and that is checked."""
-    problem = problem_of(hexagonal(1, tip_radius=0.12), PAPER_APPROACH, control)
-    boxes = Boxes.choose(problem)
-    assert boxes.cut.any()
-    assert disagreement(solve_in(Conic(), problem, boxes), Newton().solve(problem)) < 1e-12
 
 
 @pytest.mark.sample(2)
@@ -207,21 +169,6 @@ def test_any_scene_is_solved_or_refused(drawn: tuple[cr.Scene, float], control: 
         assert disagreement(found, expected) < 1e-11
 
 
-@pytest.mark.parametrize("solver", SOLVERS + RAW, ids=by_name)
-@pytest.mark.parametrize("control", CONTROLS)
-def test_a_single_asperity(solver: Any, control: str) -> None:
-    """No neighbour: S = 0, and no bound on its box but its own."""
-    scene = cr.Scene(2.0, cr.Asperities([[0.0, 0.0]], 0.5), MATERIAL, geometry="summit")
-    approach = 1e-3
-    load = 4 / 3 * np.sqrt(0.4) * approach**1.5
-    contact = cr.press(
-        scene, **{control: {"approach": approach, "load": load}[control]}, solver=solver
-    )
-    rel = 1e-14 if solver.newton_step else 1e-4
-    assert contact.loads[0] == pytest.approx(load, rel=rel)
-    assert contact.approach == pytest.approx(approach, rel=rel)
-
-
 @pytest.mark.parametrize(
     ("solver", "library"),
     [(Conic(), "clarabel"), (ConicCVXPY(), "cvxpy")],
@@ -243,7 +190,7 @@ def test_a_solver_that_stops_early(solver: Any) -> None:
         few.solve(problem)
     assert stopped.value.solver == few.name
     if isinstance(few, Conic):  # CVXPY keeps its last iterate to itself
-        boxes = Boxes.choose(problem)
+        boxes = ConeBoxes.choose(problem)
         assert stopped.value.iterate is not None
         assert stopped.value.iterate.max() > 0
         assert (stopped.value.iterate <= boxes.to_candidates(problem, boxes.loads)).all()
@@ -293,7 +240,7 @@ class Wrong(Conic):
 
     factor: float = 1.0
 
-    def answer(self, problem: NormalProblem, boxes: Boxes) -> Answer:
+    def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
         true = super().answer(problem, boxes)
         return true._replace(loads=self.factor * true.loads)
 
@@ -309,7 +256,7 @@ def test_wrong_loads_are_not_returned(factor: float) -> None:
 @pytest.mark.parametrize("step", [False, True])
 def test_an_approach_that_is_not_a_number_is_not_returned(step: bool) -> None:
     problem = problem_of(paper(), PAPER_APPROACH, "load")
-    solver, boxes = Conic(newton_step=step), Boxes.choose(problem)
+    solver, boxes = Conic(newton_step=step), ConeBoxes.choose(problem)
     answer = solver.answer(problem, boxes)._replace(approach=np.nan)
     with pytest.raises(cr.SolverError, match=r"^conic.*an approach that are not numbers; try"):
         judged(solver, problem, boxes, answer)
@@ -319,3 +266,32 @@ def test_an_approach_that_is_not_a_number_is_not_returned(step: bool) -> None:
 def test_settings_are_checked(solver: Any) -> None:
     with pytest.raises(cr.InputError, match="tolerance"):
         solver(tolerance=0.0)
+
+
+@pytest.mark.parametrize("five", [False, True])
+@pytest.mark.parametrize("control", CONTROLS)
+def test_the_model_is_convex_by_the_rules(five: bool, control: str) -> None:
+    model = ConicCVXPY().model(problem_of(paper(), PAPER_APPROACH, control), five=five)
+    assert model.program.is_dcp()
+    assert model.program.is_dpp()
+    names = ["p", *(f"y{power}" for power in range(1 if five else 2, 6)), "z"]
+    assert sorted(model.variables) == names
+    expected = Newton().solve(model.normal)
+    assert disagreement(model.solve(), expected) < 1e-12
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("solver", [ConicCVXPY(), *OTHERS], ids=by_name)
+def test_a_model_is_solved_again_at_another_approach(solver: ConicCVXPY) -> None:
+    problem = problem_of(paper(), PAPER_APPROACH)
+    model = solver.model(problem)
+    for part in (1.0, 0.9, 0.2, 0.7):
+        expected = cr.press(paper(), approach=part * PAPER_APPROACH)
+        found = model.solve(part * problem.approach_bound)
+        assert_allclose(
+            problem.to_scene(found.loads) * problem.units.force,
+            expected.loads,
+            atol=1e-12 * expected.loads.max(),
+        )
+    with pytest.raises(cr.InputError, match="approach: found"):
+        model.solve(1.01 * problem.approach_bound)

@@ -105,7 +105,7 @@ def residual(problem: NormalProblem, contact: cr.Contact) -> float:
 @pytest.mark.parametrize("kind", ["lattice", "scattered"])
 @pytest.mark.parametrize("name", SCENES)
 def test_as_through_the_matrix(name: str, kind: Kind, control: str) -> None:
-    """Loads agree within what is proved of each, and to 1e-12; words are the same."""
+    """Loads agree within what is proved of each, and to 1e-12; statuses are the same."""
     pressed, approach = SCENES[name]
     if kind == "lattice" and pressed.lattice is None:
         with pytest.raises(cr.InputError, match="lattice"):
@@ -138,14 +138,6 @@ def dense_answer(name: str) -> cr.Contact:
         pressed, approach = SCENES[name]
         _DENSE[name] = cr.press(pressed, approach=approach, influence="dense")
     return _DENSE[name]
-
-
-@pytest.mark.parametrize("k", [6, 12, 25])
-def test_loads_tend_to_those_of_a_smooth_sphere(k: int) -> None:
-    """Within 2 % of Hertz where asperities are as fine and stiff as here; nearer for finer."""
-    contact = cr.press(scene(k), approach=PAPER_APPROACH)
-    smooth = 4 / 3 * PAPER_APPROACH**1.5
-    assert 0 < 1 - contact.load / smooth < 0.5 / np.sqrt(k)
 
 
 @settings(max_examples=6, deadline=None)
@@ -263,47 +255,10 @@ def test_those_left_out_at_first_are_found(control: str) -> None:
     assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
 
-@settings(max_examples=6, deadline=None)
-@given(st.floats(-3, 3), st.floats(-3, 12))
-def test_units_do_not_matter(length: float, force: float) -> None:
-    pressed, approach = SCENES["rough"]
-    lam, mu = 10**length, 10**force
-    a = pressed.asperities
-    scaled = cr.Scene(
-        lam,
-        cr.Asperities(a.positions * lam, a.tip_radii * lam, a.heights * lam),
-        cr.Material(mu, 0.3),
-        geometry="summit",
-    )
-    known = dense_answer("rough")
-    contact = cr.press(scaled, approach=approach * lam)
-    assert_solved(contact)
-    loads = contact.loads / (lam**2 * mu)
-    assert_allclose(loads, known.loads, rtol=0, atol=1e-11 * known.loads.max())
-    assert (contact.status == known.status).all()
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("angle", [0.0, 0.7, np.pi / 2])
-@pytest.mark.parametrize("control", ["approach", "load"])
-def test_order_and_orientation_do_not_matter(control: str, angle: float) -> None:
-    pressed, _ = SCENES["rough"]
-    a, known = pressed.asperities, dense_answer("rough")
-    order = np.random.default_rng(8).permutation(len(a))
-    c, s = np.cos(angle), np.sin(angle)
-    positions = (a.positions @ np.array([[c, s], [-s, c]]))[order]
-    shuffled = cr.Asperities(positions, a.tip_radii[order], a.heights[order])
-    prescribed: Any = {control: getattr(known, control)}
-    contact = cr.press(replace(pressed, asperities=shuffled), **prescribed)
-    assert_solved(contact)
-    assert_allclose(contact.loads, known.loads[order], rtol=0, atol=1e-11 * known.loads.max())
-    assert (contact.status == known.status[order]).all()
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", sorted({*ATTACKS} - {"zero"}))
 def test_the_certificate_under_attack(kind: str) -> None:
-    """Its bounds hold and its words stay right for thousands of wrong loads, too."""
+    """Its bounds hold and its statuses stay right for thousands of wrong loads, too."""
     pressed, approach = SCENES["rough"]
     known = dense_answer("rough")
     for seed in range(3):
@@ -384,5 +339,5 @@ def test_progress_of_the_steps(approach: float, caplog: pytest.LogCaptureFixture
     )
     news = caplog.messages
     assert news[-1] == "certifying"
-    assert news[0].startswith("step 1, residual ")
-    assert " touching" in news[0]
+    assert news[0].startswith("newton: step 1, objective ")
+    assert ", residual " in news[0]

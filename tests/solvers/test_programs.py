@@ -13,7 +13,7 @@ import convexrough as cr
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, Conic, Newton, Solution, programs
 from convexrough.solvers.bristles import BristleProgram
-from convexrough.solvers.cone_boxes import Boxes
+from convexrough.solvers.cone_boxes import ConeBoxes
 from convexrough.solvers.conic import LiftedProgram
 from convexrough.solvers.programs import RawAnswer, run_osqp
 from convexrough.vector_shear.cones import FrictionConic
@@ -43,7 +43,7 @@ def cost(program: Any, x: Any) -> float:
 def test_the_cone_program_holds_the_contact(five: bool, control: str) -> None:
     """True powers of t are feasible, every cone is tight, and the cost is the energy."""
     problem, solution = solved("rough", control)
-    boxes = Boxes.choose(problem, five=five)
+    boxes = ConeBoxes.choose(problem, five=five)
     lifted = LiftedProgram.assemble(problem, boxes)
     program = lifted.apply()
     loads = solution.loads[boxes.members]
@@ -113,7 +113,7 @@ def test_too_large_for_memory(monkeypatch: pytest.MonkeyPatch) -> None:
 
     problem, _ = solved("paper", "approach")
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=2**30))
-    boxes = replace(Boxes.choose(problem), members=np.arange(10**5))
+    boxes = replace(ConeBoxes.choose(problem), members=np.arange(10**5))
     with pytest.raises(cr.InputError, match=r"asperities of the cone program: found 1e\+05"):
         LiftedProgram.assemble(problem, boxes)
 

@@ -79,16 +79,6 @@ def test_equal_radii_give_the_sphere() -> None:
         assert approach == pytest.approx(sphere.approach, rel=1e-9 if off else 1e-14)
 
 
-def test_the_sphere_of_the_same_approach() -> None:
-    for load in (1e-8, 1e-5):
-        hertz = smooth((0.5, 2.0), load)
-        sphere = cr.smooth(
-            cr.Scene(hertz.radius, ALONE, cr.Material(3.0, 0.3), 0.4, geometry="summit"), load=load
-        )
-        assert sphere.approach == pytest.approx(hertz.approach, rel=1e-14)
-        assert hertz.radius == pytest.approx(smooth((0.5, 2.0), 1.0).radius, rel=1e-13)
-
-
 @pytest.mark.parametrize("ratio", [0.02, 0.1])
 def test_what_the_mean_curvature_neglects(ratio: float) -> None:
     """An approach less by e^2 / 18, e the difference of the relative curvatures over the mean."""
@@ -148,22 +138,6 @@ def test_bases_without_a_smooth_reference_say_so(base: Any, name: str) -> None:
     cycle = cr.cycle(cr.press(scene, load=1e-6), maximum=1e-7)
     assert cycle.loss > 0
     assert np.isnan([cycle.loss_normalised, cycle.smooth_normalised]).all()
-
-
-def test_normalised_losses_of_one_asperity_under_an_ellipsoid() -> None:
-    """A blunt asperity, much blunter than the base: W / W0 differs by the ellipticity alone."""
-    scene = cr.Scene(
-        (1.0, 1.1), cr.Asperities([(0.0, 0.0)], 1e9), MATERIAL, friction=0.5, geometry="summit"
-    )
-    contact = cr.press(scene, load=1e-6)
-    cycle = cr.cycle(contact, maximum=2e-7)
-    assert cycle.loss_normalised == pytest.approx(cycle.smooth_normalised, rel=1e-3)
-    gradient = cycle.gradient().normalised
-    assert gradient.sphere_radius is None
-    assert gradient.load == pytest.approx(
-        -cycle.loss_normalised * 5 / 3 / 1e-6
-        + cycle.gradient().load / (cycle.loss / gradient.value)
-    )
 
 
 def test_the_displacement_outside_is_of_spheres_alone() -> None:

@@ -60,17 +60,6 @@ def test_another_unit_is_the_same_surface() -> None:
         cr.surface.Surface(cap, 1.0).to_unit("m")
 
 
-def test_moments_of_plain_waves() -> None:
-    """z = A sin(q x): m2 = A^2 q^2 / 4 as the mean of x and y, up to the differences."""
-    x, _ = grid((200, 2000), (0.01, 0.01))
-    surface = cr.surface.Surface(0.3 * np.sin(2 * np.pi * x), 0.01)
-    q = 2 * np.pi
-    assert_allclose(surface.moments.m0, 0.3**2 / 2, rtol=1e-3)
-    assert_allclose(surface.moments.m2, 0.3**2 * q**2 / 4, rtol=2e-3)
-    assert_allclose(surface.moments.m4, 0.3**2 * q**4 / 4, rtol=2e-3)
-    assert surface.moments.slope_ratio == 0.0
-
-
 @pytest.mark.parametrize(
     ("heights", "message"),
     [

@@ -12,11 +12,10 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
-from sweep_files import SMALL, reported_to, same, started, tables, toml
+from sweep_files import reported_to, same, started, tables, toml
 
 import convexrough as cr
 from convexrough.sweeps.folder import open_folder
@@ -89,7 +88,7 @@ def test_the_command_is_killed_at_any_moment(
         if (file / "a-sweep/manifest.json").exists():
             assert rows(file) >= known
             known = rows(file)
-    process = started(file, "a.toml", "--resume")
+    process = started(file, "a.toml", "--workers", "1", "--resume")
     out, err = process.communicate()
     assert (process.returncode, err) == (0, "")
     assert same(cr.open_sweep(file / "a-sweep"), whole)
@@ -130,6 +129,7 @@ sys.exit(main(["sweep", "a.toml", "--workers", "2"]))
 """
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("event", ["a-sweep/manifest.json", "a-sweep/parts/*.parquet"])
 def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, event: str) -> None:
     """As soon as there is a folder, and as soon as there is a part; the terminal tells workers."""
@@ -173,25 +173,6 @@ def test_a_full_disk(file: Path, whole: cr.SweepTable) -> None:
     assert (said, out.endswith("cannot be written: File too large\n")) == ("", True), out
     assert rows(file) == SCENES // PARTS
     assert not list((file / "a-sweep/parts").glob(".*"))
-    process = started(file, "a.toml", "--resume")
+    process = started(file, "a.toml", "--workers", "1", "--resume")
     assert f"found {SCENES // PARTS} scenes\n" in process.communicate()[0]
     assert same(cr.open_sweep(file / "a-sweep"), whole)
-
-
-def test_parts_of_a_job_array_at_the_same_time(file: Path, whole: cr.SweepTable) -> None:
-    jobs = [started(file, "a.toml", "--workers", "1", "--part", f"{k}/2") for k in (1, 2)]
-    said = [job.communicate() for job in jobs]
-    assert [job.returncode for job in jobs] == [0, 0], said
-    assert same(cr.open_sweep(file / "a-sweep"), whole)
-
-
-def test_a_changed_file_is_refused_unless_overwritten(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(toml(SMALL))
-    assert command("sweep", "a.toml", "--workers", "1")[0] == 0
-    changed = tables(sphere={"radius": 1.1}, sweep={"seeds": 1})
-    (tmp_path / "a.toml").write_text(toml(changed))
-    status, _, err = command("sweep", "a.toml", "--workers", "1", "--resume")
-    assert status == 2
-    assert "a-sweep: holds another sweep, 16 scenes of a.toml by version" in err
-    assert command("sweep", "a.toml", "--workers", "1", "--force")[0] == 0
-    assert same(cr.open_sweep(tmp_path / "a-sweep"), cr.sweep(changed, workers=1))

@@ -1,4 +1,4 @@
-"""The words and bounds of vector friction under attack: wrong states, and loads in doubt."""
+"""The statuses and bounds of vector friction under attack: wrong states, and loads in doubt."""
 
 from dataclasses import replace
 from typing import Any
@@ -27,8 +27,8 @@ from convexrough.vector_shear.problem import VectorProblem
     st.sampled_from(["swap", "perturb", "turn", "drop", "zero", "displacement", "slip"]),
     st.integers(0, 2**32 - 1),
 )
-def test_attacks_on_the_words(name: str, fraction: float, kind: str, seed: int) -> None:
-    """States that are wrong must not be given a wrong word, nor a bound that is too small."""
+def test_attacks_on_the_statuses(name: str, fraction: float, kind: str, seed: int) -> None:
+    """States that are wrong must not be given a wrong status, nor a bound that is too small."""
     contact = pressed(name, nu=0.5)
     problem = VectorProblem.of(contact)
     total = np.array([0.8, 0.6]) * fraction * problem.scalar.loads.sum()
@@ -75,7 +75,7 @@ def test_attacks_on_the_words(name: str, fraction: float, kind: str, seed: int) 
     st.floats(0, 0.5),
     st.floats(0, 2 * np.pi),
 )
-def test_words_and_bounds_against_exact_states(
+def test_statuses_and_bounds_against_exact_states(
     seed: int, count: int, crowding: float, fraction: float, nu: float, angle: float
 ) -> None:
     """Overlapping discs and the last parts of gross sliding included."""
@@ -93,10 +93,10 @@ def test_words_and_bounds_against_exact_states(
     except (NotProved, cr.SolverError):
         return  # neither the oracle nor Newton's method is on trial
     proof, touching = state.certificate, [i for i, P in enumerate(pressed_exactly.loads) if P > 0]
-    words = state.status[touching]
+    statuses = state.status[touching]
     slides = np.array(true.sliding)
-    assert not (words[slides] == "partial").any()
-    assert not (words[~slides] == "sliding").any()
+    assert not (statuses[slides] == "partial").any()
+    assert not (statuses[~slides] == "sliding").any()
     with ctx.workdps(60):
         travel = FRICTION * (2 - arb(nu)) / (2 * (1 - arb(nu)))
 
@@ -144,7 +144,7 @@ def test_doubt_about_the_loads_is_counted(fraction: float, digits: int) -> None:
     assert (state.status == truth.status).all()
 
 
-def test_an_uncertified_contact_gets_no_word() -> None:
+def test_an_uncertified_contact_gets_no_status() -> None:
     contact = replace(
         pressed("paper"), certificate=replace(pressed("paper").certificate, scope="none")
     )

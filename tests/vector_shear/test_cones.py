@@ -90,6 +90,7 @@ def test_an_answer_is_judged_and_not_the_word_of_its_solver(
     class Boastful:
         def __init__(self, *data: object) -> None:
             self.real = clarabel.DefaultSolver(*data)
+            self.set_termination_callback = self.real.set_termination_callback
 
         def solve(self) -> SimpleNamespace:
             answer = self.real.solve()

@@ -85,9 +85,9 @@ def test_the_equations_hold(name: str, fraction: float) -> None:
         state = found(name, nu, fraction)
         assert_solves(state, 1e-11)
         assert state.residual < 1e-12
-        words = np.where(lengths(state.slips) > 0, "sliding", "partial")
-        words[state.contact.loads == 0] = "open"
-        assert (state.status == words).all()
+        statuses = np.where(lengths(state.slips) > 0, "sliding", "partial")
+        statuses[state.contact.loads == 0] = "open"
+        assert (state.status == statuses).all()
 
 
 @pytest.mark.sample(4)
@@ -100,9 +100,9 @@ def test_close_to_gross_sliding(fraction: float, nu: float) -> None:
     assert_solves(state, 1e-10)
     if fraction >= 0.9999:
         assert (lengths(state.slips) > 0).sum() == 37
-        words = state.status[state.contact.loads > 0]
-        assert not (words == "partial").any()
-        assert (words == "sliding").sum() >= 30
+        statuses = state.status[state.contact.loads > 0]
+        assert not (statuses == "partial").any()
+        assert (statuses == "sliding").sum() >= 30
     if fraction == 1 - 1e-9:
         farther = found("paper", nu, 1 - 1e-11)
         ratio = farther.displacement[0] / state.displacement[0]

@@ -173,7 +173,7 @@ def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         read_loads(written(tmp_path, b"PAR1", "a.parquet"), small())
 
 
-def test_shear_forces_with_words(tmp_path: Path) -> None:
+def test_shear_forces_with_statuses(tmp_path: Path) -> None:
     content = "status,force [N],x,y\nopen,0,1,0\nsliding,-2,0,0\npartial,1,0.5,2.5\n"
     found = read_shear_forces(written(tmp_path, content), small(), Manner())
     assert found.values.tolist() == [-2, 0, 1]

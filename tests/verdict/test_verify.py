@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figure_checks import fits, words
+from figure_checks import fits, statuses
 from scene_files import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
@@ -152,11 +152,11 @@ def test_columns_and_tolerance(command: Any, contact: cr.Contact) -> None:
     assert "--column: found q=P, expected NAME=COLUMN" in outcome.err
 
 
-def shear_file(contact: cr.Contact, forces: Any, words: Any = None) -> str:
+def shear_file(contact: cr.Contact, forces: Any, statuses: Any = None) -> str:
     rows = [repr(force) for force in np.asarray(forces).tolist()]
-    if words is not None:
-        rows = [f"{row},{word}" for row, word in zip(rows, words, strict=True)]
-    head = "force" if words is None else "force,status"
+    if statuses is not None:
+        rows = [f"{row},{status}" for row, status in zip(rows, statuses, strict=True)]
+    head = "force" if statuses is None else "force,status"
     Path("forces.csv").write_text("\n".join([head, *rows]))
     return "forces.csv"
 
@@ -224,7 +224,7 @@ def test_the_figure(contact: cr.Contact) -> None:
     forces[4] = 0.5 * contact.loads[4]
     sheared = verify_shear(contact, forces, force=force)
     for figures in (verdict_figures(verdict), verdict_figures(verdict, sheared, length_unit="m")):
-        said = {text.get_text() for text in words(figures["verdict"])}
+        said = {text.get_text() for text in statuses(figures["verdict"])}
         assert {"36", "50", "claimed open, proved to touch (1)"} < said
         fits(figures["verdict"])
     assert {"4", "claimed to slide, proved not to (1)", "sliding", "partial slip"} < said

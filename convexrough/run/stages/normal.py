@@ -95,7 +95,7 @@ def judged_loads(certificate: Certificate, loads: Array) -> Summary:
     """What is proved of loads (n,) [force], whoever found them."""
     return {
         "asperities": len(loads),
-        **{word: int((certificate.status == word).sum()) for word in COUNTS},
+        **{status: int((certificate.status == status).sum()) for status in COUNTS},
         "approach": certificate.approach,
         "approach_error": certificate.approach_error,
         "load": float(loads.sum()),
@@ -154,7 +154,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
 
     lines = [
         ("asperities", f"{normal['asperities']}{able}"),
-        *((f"  {word}", f"{normal[word]:>{width}}") for word in COUNTS),
+        *((f"  {status}", f"{normal[status]:>{width}}") for status in COUNTS),
         ("approach", f"{normal['approach']:.10g} {units.length}".rstrip()),
         ("load", f"{normal['load']:.10g} {units.force}".rstrip()),
         ("certificate", SCOPES[proof["scope"]] + model),

@@ -16,7 +16,7 @@ from convexrough.friction.path import load_path
 from convexrough.friction.phases import PhaseLosses, phase_losses
 from convexrough.friction.shapes import elliptic_path
 from convexrough.run.stage import (
-    WORDS,
+    STATUSES,
     Columns,
     Result,
     Single,
@@ -26,16 +26,16 @@ from convexrough.run.stage import (
     plain,
     titled,
 )
-from convexrough.run.values import Finite, Mistake, NonNegative, Positive, Table, expected
+from convexrough.run.values import FileTable, Finite, Mistake, NonNegative, Positive, expected
 from convexrough.tabular.columns import aligned
 from convexrough.tabular.units import UnitNames
 
-COUNTS = tuple(word for word in WORDS if word != "contact")
+COUNTS = tuple(status for status in STATUSES if status != "contact")
 
 INCREASE = "indentations increase with the load: "
 
 
-class Ellipse(Table):
+class Ellipse(FileTable):
     """A path of load P + A cos t and shear Q + B sin(t + phase), on chords."""
 
     load: Positive
