@@ -375,7 +375,7 @@ class NormalProblem:
         assert self.load is not None
         displacement = displacement + self.influence.rounding(weights).of(displacement)
         least = self.offsets - self.offset_errors
-        return approach_bound(weights, displacement, self.coefficients, least, self.load)
+        return float(approach_bound(weights, displacement, self.coefficients, least, self.load))
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """Values of the candidates, set among zeros for all other asperities of the scene."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices, summed
 from convexrough.normal.boxes import Box
+from convexrough.normal.load_control import approach_bound, shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import Proved, errors_in, solution_in, stays_in
 from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_of
@@ -22,8 +23,8 @@ from convexrough.normal.stack import Stack
 from convexrough.numbers.balls import Ball
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: Newton steps and shifts of a first guess, at most.
-STEPS, SHIFTS = 30, 8
+#: Newton steps, at most.
+STEPS = 30
 
 #: A rough contact reaches further than Hertz's, in the square of its radius. A heuristic.
 WIDER = 1.1
@@ -186,7 +187,8 @@ def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Ar
     displacement = stack.apply(s)
     total = s.sum(axis=1, keepdims=True)
     if stack.load is not None:
-        return _shifted(stack, prescribed - stack.total.value / total * displacement)
+        ridden = prescribed - stack.total.value / total * displacement
+        return shifted_to_load(ridden, stack.coefficients, stack.total.value)
     work = (s * prescribed).sum(axis=1, keepdims=True)
     local = (s * stack.coefficients * np.cbrt(s) ** 2).sum(axis=1, keepdims=True)
     coupled = (s * displacement).sum(axis=1, keepdims=True)
@@ -196,48 +198,15 @@ def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Ar
     return np.asarray(prescribed - x**3 * displacement)
 
 
-def _shifted(stack: Stack, indentation: Array) -> Array:
-    """Until the loads are the prescribed one, to some digits: as `load_control.shifted_to_load`."""
-    assert stack.load is not None
-    k, load = stack.coefficients, stack.total.value
-    alone = np.cbrt(load) ** 2 * k  # one that carries it all
-    shift = (alone - indentation).min(axis=1, keepdims=True)
-    for _ in range(SHIFTS):
-        ratio = np.maximum(indentation + shift, 0.0) / k
-        root = np.sqrt(ratio)
-        total = (ratio * root).sum(axis=1, keepdims=True)
-        excess = total - np.cbrt(load) ** 2 * np.cbrt(total)
-        shift = shift - np.maximum(excess / (root / k).sum(axis=1, keepdims=True), 0.0)
-    return np.asarray(indentation + shift)
-
-
-@quietly
-def approach_bounds(stack: Stack, state: Trial) -> Array:
-    """(m, 1) no D0 is higher at any solution: prescribed, or as `load_control.approach_bound`."""
-    if stack.exact_approach is not None:
-        return stack.depth.upper
-    assert stack.load is not None
-    loads, load, d = state.loads.high, stack.total.upper, stack.exact.offsets
-    total = loads.sum(axis=1, keepdims=True)
-    q, c = loads / total, state.product.upper / total
-    cubes = (q * stack.coefficients) ** 3
-    height = (c + np.cbrt(8.0 * cubes / (27.0 * load))).max(axis=1, keepdims=True) * (1 + SAFETY)
-    for _ in range(SHIFTS):  # any height gives a bound
-        excess = np.where(cubes > 0, cubes / (height - c) ** 3, 0.0)
-        slope = 3.0 * np.where(cubes > 0, excess / (height - c), 0.0).sum(axis=1, keepdims=True)
-        step = (excess.sum(axis=1, keepdims=True) - 27.0 * load / 8.0) / slope
-        height = height + np.fmax(step, 0.0)
-    height = np.maximum(height, c.max(axis=1, keepdims=True))
-    rest = np.where(cubes > 0, cubes / (height - c) ** 2, 0.0).sum(axis=1, keepdims=True)
-    terms = height * load, 4.0 / 27.0 * rest, -(d.lower * q).sum(axis=1, keepdims=True)
-    size = terms[0] + terms[1] + (np.abs(d.lower) * q).sum(axis=1, keepdims=True)
-    return np.asarray(sum(terms) + (SAFETY + loads.shape[1] * ROUNDOFF) * size)
-
-
 @quietly
 def widest(stack: Stack, state: Trial) -> Box:
     """Boxes that hold every solution and these loads, by shells: as `boxes.tried` begins."""
-    depth = np.maximum(approach_bounds(stack, state) + stack.exact.offsets.upper, 0.0)
+    if stack.load is None:
+        highest = stack.depth.upper
+    else:
+        given = stack.coefficients, stack.exact.offsets.lower, stack.total.upper
+        highest = approach_bound(state.loads.high, state.product.upper, *given)
+    depth = np.maximum(highest + stack.exact.offsets.upper, 0.0)
     alone = (depth / stack.exact.coefficients.lower) ** 1.5 * (1 + SAFETY)
     corner = np.maximum(alone, state.loads.high)
     h = stack.stiffness(corner)
