@@ -52,7 +52,7 @@ def sweep_tables(surfaces: int) -> dict[str, Any]:
         },
         "normal": {"load": LOAD},
         "friction": {"coefficient": FRICTION},
-        "cycle": {"maximum": list(AMPLITUDES)},
+        "cycle": {"maximum_fraction": list(AMPLITUDES)},
         "sweep": {
             "seeds": max(1, surfaces // (len(SPREADS) * len(TIPS))),
             "measure": ["loss", "loss_over_smooth"],

@@ -173,7 +173,7 @@ def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
     found: dict[str, Stage] = {"normal": Normal(approach=0.0)}
     mistakes: list[str] = []
     models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
-    models = ((Shear, "fractions", shear), (Cycle, "maximum", cycle))
+    models = ((Shear, "fractions", shear), (Cycle, "maximum_fraction", cycle))
     for model, key, values in models:
         if len(values):
             table, wrong = validate_table(model.name, {key: [*map(float, values)]}, model)

@@ -71,7 +71,7 @@ def test_draws_belong_to_the_seed_alone() -> None:
         tables(sweep={"seeds": 5}),
         tables(sweep={"measure": ["load"]}),
         tables(sweep={"seeds": [0, 1, 2, 4]}),
-        tables(cycle={"maximum": [0.38]}),
+        tables(cycle={"maximum_fraction": [0.38]}),
         tables(sweep={"over": {"normal.load": [1e-7, 3e-7], "asperities.height_std": [0.0, 1e-6]}}),
     ],
 )
@@ -123,7 +123,7 @@ WRONG = {
         "swept twice, by seeds too",
     ),
     "fractions swept": (
-        sweeping(over={"cycle.maximum": [[0.1]]}),
+        sweeping(over={"cycle.maximum_fraction": [[0.1]]}),
         "values of [cycle] are columns",
     ),
     "of unequal length": (
