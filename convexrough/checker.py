@@ -244,11 +244,14 @@ def read_scene(given: Any) -> Scene:
 # Convexity ----------------------------------------------------------------------------------------
 
 
-def distances(scene: Scene, chosen: list[int], tell: Tell) -> Iterator[tuple[int, list[int]]]:
-    """Of each asperity: its number, and integers m with m - 2 < r_ij < m + 3 for `chosen` (1)."""
+def distances(
+    scene: Scene, some: Sequence[int], chosen: list[int], tell: Tell
+) -> Iterator[tuple[int, list[int]]]:
+    """Of some asperities: the number, and integers m with m - 2 < r_ij < m + 3 for `chosen` (1)."""
     place = {j: k for k, j in enumerate(chosen)}
     points = [scene.points[j] for j in chosen]
-    for i, (p, q) in enumerate(scene.points):
+    for i in some:
+        p, q = scene.points[i]
         apart = [math.isqrt((x - p) ** 2 + (y - q) ** 2) for x, y in points]
         if i in place:
             apart[place[i]] = FAR
@@ -285,18 +288,16 @@ def prove_by_shells(
     scene: Scene, shells: list[Fraction], radii: list[Fraction], able: list[int], tell: Tell
 ) -> None:
     """That A + diag(1 / (2 E* radii)) is, by spheres that overlap little or not at all (3)."""
-    place = {i: k for k, i in enumerate(able)}
     sizes = [math.floor(shells[i] * scene.grid) for i in able]
     if min(sizes, default=1) <= 0:
         raise Refused("a shell is not positive")
-    for i, apart in distances(scene, able, tell):
-        if i not in place:
-            continue
-        size, overlap = sizes[place[i]], 0
+    rows = distances(scene, able, able, tell)
+    for size, radius, (i, apart) in zip(sizes, radii, rows, strict=True):
+        overlap = 0
         for other, m in zip(sizes, apart, strict=True):
             if (over := size + other - m + 2) > 0:
                 overlap -= -over * over // (4 * (m - 2))
-        if overlap > size * (size * PI.low / (2 * radii[place[i]] * scene.grid) - 1):
+        if overlap > size * (size * PI.low / (2 * radius * scene.grid) - 1):
             raise Refused(f"the shell of asperity {i} is too small for its box, or overlaps others")
 
 
@@ -305,10 +306,8 @@ def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: T
     scale = [math.isqrt(math.floor(2 * c * scene.grid * 4**ROOT_BITS)) for c in radii]
     wholes, parts = (PI.high * UNIT).as_integer_ratio()
     factor: list[list[int]] = []
-    for i, apart in distances(scene, able, tell):
-        if len(factor) == len(able) or i != able[len(factor)]:
-            continue
-        k, row = len(factor), list[int]()
+    for k, (_, apart) in enumerate(distances(scene, able, able, tell)):
+        row = list[int]()
         for j in range(k):
             entry = scale[k] * scale[j] * (UNIT // (apart[j] + 3)) * parts // wholes
             row.append((entry - sum(map(mul, row, factor[j]))) // factor[j][j])
@@ -396,7 +395,7 @@ def push(
     parts = [math.floor(loads[j] / force) for j in box.able]
     weights = [math.ceil(2 * box.radii[j] * scene.grid) for j in box.able]
     pushed, spread = [], []
-    for _, apart in distances(scene, box.able, tell):
+    for _, apart in distances(scene, range(len(scene.points)), box.able, tell):
         inverse = [UNIT // (m + 3) for m in apart]
         least = sum(map(mul, inverse, parts))
         most = (least + sum(inverse)) * SLACK
@@ -439,12 +438,12 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
     parts, wholes = (ONE / PI.high).as_integer_ratio()
     rows: dict[int, list[int]] = {}  # of A C, in parts of ONE, less than `rounding` too small
     sums: dict[int, int] = {}
-    for i, apart in distances(scene, near, tell):
-        if (state.approach + scene.offsets[i]).high > 0:
-            row = [w * parts // ((m + 3) * wholes) for w, m in zip(weights, apart, strict=True)]
-            sums[i] = sum(row)
-            if len(near) <= MOST_INVERTED:
-                rows[i] = row
+    able = [i for i, d in enumerate(scene.offsets) if (state.approach + d).high > 0]
+    for i, apart in distances(scene, able, near, tell):
+        row = [w * parts // ((m + 3) * wholes) for w, m in zip(weights, apart, strict=True)]
+        sums[i] = sum(row)
+        if len(near) <= MOST_INVERTED:
+            rows[i] = row
     rounding = 2 + (max(sums.values(), default=0) >> 68)
     missed = {i: Fraction(each + rounding * len(near) - ONE) for i, each in sums.items()}
     if any(missed[i] > 0 for i in near):

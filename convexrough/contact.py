@@ -162,14 +162,8 @@ class Contact(Cached, Table, Plottable):
         """
         from convexrough.gradients.states import contact_gradient  # a floor above: when asked
 
-        return contact_gradient(
-            self,
-            loads=loads,
-            gaps=gaps,
-            approach=approach,
-            load=load,
-            holding=holding,
-        )
+        weights = {"loads": loads, "gaps": gaps, "approach": approach, "load": load}
+        return contact_gradient(self, holding, **weights)
 
     def change(self, direction: Direction) -> ContactChange:
         """First-order changes of loads, gaps and approach for a change of the scene.

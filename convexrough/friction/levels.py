@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
+from convexrough.errors import InputError
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level
-from convexrough.normal.stack import Rows
+from convexrough.normal.stack import Rows, of_rows
 from convexrough.numbers.balls import TINY, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -132,7 +133,14 @@ class FrictionLevels:
         )
 
     def displaced(self, displacement: float) -> Fraction:
-        """The load of the level whose approach is D0(P) - X / (c_t f), X >= 0 [length]."""
+        """The load of the level whose approach is D0(P) - X / (c_t f), X >= 0 [length].
+
+        That of first loading to X. Raises InputError beyond gross sliding.
+        """
+        if not displacement <= self.farthest * (1 + 1e-14):
+            found = f"{displacement:.17g}: gross sliding"
+            expected = f"at most X = {self.farthest:.17g}, where the last asperity slides"
+            raise InputError("displacement", found=found, expected=expected)
         lowered = Ball.exact(displacement) / self.travel_unit
         left = self.top.approach - lowered - self.at(Fraction(0)).approach
         if not left.value > AT_THE_END * ROUNDOFF * lowered.value:
@@ -185,15 +193,16 @@ class FrictionLevels:
 
     def loads(self, level: Level) -> Ball:
         """(N,) P_i in own units."""
-        high, low, radius = (self.to_scene(part) for part in _parts(level.loads))
-        return Ball(Pair(high, low), radius)
+        found: Ball = of_rows(self.to_scene, level.loads)
+        return found
 
     def indentations(self, level: Level) -> Ball:
         """(N,) n_i in own units; of asperities that cannot touch to some sixteen digits."""
         known, others = level.indentation, self._others
         if len(others) == 0:
             return known
-        high, low, radius = (self.to_scene(part) for part in _parts(known))
+        known = of_rows(self.to_scene, known)
+        (high, low), radius = known.mid, known.radius
         approach = float(level.approach.value)
         high[others] = approach + self.scene.offsets[others] / self.units.length
         radius[others] = self.scene.offset_errors[others] / self.units.length
@@ -277,7 +286,3 @@ def exactly(values: Sequence[Fraction]) -> Ball:
 def rounded(ball: Ball) -> tuple[Array, Array]:
     """The float64 numbers nearest to a ball, and bounds on their errors."""
     return frozen(np.array(ball.value)), frozen(np.array(ball.error))
-
-
-def _parts(ball: Ball) -> tuple[Array, Array, Array]:
-    return np.asarray(ball.mid.high), np.asarray(ball.mid.low), ball.radius

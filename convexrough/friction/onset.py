@@ -82,7 +82,7 @@ def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
 def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
     """By the levels on the way to the root, and where these are far from it by levels close by."""
     place = int(np.searchsorted(levels.candidates, asperity))
-    found = _root(levels, place)
+    found = root(levels, place)
     around = [Fraction(part) * (found or levels.load) for part in TRIED]
     near = [s for s in levels.known if around[0] <= abs(s - found) <= around[ENOUGH]]
     below = [*(s for s in near if s < found), *(found - part for part in around)]
@@ -92,7 +92,7 @@ def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
     return Onset(found, lower, next(sure, levels.load))
 
 
-def _root(levels: FrictionLevels, place: int) -> Fraction:
+def root(levels: FrictionLevels, place: int) -> Fraction:
     """The load at which n_i is 0, of a candidate; 0 of the highest."""
 
     def depth(load: Fraction) -> float:

@@ -135,13 +135,8 @@ class ShearState(Table, Plottable):
         """
         from convexrough.gradients.states import state_gradient  # a floor above: when asked
 
-        return state_gradient(
-            self,
-            displacement=displacement,
-            forces=forces,
-            slips=slips,
-            holding=holding,
-        )
+        weights = {"displacement": displacement, "forces": forces, "slips": slips}
+        return state_gradient(self, holding, **weights)
 
     def change(self, direction: Direction) -> ShearChange:
         """How forces, slips and the displacement change, to first order, when the scene does.
@@ -176,17 +171,15 @@ def shear(
     checks.instance("contact", contact, Contact)
     friction = checks.friction(contact.scene.friction)
     checks.exactly_one("force", force, "displacement", displacement)
-    if displacement is not None:
-        displacement = checks.finite("displacement", displacement)
-    else:
-        force = one_force("force", force, friction * contact.load)
-    levels = contact.cached(FrictionLevels)
     LOGGER.info("pressing at the load P - Q / f")
-    if force is not None:
+    levels = contact.cached(FrictionLevels)
+    if displacement is None:
+        force = one_force("force", force, friction * contact.load)
         height = levels.height(force)
     else:
-        height = levels.load - level_at("displacement", levels, abs(displacement or 0.0))
-        height = height if (displacement or 0.0) >= 0 else -height
+        displacement = checks.finite("displacement", displacement)
+        height = levels.load - levels.displaced(abs(displacement))
+        height = height if displacement >= 0 else -height
     return _state(contact, levels, height, force, displacement)
 
 
@@ -196,18 +189,6 @@ def one_force(what: str, value: ArrayLike | None, limit: float) -> float:
     if given.ndim:
         raise InputError(what, found=f"shape {given.shape}", expected="one number")
     return float(given)
-
-
-def level_at(what: str, levels: FrictionLevels, displacement: float) -> Fraction:
-    """The load of the level that gives the deep points a displacement X >= 0 on first loading."""
-    farthest = levels.farthest
-    if not displacement <= farthest * (1 + 1e-14):
-        raise InputError(
-            what,
-            found=f"{displacement:.17g}: gross sliding",
-            expected=f"at most X = {farthest:.17g}, where the last asperity slides",
-        )
-    return levels.displaced(displacement)
 
 
 def _state(

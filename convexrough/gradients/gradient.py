@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from convexrough import checks
-from convexrough.arrays import Array, among_zeros, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
 from convexrough.gradients.pulled import ZERO, Moves, Part, Pulled, value_of
@@ -137,8 +137,6 @@ class Gradient(Table, Plottable):
     height_errors: Array
     tip_radii: Array
     tip_radius_errors: Array
-    sphere_radius: float | None
-    sphere_radius_error: float | None
     contact_modulus: float
     contact_modulus_error: float
     poisson_ratio: float
@@ -146,6 +144,8 @@ class Gradient(Table, Plottable):
     balance_defect: float
     number: Number
     derivatives: Derivatives
+    sphere_radius: float | None = None
+    sphere_radius_error: float | None = None
     load: float | None = None
     load_error: float | None = None
     approach: float | None = None
@@ -169,41 +169,29 @@ class Gradient(Table, Plottable):
     def of(cls, number: Number, holding: Holding) -> Gradient:
         """All of it in the scene's units."""
         shown = number.holding_the_approach() if holding == "approach" else number
-        contact, problem, slopes = shown.contact, shown.problem, shown.slopes
-        found = Derivatives.of(problem, shown.pulled)
-        zero = Ball.exact(0.0)
-        modulus = found.contact_modulus + slopes.get("contact_modulus", zero)
-        sphere = found.sphere_radius
+        slopes = shown.slopes
+        found = Derivatives.of(shown.problem, shown.pulled)
+        numbers = {"value": number.value, "poisson_ratio": slopes.get("poisson_ratio", ZERO)}
+        numbers |= {name: slopes[name] for name in WHOLE if name in slopes}
+        modulus = found.contact_modulus + slopes.get("contact_modulus", ZERO)
+        numbers["contact_modulus"] = modulus
+        if (sphere := found.sphere_radius) is not None:
+            numbers["sphere_radius"] = sphere + slopes.get("sphere_radius", ZERO)
         named: dict[str, Any] = {}
-        for name in WHOLE:
-            if name in slopes:
-                named[name], named[f"{name}_error"] = _number(slopes[name])
-            if name in shown.steep:
-                named[name] = float(np.copysign(np.inf, shown.steep[name].value))
-                named[f"{name}_error"] = 0.0
+        for name, ball in numbers.items():
+            named[name], named[f"{name}_error"] = float(ball.value), float(ball.error)
+        for name, ball in shown.steep.items():
+            named[name], named[f"{name}_error"] = float(np.copysign(np.inf, ball.value)), 0.0
         for name in SEVERAL:
             if name in slopes:
-                error = f"{name[:-1]}_errors"
+                one = name.removesuffix("s")
                 named[name] = frozen(slopes[name].value.copy())
-                named[f"{name[:-1]}_sides"] = frozen(shown.sides[name])
-                named[error] = frozen(slopes[name].error.copy())
-        for each, name in (
-            (number.value, "value"),
-            (modulus, "contact_modulus"),
-            (slopes.get("poisson_ratio", zero), "poisson_ratio"),
-        ):
-            named[name], named[f"{name}_error"] = _number(each)
-        named["sphere_radius"] = named["sphere_radius_error"] = None
-        if sphere is not None:
-            sphere = sphere + slopes.get("sphere_radius", zero)
-            named["sphere_radius"], named["sphere_radius_error"] = _number(sphere)
+                named[f"{one}_errors"] = frozen(slopes[name].error.copy())
+                named[f"{one}_sides"] = frozen(shown.sides[name])
 
-        def in_scene(values: Array) -> Array:
-            return frozen(problem.to_scene(values))
-
-        tips = found.tip_radii
+        tips, in_scene = found.tip_radii, found.in_scene
         return cls(
-            contact=contact,
+            contact=shown.contact,
             holding=holding,
             heights=in_scene(found.offsets.value),
             height_errors=in_scene(found.offsets.error),
@@ -217,15 +205,11 @@ class Gradient(Table, Plottable):
 
     @cached_property
     def positions(self) -> Array:
-        return frozen(self._in_scene(self.derivatives.positions.value))
+        return self.derivatives.in_scene(self.derivatives.positions.value)
 
     @cached_property
     def position_errors(self) -> Array:
-        return frozen(self._in_scene(self.derivatives.positions.error))
-
-    def _in_scene(self, values: Array) -> Array:
-        problem = self.number.problem
-        return among_zeros(values, problem.candidates, len(problem.scene))
+        return self.derivatives.in_scene(self.derivatives.positions.error)
 
     @cached_property
     def normalised(self) -> Gradient:
@@ -269,10 +253,6 @@ class Gradient(Table, Plottable):
         """But for what it was made from, and for parameters that it has not."""
         hidden = ("number", "derivatives")
         return (row for row in super()._rows() if row[0] not in hidden and row[1] != "None")
-
-
-def _number(ball: Ball) -> tuple[float, float]:
-    return float(ball.value), float(ball.error)
 
 
 def _balance_defect(number: Number, found: Derivatives) -> float:

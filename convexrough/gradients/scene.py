@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.gradients.pulled import ZERO, Pulled
 from convexrough.normal.problem import NormalProblem
+from convexrough.normal.stack import of_rows
 from convexrough.numbers.balls import Ball, where
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
@@ -132,6 +133,11 @@ class Derivatives:
         local = sum((each.local for each in pulled), start=zero)
         return cls(Geometry.of(problem), offsets, local, tuple(pulled))
 
+    def in_scene(self, values: Array) -> Array:
+        """(N, ...) values of the candidates, among zeros for all others of the scene."""
+        problem = self.geometry.problem
+        return frozen(among_zeros(values, problem.candidates, len(problem.scene)))
+
     @cached_property
     def turning(self) -> Ball:
         """(n, 2) by the contact points c, through the coupling: G."""
@@ -146,7 +152,8 @@ class Derivatives:
             if left.size.any():
                 total = total + left[:, None] * geometry.slopes(loads, which)
                 total = total + loads[:, None] * geometry.slopes(left, which)
-        return spread(total, which, n)
+        among: Ball = of_rows(partial(among_zeros, places=which, count=n), total)
+        return among
 
     @cached_property
     def coupled(self) -> Ball:
@@ -204,14 +211,3 @@ def curvatures(scene: Scene) -> Ball:
     radii = np.array(along(scene.sphere_radius))
     bent = np.isfinite(radii)
     return where(bent, 1.0 / Ball.exact(np.where(bent, radii, 1.0)), Ball.exact(np.zeros(2)))
-
-
-def spread(values: Ball, places: Indices, n: int) -> Ball:
-    """Balls at their places of n along the first axis, among zeros."""
-
-    def full(part: Array) -> Array:
-        found = np.zeros((n, *part.shape[1:]))
-        found[places] = part
-        return found
-
-    return Ball(Pair(full(values.mid.high), full(values.mid.low)), full(values.radius))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,12 +15,12 @@ from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
 from convexrough.errors import InputError, ProofError
 from convexrough.friction.levels import FrictionLevels
-from convexrough.friction.onset import indices
+from convexrough.friction.onset import indices, root
 from convexrough.friction.order import Order
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held, levels
 from convexrough.gradients.pulled import ZERO, Moves, Part, product
-from convexrough.normal.level import Level, Levels
+from convexrough.normal.level import Level
 from convexrough.normal.proved import Obstacle, proved
 from convexrough.normal.refine import refined_loads
 from convexrough.numbers import balls
@@ -93,22 +94,12 @@ class Frictional:
 
 
 def contact_gradient(
-    contact: Contact,
-    *,
-    loads: ArrayLike | None = None,
-    gaps: ArrayLike | None = None,
-    approach: float | None = None,
-    load: float | None = None,
-    holding: Holding | None = None,
+    contact: Contact, holding: Holding | None = None, **weights: ArrayLike | None
 ) -> Gradient:
     """As `Contact.gradient`."""
     holding = control_held(contact, holding)
-    top = levels(contact).top
-    P, D = _number("load", load), _number("approach", approach)
-    on_loads = _weights("loads", loads, contact) + P
-    on_gaps = _weights("gaps", gaps, contact)
-    _something(loads=loads, gaps=gaps, approach=approach, load=load)
-    units = top.problem.units
+    top, (on_loads, on_gaps, D, P) = levels(contact).top, _checked(contact, weights)
+    on_loads, units = on_loads + P, top.problem.units
     far = np.setdiff1d(np.flatnonzero(on_gaps), top.problem.candidates)
     if len(far):
         top = _wider(top, np.union1d(top.problem.candidates, far))
@@ -126,19 +117,12 @@ def contact_gradient(
 
 
 def state_gradient(
-    state: ShearState,
-    *,
-    displacement: float | None = None,
-    forces: ArrayLike | None = None,
-    slips: ArrayLike | None = None,
-    holding: Holding | None = None,
+    state: ShearState, holding: Holding | None = None, **weights: ArrayLike | None
 ) -> Gradient:
     """As `ShearState.gradient`."""
     contact, sheared = state.contact, Frictional.of(state)
     holding = control_held(contact, holding)
-    X = _number("displacement", displacement)
-    on_forces, on_slips = _weights("forces", forces, contact), _weights("slips", slips, contact)
-    _something(displacement=displacement, forces=forces, slips=slips)
+    X, on_forces, on_slips = _checked(contact, weights)
     sign = -1.0 if state.force < 0 else 1.0
     top, low = sheared.known.top, sheared.below("force", state.force, holding)
     which, f, travel = top.problem.candidates, sheared.f, sheared.known.travel_unit
@@ -181,7 +165,7 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
     first = offsets.upper >= offsets.lower.max()
     total = top.load * f * unit
     if not first[place]:
-        low, slope = _just_touching(levels(contact), place)
+        low, slope = _just_touching(sheared, place)
         only = Ball.exact(among_zeros(np.ones(1), np.array([place]), len(offsets)))
         # n(L) = 0, so that -f dL = f dn / (dn/dL)
         parts = [Part(low, indentations=only * (f * unit / slope))]
@@ -194,23 +178,19 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
     return Gradient.of(number._replace(value=total), holding)
 
 
-def _just_touching(known: Levels, place: int) -> tuple[Level, Ball]:
+def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
     """The level at which a candidate touches and carries nothing, and dn/dL of it there.
 
     As a ball of loads that holds the root of n: its indentation rises at all of them.
     """
-    from scipy.optimize import brentq  # 0.1 s to import: only when asked
+    known, named = levels(sheared.contact), sheared.known
 
     def at(load: Ball) -> tuple[Level, Ball]:
         level = known.at(load)
         coupled = product(level, level.tangent.loads)[place]
         return level, level.tangent.approach - coupled
 
-    def depth(load: float) -> float:
-        return float(known.at(Ball.exact(load)).indentation.value[place])
-
-    most = float(known.top.load.value)
-    load = Ball.exact(brentq(depth, 0.0, most, xtol=1e-15 * most, rtol=1e-15))
+    load = Ball.exact(named.at(root(named, place)).load.mid)
     for _ in range(NEWTON):
         level, slope = at(load)
         load = Ball.exact((load - level.indentation[place] / slope).mid)
@@ -246,16 +226,13 @@ def _wider(level: Level, which: Indices) -> Level:
     return Level.of(found, level.load)
 
 
-def _weights(what: str, values: ArrayLike | None, contact: Contact) -> Array:
-    """(n,) checked; 0 where none are given."""
-    return checks.array(what, 0.0 if values is None else values, length=len(contact.scene))
-
-
-def _number(what: str, value: float | None) -> float:
-    return 0.0 if value is None else checks.finite(what, value)
-
-
-def _something(**weights: object) -> None:
+def _checked(contact: Contact, weights: Mapping[str, Any]) -> Iterator[Any]:
+    """Weights on numbers and (n,) on what there is of each asperity; 0 where none are given."""
     if all(value is None for value in weights.values()):
         expected = "at least one: weights on what is to be differentiated"
         raise InputError(", ".join(weights), found="none", expected=expected)
+    for name, value in weights.items():
+        if name in ("load", "approach", "displacement"):
+            yield 0.0 if value is None else checks.finite(name, value)
+        else:
+            yield checks.array(name, 0.0 if value is None else value, length=len(contact.scene))

@@ -40,7 +40,7 @@ def scalar_shares(contact: Contact) -> Shares:
     if known.scope == "none":
         return _unproved(known.elastic, known)
     place = np.searchsorted(known.levels.candidates, known.touching)
-    shares = known.tangent.loads[place]
+    shares = known.levels.top.tangent.loads[place]
     return Shares(shares.value, shares.error, known.loads, known.errors)
 
 
@@ -53,15 +53,14 @@ def vector_shares(contact: Contact) -> Shares:
     together = np.tile(np.eye(2), (n, 1))
     moved = np.linalg.solve(stiffness, together)
     y = moved @ np.linalg.inv(together.T @ moved)  # (2n, 2)
-    known = problem.scalar
-    if known.scope == "none":
-        return _unproved(y.reshape(n, 2, 2), known)
+    if problem.scope == "none":
+        return _unproved(y.reshape(n, 2, 2), problem)
 
     shares = y.reshape(n, 2, 2)
-    if problem.margin == 0.0 or known.stray > 0 or not known.sure.all():
-        return _unproved(shares, known)
+    if problem.margin == 0.0 or problem.stray > 0 or not problem.sure.all():
+        return _unproved(shares, problem)
     errors = np.stack([_errors(problem, shares[..., k], np.eye(2)[k]) for k in (0, 1)], axis=1)
-    return Shares(shares, errors, known.loads, known.errors)
+    return Shares(shares, errors, problem.loads, problem.errors)
 
 
 def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
@@ -69,23 +68,22 @@ def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
 
     What they miss of the total is put on the first one.
     """
-    known = problem.scalar
     exact = Ball.exact(np.ascontiguousarray(shares.T))
-    stiffness = 1.0 / (known.load_balls / known.threshold_balls * 1.5)
+    stiffness = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
     moved = exact * stiffness + problem.couple(shares).T
     off = np.hypot(*(moved - moved.value.mean(axis=1)[:, None]).size)
-    off += problem.product_error * (known.influence.matrix @ np.hypot(*shares.T))
+    off += problem.product_error * (problem.influence.matrix @ np.hypot(*shares.T))
     missing = float(np.hypot(*(exact.sum() - total).size)) * (1 + SAFETY)
     off += missing * problem.reach[0]
     off[0] += missing * stiffness.upper[0]
-    within = distance(off * (1 + SAFETY), 1.0 / known.softness, problem.margin)
-    errors: Array = within * np.sqrt(known.softness) * (1 + SAFETY)
+    within = distance(off * (1 + SAFETY), 1.0 / problem.softness, problem.margin)
+    errors: Array = within * np.sqrt(problem.softness) * (1 + SAFETY)
     errors[0] += missing
     return errors
 
 
 def _unproved(values: Array, problem: Loaded) -> Shares:
-    """Shares of loads of which nothing is known."""
+    """Shares of loads of which nothing is problem."""
     nowhere = np.full(len(values), np.inf)
     errors = nowhere if values.ndim == 1 else np.full(values[:, 0].shape, np.inf)
     return Shares(values, errors, problem.loads, nowhere)

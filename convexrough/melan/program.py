@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough import checks
-from convexrough.arrays import Array
+from convexrough.arrays import Array, among_zeros
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
 from convexrough.melan.elastic_shares import Shares, vector_shares
@@ -52,7 +52,7 @@ class Melan(NamedTuple):
 def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
     """The program with the full tangential kernel; mean (2,) and vertices (m, 2) are Q / f."""
     problem = Loaded.of(contact)
-    unit, touching, n = problem.units.force, problem.touching, len(problem.loads)
+    unit, n = problem.units.force, len(problem)
     shares, m = vector_shares(contact), len(vertices)
     checks.fits_in_memory("cones", m * n, 4000.0)
     elastic = np.einsum("ijk,vk->vij", shares.values, vertices / unit)  # (m, n, 2)
@@ -62,17 +62,13 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
     rest = _inwards(shares.loads, steady + raw.x[1:].reshape(n, 2), mean / unit)
     cones = raw.multipliers[2:].reshape(m, n, 3)
     slips = _closed(-cones[..., 1:] / shares.loads[:, None])
-    everyone = np.zeros((m, len(contact.scene), 2))
-    everyone[:, touching] = slips
-    state = np.zeros((len(contact.scene), 2))
-    state[touching] = (rest - steady) * unit
     return Melan(
         factor=_largest(rest, elastic, shares.loads)[1],
         lower=_lower(shares, rest, mean / unit, elastic, errors),
         upper=_upper(shares, slips, mean / unit, elastic, errors),
         gross=_largest(mean[None], vertices[:, None], np.array([contact.load]))[1],
-        rest=state,
-        slips=everyone,
+        rest=problem.to_scene((rest - steady) * unit),
+        slips=among_zeros(slips, problem.touching, len(contact.scene), axis=1),
     )
 
 

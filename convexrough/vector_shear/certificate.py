@@ -39,7 +39,6 @@ from convexrough.convex.theorem import distance
 from convexrough.friction.levels import AT_THE_END
 from convexrough.numbers.balls import Ball, quietly
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
-from convexrough.vector_shear.loaded import Loaded
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
 #: Radii that are tried for step 2, each so much larger than the one before. Heuristics.
@@ -78,24 +77,21 @@ def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> 
 
     total : (2,) T
     """
-    known = problem.scalar
-    if known.scope == "none" or not known.sure.any():
+    if problem.scope == "none" or not problem.sure.any():
         return VectorBounds.unproved(len(problem))
     found = VectorBounds.unproved(len(problem))
     if np.isfinite(state.displacement).all() and problem.margin > 0:
-        found = _by_convexity(problem, known, state, total)
+        found = _by_convexity(problem, state, total)
     if not (found.sliding | found.partial).all():
-        found = _merged(found, _by_exhaustion(problem, known, state, total))
+        found = _merged(found, _by_exhaustion(problem, state, total))
     return found._replace(excess=_excess(problem, state, total, found.increments))
 
 
-def _by_convexity(
-    problem: VectorProblem, known: Loaded, state: VectorState, total: Ball
-) -> VectorBounds:
+def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
     """Steps 1 to 6."""
-    sure, softness = known.sure, known.softness
+    sure, softness = problem.sure, problem.softness
     reach = problem.reach
-    limits, thresholds = known.load_balls, known.threshold_balls
+    limits, thresholds = problem.load_balls, problem.threshold_balls
 
     # 1. The trial, and by how much it misses the balance and the total.
     eta = state.displacement - problem.couple(state.increments)
@@ -103,16 +99,16 @@ def _by_convexity(
     forces, force_errors = q.value.T, np.hypot(*q.error)
     imbalance = (Ball.exact(eta) + problem.couple(forces) - state.displacement).size
     off = np.hypot(*imbalance.T)
-    off += problem.product_error * (known.influence.matrix @ np.hypot(*forces.T))
-    off = (off + reach @ force_errors + known.stray_effect * (1.0 + problem.bias)) * (1 + SAFETY)
-    missing = float(np.hypot(*(q.sum() - total).size)) + known.stray
+    off += problem.product_error * (problem.influence.matrix @ np.hypot(*forces.T))
+    off = (off + reach @ force_errors + problem.stray_effect * (1.0 + problem.bias)) * (1 + SAFETY)
+    missing = float(np.hypot(*(q.sum() - total).size)) + problem.stray
 
     # 2. The shift that restores the total.
     size = np.hypot(*eta.T)
     shift = _shift(problem, eta, np.zeros(len(eta)), missing)
     if shift == np.inf:
         return VectorBounds.unproved(len(eta))
-    moved = _steepest(known, size - shift) * shift
+    moved = _steepest(problem, size - shift) * shift
 
     # 3. and 4. The residual, and the theorem.
     residual = np.where(sure, off + reach @ moved, 0.0)
@@ -122,19 +118,19 @@ def _by_convexity(
     # 5. The displacement.
     coupled = within * np.sqrt(reach**2 @ np.where(sure, softness, 0.0)) + reach @ moved
     turned = (off + coupled) * (1 + SAFETY)
-    carried = float(np.where(sure, _steepest(known, size - turned) * turned, 0.0).sum())
+    carried = float(np.where(sure, _steepest(problem, size - turned) * turned, 0.0).sum())
     displacement_error = _shift(problem, eta, turned, (missing + carried) * (1 + SAFETY))
 
     # 6. Words, and bounds for the state as it was given.
     uncertainty = (turned + displacement_error) * (1 + SAFETY) + ROUNDED * size
-    distances = np.fmin(distances, _steepest(known, size - uncertainty) * uncertainty) * (
+    distances = np.fmin(distances, _steepest(problem, size - uncertainty) * uncertainty) * (
         1 + SAFETY
     )
     sliding = sure & (size - uncertainty > thresholds.upper)
     bears_more = np.hypot(*forces.T) * (1 + ROUNDED) + force_errors + distances < limits.lower
     partial = sure & ((size + uncertainty < thresholds.lower) | bears_more)
     increments = distances + force_errors + np.hypot(*(forces - state.increments).T) * (1 + SAFETY)
-    increments = np.where(sure, increments, known.most + np.hypot(*state.increments.T))
+    increments = np.where(sure, increments, problem.most + np.hypot(*state.increments.T))
     # What a vector has beyond a disc changes by no more than the vector and the radius do.
     slips = along(np.maximum(size - thresholds.value, 0.0), eta, size)
     slip_errors = np.hypot(*(slips - state.slips).T) + uncertainty + thresholds.error
@@ -171,11 +167,11 @@ def _slopes(scale: Array, share: Array) -> tuple[Array, Array]:
     return 1.5 * scale * root, scale * (1.0 + left / (1.0 + root)) / np.maximum(share, 1.0)
 
 
-def _steepest(known: Loaded, size: Array) -> Array:
+def _steepest(problem: VectorProblem, size: Array) -> Array:
     """(n,) upper bounds on the slopes of q at displacements no shorter than this."""
-    share = np.fmax(size, 0.0) / known.threshold_balls.upper * (1.0 - ROUNDED)
-    _, across = _slopes(known.load_balls.upper / known.threshold_balls.lower, share)
-    return np.asarray(np.where(known.sure, across * (1 + SAFETY), 0.0))
+    share = np.fmax(size, 0.0) / problem.threshold_balls.upper * (1.0 - ROUNDED)
+    _, across = _slopes(problem.load_balls.upper / problem.threshold_balls.lower, share)
+    return np.asarray(np.where(problem.sure, across * (1 + SAFETY), 0.0))
 
 
 def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) -> float:
@@ -185,15 +181,15 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
     between z and eta_i, at the longest eta_i. All together, by Minkowski's inequality, with sines
     with errors theta_i:  lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
     """
-    known, size = problem.scalar, np.hypot(*eta.T)
+    size = np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:
         return np.inf
-    scale = known.load_balls.lower / known.threshold_balls.upper
+    scale = problem.load_balls.lower / problem.threshold_balls.upper
     direction = along(np.ones(len(size)), eta, size)
 
     def least_slope(reached: Array) -> float:
-        share = (size + reached) / known.threshold_balls.lower * (1.0 + ROUNDED)
-        radial, across = np.where(known.sure, _slopes(scale, share), 0.0)
+        share = (size + reached) / problem.threshold_balls.lower * (1.0 + ROUNDED)
+        radial, across = np.where(problem.sure, _slopes(scale, share), 0.0)
         extra = across - radial
         angle = np.minimum(reached / np.maximum(size, 1e-300), 1.0) + ROUNDED
         _, axes = np.linalg.eigh((direction * extra[:, None]).T @ direction)
@@ -220,20 +216,20 @@ def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Arr
 
     e_i is the distance of X - (B q)_i from the deflection of q_i, or from the ray of those of q_i.
     """
-    q, X, known = state.increments, state.displacement, problem.scalar
+    q, X = state.increments, state.displacement
     if not np.isfinite(X).all() or problem.margin == 0.0:
         return np.inf
     size = problem.sizes(q)
-    eta, own = X - problem.couple(q), known.deflections(size)
+    eta, own = X - problem.couple(q), problem.deflections(size)
     length = np.hypot(*q.T)
     along_q = (eta * along(np.ones(len(q)), q, length)).sum(axis=1)
-    nearest = np.where(size < known.loads, own, np.maximum(along_q, own))
+    nearest = np.where(size < problem.loads, own, np.maximum(along_q, own))
     off = np.hypot(*(eta - along(nearest, q, length)).T)
     # One roundoff of a size near P changes the deflection by far more than one.
-    steep = known.deflections(np.minimum(size * (1 + ROUNDED), known.loads)) - own
-    sums = own + known.influence.matrix @ size + float(np.hypot(*X))
+    steep = problem.deflections(np.minimum(size * (1 + ROUNDED), problem.loads)) - own
+    sums = own + problem.influence.matrix @ size + float(np.hypot(*X))
     off = off + steep + (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * sums
-    moved = np.fmin(errors, length + known.most)
+    moved = np.fmin(errors, length + problem.most)
     short = (Ball.exact(np.ascontiguousarray(q.T)).sum() - total) * X
     return float(off @ moved + short.size.sum()) * (1 + SAFETY)
 
@@ -250,37 +246,35 @@ def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
     )
 
 
-def _by_exhaustion(
-    problem: VectorProblem, known: Loaded, state: VectorState, total: Ball
-) -> VectorBounds:
+def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
     """docs/theory/vector-friction.md, "Close to gross sliding".
 
     The sum of P_i - q_i.t is at most `unused`. So each q is within (2 P unused)^(1/2) of P t, all
     together in the same sense; then X.t is no less than what it is at any asperity, and a sliding
     force that is turned costs friction.
     """
-    sure, reach, unproved = known.sure, problem.reach, VectorBounds.unproved(len(problem))
-    P, thresholds = np.where(sure, known.loads, 0.0), known.threshold_balls
+    sure, reach, unproved = problem.sure, problem.reach, VectorBounds.unproved(len(problem))
+    P, thresholds = np.where(sure, problem.loads, 0.0), problem.threshold_balls
     size = float(np.hypot(*total.value))
     if size == 0.0:
         return unproved
     t = total.value / size
     squares = total * total
-    left = known.load_balls.sum() - (squares[0] + squares[1]).sqrt()
-    unused = max(float(left.upper), 0.0) + known.stray
-    most = np.where(sure, known.most, 0.0)
+    left = problem.load_balls.sum() - (squares[0] + squares[1]).sqrt()
+    unused = max(float(left.upper), 0.0) + problem.stray
+    most = np.where(sure, problem.most, 0.0)
     turned = np.minimum(np.sqrt(2.0 * most * unused), 2.0 * most)
-    errors = np.where(sure, known.errors, known.most) + turned + 2 * ROUNDED * P
+    errors = np.where(sure, problem.errors, problem.most) + turned + 2 * ROUNDED * P
     errors = errors + np.hypot(*(state.increments - P[:, None] * t).T)
 
     # B q by what is known of q: `coupled` at P t, within `uncertainty`.
     coupled, across = problem.couple(P[:, None] * t), np.array([-t[1], t[0]])
-    uncertainty = reach @ np.where(sure, known.errors, 0.0) + np.sqrt(
+    uncertainty = reach @ np.where(sure, problem.errors, 0.0) + np.sqrt(
         2.0 * unused * (reach**2 @ most)
     )
-    uncertainty += (1.0 + problem.bias) * known.stray_effect
+    uncertainty += (1.0 + problem.bias) * problem.stray_effect
     uncertainty += (problem.product_error + 2 * ROUNDED) * (reach @ P)
-    least = np.where(sure, known.load_balls.lower, np.inf)
+    least = np.where(sure, problem.load_balls.lower, np.inf)
     missing = unused / least
     lowest = (
         thresholds.lower * (1.0 - missing - missing ** (2 / 3) - ROUNDED)
@@ -296,7 +290,7 @@ def _by_exhaustion(
     spread = np.sqrt(weights @ (side - mean) ** 2) - np.sqrt(weights @ uncertainty**2)
     longest = highest + float(np.hypot(*np.ptp(coupled, axis=0))) + float(uncertainty.max())
     sliding = sure & (pushed | (spread * (1 - SAFETY) > np.sqrt(2.0 * unused) * longest))
-    complete = known.stray == 0 and bool(sure.all())
+    complete = problem.stray == 0 and bool(sure.all())
     proved = bool(sliding.any()) or complete
     # Where nothing turns, the only state is its own mirror image: all along t, so that not all
     # slide below the limit. If all but one do, that one sticks.

@@ -119,7 +119,7 @@ class FrictionConic:
 
     def solve(self, problem: VectorProblem, total: Array) -> VectorState:
         """The state of a total increment (2,), |T| < sum P (own units)."""
-        scale = min(float(np.hypot(*total)) / (ELASTIC * problem.scalar.loads.sum()), 1.0)
+        scale = min(float(np.hypot(*total)) / (ELASTIC * problem.loads.sum()), 1.0)
         program = FrictionProgram.assemble(problem, total / scale)
         data, solver = program.apply(), f"friction ({self.name})"
         for step in STEPS:
@@ -165,12 +165,12 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     @classmethod
     def assemble(cls, problem: VectorProblem, total: Array) -> FrictionProgram:
         """Raises SolverError, with the asperities, where S is above the range of the cones."""
-        scalar, shares = problem.scalar, problem.shift.shares
+        shares = problem.shift.shares
         if shares.max() > FIVE_CONES_LIMIT:
             raise _too_dense(problem)
-        elastic = np.hypot(*total) * scalar.elastic / scalar.loads
+        elastic = np.hypot(*total) * problem.elastic / problem.loads
         small = np.clip(elastic, 0.01 * elastic.max(), 1.0)
-        energy = float((scalar.loads * scalar.thresholds * small**2).max())
+        energy = float((problem.loads * problem.thresholds * small**2).max())
         lift = FOUR if shares.max() <= FOUR_CONES_LIMIT else FIVE
         return cls(problem, total, lift, small, energy)
 
@@ -189,13 +189,13 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
-        n, P, S = len(problem), problem.scalar.loads, problem.shift.shares[:, None]
+        n, P, S = len(problem), problem.loads, problem.shift.shares[:, None]
         unit = np.repeat(self.small * P, 2)
         M = problem.kernel.copy()
         M[np.diag_indices(2 * n)] += np.repeat(problem.shift.values, 2)
         upper = sparse.csc_matrix(np.triu(M * (unit / self.energy) * unit[:, None]))
         nothing = sparse.csc_matrix(((len(lift.orders) - 1) * n,) * 2)
-        counted = (P * problem.scalar.thresholds / self.energy)[:, None] * small**lift.orders
+        counted = (P * problem.thresholds / self.energy)[:, None] * small**lift.orders
         lifted = (counted * (lift.energy[0] + S * lift.energy[1]))[:, 1:]
         linear = np.concatenate((np.zeros(2 * n), lifted.ravel()))
         return sparse.csc_matrix(sparse.block_diag((upper, nothing))), linear
@@ -208,7 +208,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         vectors = np.zeros((rows.shape[1], 2))
         vectors[[1, 2], [0, 1]] = 1.0
         coefficients = (np.ascontiguousarray(rows[:, :, 1:]), np.arange(n), np.arange(n + 1))
-        weights = (self.small * self.problem.scalar.loads)[None] / self.force
+        weights = (self.small * self.problem.loads)[None] / self.force
         balance = sparse.kron(weights, sparse.identity(2))
         powers = sparse.csc_matrix(sparse.bsr_matrix(coefficients))
         each = sparse.hstack([sparse.csc_matrix(sparse.kron(sparse.identity(n), vectors)), powers])
@@ -238,14 +238,14 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         a little slip: of the two, the larger part of its threshold is taken.
         """
         problem = self.problem
-        n, P, thresholds = len(problem), problem.scalar.loads, problem.scalar.thresholds
+        n, P, thresholds = len(problem), problem.loads, problem.thresholds
         unit = self.small * P
         q = raw.x[: 2 * n].reshape(n, 2) * unit[:, None]
         size = np.hypot(*q.T)
         displacement = -raw.multipliers[:2] * self.energy / self.force
         limit = raw.multipliers[2:].reshape(n, -1)[:, 0] * self.energy / unit  # of |q_i| <= m_i
         slip = limit - (thresholds - problem.shift.values * P)  # where |q_i| = P_i
-        left = thresholds - problem.scalar.deflections(np.minimum(size, P))
+        left = thresholds - problem.deflections(np.minimum(size, P))
         sliding = slip > left
         q = along(np.where(sliding, P, np.minimum(size, P)), q, size)
         slips = along(np.where(sliding, slip, 0.0), q, np.hypot(*q.T))
@@ -253,7 +253,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
 
 
 def _too_dense(problem: VectorProblem) -> SolverError:
-    touching, numbers = problem.scalar.touching, problem.convexity_numbers
+    touching, numbers = problem.touching, problem.convexity_numbers
     worst = np.argsort(-numbers)[:5]
     named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
     return SolverError(

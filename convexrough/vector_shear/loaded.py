@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from convexrough.friction.levels import FrictionLevels
 from convexrough.influence import Influence, couple
 from convexrough.influence.shells import shells
 from convexrough.normal.boxes import Scope
-from convexrough.normal.level import Response
 from convexrough.normal.units import Units
 from convexrough.numbers.balls import Ball, where
 from convexrough.roundoff import SAFETY
@@ -66,12 +65,12 @@ class Loaded:
     stray_effect: float
 
     @classmethod
-    def of(cls, contact: Contact) -> Loaded:
+    def of(cls, contact: Contact) -> Self:
         """Those of a contact, which keeps them; InputError where the scene has no friction."""
         return contact.cached(cls._assemble)
 
     @classmethod
-    def _assemble(cls, contact: Contact) -> Loaded:
+    def _assemble(cls, contact: Contact) -> Self:
         levels, scene = contact.cached(FrictionLevels), contact.scene
         level, units = levels.top, levels.units
         loaded = np.flatnonzero(level.loads.value > 0)
@@ -173,11 +172,6 @@ class Loaded:
         shares: Array = c * y
         return np.asarray(shares / shares.sum())
 
-    @property
-    def tangent(self) -> Response:
-        """The same, as proved of the normal solution."""
-        return self.levels.top.tangent
-
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
-        """(..., n) values, among zeros for all other asperities of the scene."""
-        return among_zeros(values, self.touching, len(self.scene), axis=-1)
+        """(n, ...) values, among zeros for all other asperities of the scene."""
+        return among_zeros(values, self.touching, len(self.scene))

@@ -26,7 +26,6 @@ from convexrough.arrays import Array
 from convexrough.convex import newton
 from convexrough.errors import SolverError
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.vector_shear.loaded import Loaded
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
 
@@ -50,19 +49,19 @@ class FrictionNewton:
         """The state of a total increment (2,), |T| < sum P (own units)."""
         law = _Friction(problem, total)
         size = float(np.hypot(*total))
-        height = Fraction(size) * Fraction(problem.scalar.units.force)
-        _, deflections = problem.scalar.from_rest(height)
+        height = Fraction(size) * Fraction(problem.units.force)
+        _, deflections = problem.from_rest(height)
         start = law.evaluate(deflections[:, None] * (total / size))
         if start is None:
             raise SolverError(
                 "no forces of the prescribed total to start from",
                 solver=law.solver,
-                advice=advice(problem.scalar, size),
+                advice=advice(problem, size),
             )
         stopping = newton.Stopping(self.tolerance, 0.0, self.max_iterations)
         state, iterations = newton.solve(law, start, stopping)
         size_of = np.hypot(*state.unknown.T)
-        beyond = np.maximum(size_of - problem.scalar.thresholds, 0.0)
+        beyond = np.maximum(size_of - problem.thresholds, 0.0)
         slips = along(beyond, state.unknown, size_of)
         return VectorState(total, state.forces, state.displacement, slips, iterations)
 
@@ -118,7 +117,7 @@ class _Friction:
 
     def gradient(self, state: _Iterate) -> Array:
         size = np.hypot(*state.unknown.T)
-        bearable = np.minimum(size, self.problem.scalar.thresholds)
+        bearable = np.minimum(size, self.problem.thresholds)
         return along(bearable, state.unknown, size) + state.coupling - state.displacement
 
     def energy_rounding(self, state: _Iterate) -> float:
@@ -134,7 +133,7 @@ class _Friction:
         return ROUNDOFF * state.scale
 
     def advice(self, state: _Iterate) -> str:
-        return advice(self.problem.scalar, float(np.hypot(*self.total)))
+        return advice(self.problem, float(np.hypot(*self.total)))
 
 
 def _direction(problem: VectorProblem, state: _Iterate) -> Array:
@@ -176,10 +175,8 @@ def _direction(problem: VectorProblem, state: _Iterate) -> Array:
 def _roots(problem: VectorProblem, eta: Array) -> Array:
     """(n, 2, 2) W: the frame along and across eta_i times the roots of the slopes there."""
     size = np.hypot(*eta.T)
-    radial = problem.scalar.slopes(size)
-    across = np.where(
-        size > 0, problem.scalar.increments(size) / np.where(size > 0, size, 1.0), radial
-    )
+    radial = problem.slopes(size)
+    across = np.where(size > 0, problem.increments(size) / np.where(size > 0, size, 1.0), radial)
     direction = along(np.ones(len(size)), eta, size)
     direction[size == 0] = (1.0, 0.0)
     x, y = direction.T
@@ -222,10 +219,10 @@ def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | Non
     return None
 
 
-def advice(scalar: Loaded, total: float) -> str:
+def advice(problem: VectorProblem, total: float) -> str:
     """What a user might try where no state is found at a total increment."""
-    place = f"this was at {total / float(scalar.loads.sum()):.6g} of gross sliding"
-    number = float((scalar.shells * scalar.stiffest).max())
+    place = f"this was at {total / float(problem.loads.sum()):.6g} of gross sliding"
+    number = float((problem.shells * problem.stiffest).max())
     if number < 1:
         return f"{place}; try a shear force a little smaller"
     return (

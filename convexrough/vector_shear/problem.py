@@ -24,9 +24,9 @@ docs/theory/vector-friction.md, "The kernel" and "The program".
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -68,43 +68,35 @@ class Shift(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class VectorProblem:
+class VectorProblem(Loaded):
     """The loaded asperities of a contact, and how tangential forces couple them.
 
-    scalar : the same with the angular mean of the kernel (Ciavarella-Jaeger)
     bias   : nu / (2 - nu)
     kernel : (2n, 2n) B, in the order x_1, y_1, x_2, y_2, ...
     """
 
-    scalar: Loaded
     bias: float
     kernel: Array
 
     @classmethod
-    def of(cls, contact: Contact) -> VectorProblem:
-        """That of a contact, which keeps it. Raises InputError where it does not fit in memory."""
-        return contact.cached(cls._assemble)
-
-    @classmethod
-    def _assemble(cls, contact: Contact) -> VectorProblem:
+    def _assemble(cls, contact: Contact) -> Self:
+        """Raises InputError where it does not fit in memory."""
         checks.fits_in_memory("loaded asperities", len(contact.loads.nonzero()[0]), 160, power=2)
-        scalar = Loaded.of(contact)
-        n = len(scalar)
+        loaded = Loaded.of(contact)
+        n = len(loaded)
         nu = contact.scene.material.poisson_ratio
         bias = nu / (2.0 - nu)
-        x, y = contact.scene.contact_points[scalar.touching].T
+        x, y = contact.scene.contact_points[loaded.touching].T
         dx, dy = np.subtract.outer(x, x), np.subtract.outer(y, y)
         squares = dx**2 + dy**2
         squares[np.diag_indices(n)] = 1.0
         kernel = np.empty((n, 2, n, 2))
-        A = scalar.influence.matrix
+        A = loaded.influence.matrix
         turned = bias * A * (dx - dy) * (dx + dy) / squares  # 2 d d' - I = [[cos, sin], [., -cos]]
         kernel[:, 0, :, 0], kernel[:, 1, :, 1] = A + turned, A - turned
         kernel[:, 0, :, 1] = kernel[:, 1, :, 0] = bias * A * 2.0 * dx * dy / squares
-        return cls(scalar, bias, kernel.reshape(2 * n, 2 * n))
-
-    def __len__(self) -> int:
-        return len(self.scalar.loads)
+        known = {each.name: getattr(loaded, each.name) for each in fields(Loaded)}
+        return cls(**known, bias=bias, kernel=kernel.reshape(2 * n, 2 * n))
 
     @property
     def stiffness(self) -> Array:
@@ -113,19 +105,19 @@ class VectorProblem:
         Its eigenvalues, along q and across, are threshold/P times deflection'(t) and
         deflection(t)/t: docs/theory/vector-friction.md, "Convexity".
         """
-        h: Array = (2.0 / 3.0) * self.scalar.thresholds / self.scalar.loads
+        h: Array = (2.0 / 3.0) * self.thresholds / self.loads
         return h
 
     @property
     def convexity_numbers(self) -> Array:
         """(n,) a_i / ((pi/2) s_i) of the pressed state, s_i half the distance to the nearest."""
-        numbers: Array = self.scalar.shells / self.stiffness
+        numbers: Array = self.shells / self.stiffness
         return numbers
 
     @property
     def product_error(self) -> float:
         """The error of (B q)_i as computed is at most this times sum_j A_ij |q_j|."""
-        entries = self.scalar.influence.entry_error
+        entries = self.influence.entry_error
         return 2.0 * (entries + (2 * len(self) + SUM_ROUNDOFFS) * ROUNDOFF)
 
     def couple(self, increments: Array) -> Array:
@@ -136,25 +128,25 @@ class VectorProblem:
     def own(self, increments: Array) -> Array:
         """(n, 2) how far each asperity's own force moves it, |q_i| <= P_i."""
         size = self.sizes(increments)
-        return along(self.scalar.deflections(size), increments, size)
+        return along(self.deflections(size), increments, size)
 
     def sizes(self, increments: Array) -> Array:
         """(n,) |q_i|, and exactly P_i where it is that to rounding, or beyond.
 
         The local law is steep there: one roundoff less than P_i would seem 2e-11 off the threshold.
         """
-        size, P = np.hypot(*increments.T), self.scalar.loads
+        size, P = np.hypot(*increments.T), self.loads
         full: Array = np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
         return full
 
     def local_forces(self, deflections: Array) -> Array:
         """(n, 2) q(eta), the inverse of `own`, along eta; |q_i| = P_i where it slides."""
         size = np.hypot(*deflections.T)
-        return along(self.scalar.increments(size), deflections, size)
+        return along(self.increments(size), deflections, size)
 
     def energy(self, increments: Array, coupling: Array) -> float:
         """`coupling` is B q."""
-        P, thresholds = self.scalar.loads, self.scalar.thresholds
+        P, thresholds = self.loads, self.thresholds
         local = mindlin.potential(np.hypot(*increments.T) / P) @ (P * thresholds)
         return float(local + 0.5 * (increments * coupling).sum())
 
@@ -168,7 +160,7 @@ class VectorProblem:
         """
         if not np.isfinite(state.displacement).all():
             return np.inf
-        q, slips, P = state.increments, state.slips, self.scalar.loads
+        q, slips, P = state.increments, state.slips, self.loads
         size = self.sizes(q)
         slip_size = np.hypot(*slips.T)
         imbalance = np.hypot(*(state.displacement - self.own(q) - self.couple(q) - slips).T)
@@ -195,7 +187,7 @@ class VectorProblem:
         """
         nu = 2.0 * self.bias / (1.0 + self.bias)
         factor = 1.0 if nu == 0 else 4.5 * (1.0 - 2.0 * nu / 3.0) / (2.0 - nu)
-        by_distance = factor * self.scalar.shells
+        by_distance = factor * self.shells
         shares = by_distance / self.stiffness
         if shares.max() <= 21 / 25:
             return Shift(by_distance, shares)
@@ -210,14 +202,14 @@ class VectorProblem:
 
         Asperities not sure to touch are not among the unknowns.
         """
-        root = np.repeat(np.sqrt(self.scalar.softness), 2)
+        root = np.repeat(np.sqrt(self.softness), 2)
         scaled = self.kernel * root * root[:, None]
         return proved_margin(scaled, MARGINS, self.product_error + 8 * ROUNDOFF, spare=SAFETY)
 
     @property
     def reach(self) -> Array:
         """(n, n) |B_ij v| <= reach_ij |v|."""
-        bound: Array = self.scalar.influence.matrix * ((1.0 + self.bias) * (1 + SAFETY))
+        bound: Array = self.influence.matrix * ((1.0 + self.bias) * (1 + SAFETY))
         return bound
 
 

@@ -16,16 +16,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, among_zeros, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
-from convexrough.friction.shear import ShearCertificate
+from convexrough.friction.shear import ShearCertificate, shear
 from convexrough.numbers.balls import Ball
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.vector_shear.certificate import ROUNDED, VectorBounds, certify_vectors
-from convexrough.vector_shear.loaded import Loaded
 from convexrough.vector_shear.newton import FrictionNewton
 from convexrough.vector_shear.problem import VectorProblem, VectorState
 
@@ -108,42 +107,41 @@ def shear_vector(
     """
     checks.instance("contact", contact, Contact)
     solver = FrictionNewton() if solver is None else solver
-    scene = contact.scene
-    friction = checks.friction(scene.friction)
+    friction = checks.friction(contact.scene.friction)
     Q = _vector(force)
     size = float(checks.bearable("force", np.hypot(*Q), friction * contact.load))
     if contact.load == 0.0:
         return _unmoved(contact, solver.name)
     problem = VectorProblem.of(contact)
-    scalar = problem.scalar
-    exact = Ball.exact(Q) / friction / scalar.units.force
+    exact = Ball.exact(Q) / friction / problem.units.force
     total = exact.value
-    height = scalar.levels.height(size)
+    height = problem.levels.height(size)
     if size == 0.0:
-        state = _at_rest(problem)
-    elif height == scalar.levels.load:
+        nothing = np.zeros((len(problem), 2))
+        state = VectorState(np.zeros(2), nothing, np.zeros(2), nothing, 0)
+    elif height == problem.levels.load:
         state = _gross(problem, total)
     else:
         state = _solved(solver, problem, total)
 
-    unit, travel = scalar.force_unit, scalar.travel_unit
+    unit, travel = problem.force_unit, problem.travel_unit
 
     def in_scene(values: Array, unit: float) -> Array:
-        return frozen(among_zeros(values * unit, scalar.touching, len(scene)))
+        return frozen(problem.to_scene(values * unit))
 
     known = certify_vectors(problem, state, exact)
-    left = np.maximum(1.0 - problem.sizes(state.increments) / scalar.loads, 0.0)
+    left = np.maximum(1.0 - problem.sizes(state.increments) / problem.loads, 0.0)
     return VectorShearState(
         contact=contact,
         force=frozen(Q),
         displacement=frozen(_times(state.displacement, travel)),
         forces=in_scene(state.increments, unit),
         slips=in_scene(state.slips, travel),
-        stick_radii=in_scene(contact.contact_radii[scalar.touching] * np.cbrt(left), 1.0),
+        stick_radii=in_scene(contact.contact_radii[problem.touching] * np.cbrt(left), 1.0),
         disagreement=_disagreement(problem, state, height),
         residual=problem.residual(state),
         duality_gap=known.excess * unit * travel,
-        certificate=_certificate(contact, scalar, state, known),
+        certificate=_certificate(contact, problem, state, known),
         solver=solver.name,
         iterations=state.iterations,
     )
@@ -155,9 +153,7 @@ def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> Vec
         state = solver.solve(problem, total)
     except SolverError as error:
         if error.iterate is not None and error.iterate.ndim == 2:
-            scalar = problem.scalar
-            forces = error.iterate * scalar.force_unit
-            error.iterate = among_zeros(forces, scalar.touching, len(scalar.scene))
+            error.iterate = problem.to_scene(error.iterate * problem.force_unit)
         raise
     found = (state.increments, state.slips, state.displacement)
     shapes = ((len(problem), 2), (len(problem), 2), (2,))
@@ -178,11 +174,6 @@ def _vector(force: ArrayLike) -> Array:
     return pair.copy()
 
 
-def _at_rest(problem: VectorProblem) -> VectorState:
-    nothing = np.zeros((len(problem), 2))
-    return VectorState(np.zeros(2), nothing, np.zeros(2), nothing, 0)
-
-
 def _gross(problem: VectorProblem, total: Array) -> VectorState:
     """|T| = sum P: one state of forces, all along T. Slips are along T too.
 
@@ -191,7 +182,7 @@ def _gross(problem: VectorProblem, total: Array) -> VectorState:
     """
     along_total = total / np.hypot(*total)
     across_total = np.array([-along_total[1], along_total[0]])
-    P, thresholds = problem.scalar.loads, problem.scalar.thresholds
+    P, thresholds = problem.loads, problem.thresholds
     q = P[:, None] * along_total
     coupling = problem.couple(q)
     least = thresholds + coupling @ along_total  # X at which each starts to slide
@@ -215,43 +206,43 @@ def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) 
     """With Ciavarella-Jaeger forces along the total; 0 at rest."""
     if height == 0:
         return 0.0
-    other, _ = problem.scalar.from_rest(height)
+    other, _ = problem.from_rest(height)
     total = float(np.hypot(*state.total))
     difference = state.increments - other[:, None] * (state.total / total)
     return float(np.linalg.norm(difference / total) / np.linalg.norm(other / total))
 
 
 def _certificate(
-    contact: Contact, scalar: Loaded, state: VectorState, bounds: VectorBounds
+    contact: Contact, problem: VectorProblem, state: VectorState, bounds: VectorBounds
 ) -> ShearCertificate:
     """From the bounds on one state, in the scene's units; those on vectors are on their lengths."""
 
     def in_scene(errors: Array, values: Array, unit: float) -> Array:
         size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)
-        return scalar.to_scene((errors * (1 + SAFETY) + ROUNDED * size) * unit)
+        return problem.to_scene((errors * (1 + SAFETY) + ROUNDED * size) * unit)
 
     displacement_error = float(bounds.displacement_error + ROUNDED * np.hypot(*state.displacement))
     open_, n = contact.status == "open", len(contact.scene)
     status = np.full(n, "undecided", dtype="<U12")
     status[open_] = "open"
-    status[scalar.to_scene(bounds.partial)] = "partial"
-    status[scalar.to_scene(bounds.sliding)] = "sliding"
-    loaded = scalar.to_scene(np.ones(len(scalar), dtype=bool))
-    strays = np.where(loaded, 0.0, scalar.levels.top_error * scalar.force_unit)
+    status[problem.to_scene(bounds.partial)] = "partial"
+    status[problem.to_scene(bounds.sliding)] = "sliding"
+    loaded = problem.to_scene(np.ones(len(problem), dtype=bool))
+    strays = np.where(loaded, 0.0, problem.levels.top_error * problem.force_unit)
     return ShearCertificate(
-        scope=scalar.scope if bounds.proved else "none",
+        scope=problem.scope if bounds.proved else "none",
         order="proved for one step",
         status=frozen(status),
         force_errors=frozen(
-            strays + in_scene(bounds.increments, state.increments, scalar.force_unit)
+            strays + in_scene(bounds.increments, state.increments, problem.force_unit)
         ),
         slip_errors=frozen(
             np.where(loaded | open_, 0.0, np.inf)
-            + in_scene(bounds.slips, state.slips, scalar.travel_unit)
+            + in_scene(bounds.slips, state.slips, problem.travel_unit)
         ),
         stick_radius_errors=frozen(np.where(open_, 0.0, np.inf)),
         force_error=0.0,
-        displacement_error=displacement_error * scalar.travel_unit,
+        displacement_error=displacement_error * problem.travel_unit,
     )
 
 
@@ -259,10 +250,7 @@ def _unmoved(contact: Contact, solver: str) -> VectorShearState:
     """Nothing is loaded."""
     n = len(contact.scene)
     zero, none, pairs = frozen(np.zeros(n)), frozen(np.zeros(2)), frozen(np.zeros((n, 2)))
-    normal = contact.certificate
-    certificate = ShearCertificate(
-        normal.scope, "proved", normal.status, zero, zero, zero, 0.0, 0.0
-    )
+    certificate = shear(contact, force=0.0).certificate
     return VectorShearState(
         contact, none, none, pairs, pairs, zero, 0.0, 0.0, 0.0, certificate, solver, 0
     )

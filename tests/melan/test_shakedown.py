@@ -223,12 +223,12 @@ def test_cycles_below_and_above_melans_limit(kind: str) -> None:
         limit = cr.shakedown(
             PAPER, loads=P, forces=0.5 * mean[0], force_amplitudes=0.5 * swing[:, 0], kind="elastic"
         )
-        kernel = np.kron(problem.scalar.influence.matrix, np.eye(2))
+        kernel = np.kron(problem.influence.matrix, np.eye(2))
     K = kernel + np.diag(np.repeat(problem.stiffness, 2))
-    unit = problem.scalar.units.force
+    unit = problem.units.force
     slid = {}
     for part in (0.99, 1.01):
-        state = Stuck(K, problem.scalar.loads)
+        state = Stuck(K, problem.loads)
         slips = []
         for _ in range(40):
             cycle = 0.0

@@ -353,7 +353,8 @@ def test_distances_hold_the_true_ones() -> None:
         [Fraction(float(p)) * R / (R + t) for p in point]
         for point, t in zip(scene.asperities.positions, tips, strict=True)
     ]
-    for i, apart in checker.distances(read, list(range(12)), lambda line: None):
+    everyone = list(range(len(points)))
+    for i, apart in checker.distances(read, everyone, everyone[:12], lambda line: None):
         for j, m in enumerate(apart):
             square = sum((p - q) ** 2 for p, q in zip(points[i], points[j], strict=True))
             assert i == j or (m - 2) ** 2 < square * read.grid**2 < (m + 3) ** 2

@@ -80,11 +80,11 @@ def test_tangential_kernel_is_the_sum_of_both_bodies() -> None:
     contact = pressed(cr.Material.pair(STEEL, ALUMINIUM), load=2e4)
     problem = VectorProblem.of(contact)
     _, G, nu = _constants(STEEL, ALUMINIUM)
-    apart = np.subtract(*contact.scene.contact_points[problem.scalar.touching[[3, 17]]])
+    apart = np.subtract(*contact.scene.contact_points[problem.touching[[3, 17]]])
     r = np.hypot(*apart)
     cosine = apart[0] / r
     along = (((1 - nu) + nu * cosine**2) / (2 * np.pi * G * r)).sum()
-    units = problem.scalar.units
+    units = problem.units
     ratio = mindlin.ratio(contact.scene.material.poisson_ratio) * units.length / units.force
     assert ratio * problem.kernel[2 * 3, 2 * 17] == pytest.approx(along, rel=1e-13)
 

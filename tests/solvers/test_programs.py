@@ -121,7 +121,7 @@ def test_too_large_for_memory(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_refused_friction_program_gives_its_last_forces() -> None:
     contact = cr.press(replace(paper(), friction=0.3), approach=PAPER_APPROACH)
     problem = VectorProblem.of(contact)
-    total = np.array([0.3, 0.4]) * problem.scalar.loads.sum()
+    total = np.array([0.3, 0.4]) * problem.loads.sum()
     with pytest.raises(cr.SolverError, match=r"accepted are 1e-18 and 1e-14; try") as refused:
         FrictionConic(accepted=1e-18).solve(problem, total)
     assert refused.value.iterate is not None

@@ -31,7 +31,7 @@ def test_attacks_on_the_statuses(name: str, fraction: float, kind: str, seed: in
     """States that are wrong must not be given a wrong status, nor a bound that is too small."""
     contact = pressed(name, nu=0.5)
     problem = VectorProblem.of(contact)
-    total = np.array([0.8, 0.6]) * fraction * problem.scalar.loads.sum()
+    total = np.array([0.8, 0.6]) * fraction * problem.loads.sum()
     good = FrictionNewton().solve(problem, total)
     rng = np.random.default_rng(seed)
     q, displacement, slips = good.increments.copy(), good.displacement, good.slips.copy()
@@ -51,7 +51,7 @@ def test_attacks_on_the_statuses(name: str, fraction: float, kind: str, seed: in
         slips[rng.integers(len(q))] += size * displacement
     else:
         displacement = displacement * (1 + size * rng.standard_normal(2))
-    q /= np.maximum(lengths(q) / problem.scalar.loads, 1.0)[:, None]
+    q /= np.maximum(lengths(q) / problem.loads, 1.0)[:, None]
     wrong = good._replace(increments=q, displacement=displacement, slips=slips)
     known = certify_vectors(problem, good, Ball.exact(total))
     bounds = certify_vectors(problem, wrong, Ball.exact(total))

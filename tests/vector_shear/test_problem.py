@@ -49,7 +49,7 @@ def test_the_residual_sees_every_fault() -> None:
         1.0, cr.Asperities([[0.0, 0.0]], 0.01), cr.Material(1.0, 0.5), FRICTION, geometry="summit"
     )
     problem = VectorProblem.of(cr.press(scene, approach=1e-4))
-    P, threshold = problem.scalar.loads[0], problem.scalar.thresholds[0]
+    P, threshold = problem.loads[0], problem.thresholds[0]
     along_x = np.array([[1.0, 0.0]])
 
     def residual(share: float, slip: tuple[float, float], off: float = 0.0) -> float:
@@ -80,14 +80,14 @@ def test_the_duality_gap_bounds_what_forces_cost_too_much(
     if contact.load == 0 or contact.certificate.scope == "none":
         return
     problem = VectorProblem.of(contact)
-    total = np.array([fraction * problem.scalar.loads.sum(), 0.0])
+    total = np.array([fraction * problem.loads.sum(), 0.0])
     best = FrictionNewton().solve(problem, total)
     least = problem.energy(best.increments, problem.couple(best.increments))
     assert 0 <= duality_gap(problem, best) <= 1e-11 * least
     short = best._replace(increments=0.99 * best.increments)
     assert duality_gap(problem, short) > 5e-3 * least  # 1 % of the total is missing
     # Forces in proportion to the loads are borne too, and have the right total.
-    other = best._replace(increments=fraction * np.outer(problem.scalar.loads, [1.0, 0.0]))
+    other = best._replace(increments=fraction * np.outer(problem.loads, [1.0, 0.0]))
     for scale in (0.5, 1.0, 2.0):
         moved = other._replace(displacement=scale * best.displacement)
         excess = problem.energy(other.increments, problem.couple(other.increments)) - least
@@ -107,7 +107,7 @@ def test_the_duality_gap_counts_its_rounding(
     if contact.load == 0 or contact.certificate.scope == "none":
         return
     problem = VectorProblem.of(contact)
-    limit = problem.scalar.loads.sum()
+    limit = problem.loads.sum()
     total = fraction * limit * np.array([np.cos(angle), np.sin(angle)])
     best = FrictionNewton().solve(problem, total)
     for sign in (-1, 1):
@@ -126,7 +126,7 @@ def test_the_duality_gap_counts_its_rounding(
 def test_no_duality_gap_without_a_proof_of_convexity() -> None:
     contact = pressed("paper", nu=0.3)
     problem = VectorProblem.of(contact)
-    best = FrictionNewton().solve(problem, np.array([0.3 * problem.scalar.loads.sum(), 0.0]))
+    best = FrictionNewton().solve(problem, np.array([0.3 * problem.loads.sum(), 0.0]))
     assert 0 < duality_gap(problem, best) < 1e-13 * float(best.displacement @ best.total)
     unproved = replace(problem)
     unproved.__dict__["margin"] = 0.0

@@ -204,8 +204,8 @@ def test_random_scenes(
     assert_solves(state, 1e-9 if fraction < 0.9999 else 1e-5)
 
     problem = VectorProblem.of(contact)
-    force = problem.scalar.units.force * FRICTION
-    q, P = state.forces[problem.scalar.touching] / force, problem.scalar.loads
+    force = problem.units.force * FRICTION
+    q, P = state.forces[problem.touching] / force, problem.loads
     least = problem.energy(q, problem.couple(q))
     rng = np.random.default_rng(seed)
     for size in (1e-3, 0.1, 1.0):
@@ -217,7 +217,7 @@ def test_random_scenes(
             trial -= excess / len(P)
             trial /= np.maximum(lengths(trial) / P, 1.0)[:, None]
             excess = trial.sum(axis=0) - q.sum(axis=0)
-        displacement = np.hypot(*state.displacement) / problem.scalar.units.length / FRICTION
+        displacement = np.hypot(*state.displacement) / problem.units.length / FRICTION
         slack = np.hypot(*excess) * displacement / mindlin.ratio(nu) + 1e-12 * least
         assert problem.energy(trial, problem.couple(trial)) >= least - slack
 
