@@ -124,16 +124,16 @@ def run(
         todo, found = folder.missing(todo, resume)
         LOGGER.info(found)
     count = sum(map(len, todo))
-    held = [table(plan.batch(range(0)), [])]  # no rows, all columns
+    parts = [table(plan.batch(range(0)), [])]  # no rows, all columns
     for columns in _report_progress(computed(map(plan.batch, todo), executor), count):
         if folder is None:
-            held.append(columns)
+            parts.append(columns)
         else:
             folder.write(columns)
     seconds = time.monotonic() - began
     if folder is not None:
         return Done(SweepTable(folder.manifest, folder), found, count, seconds)
-    joined = {name: np.concatenate([each[name] for each in held]) for name in held[0]}
+    joined = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
     order = np.argsort(joined["scene"])
     rows = {name: values[order] for name, values in joined.items()}
     return Done(SweepTable(plan.manifest(), None, rows), found, count, seconds)

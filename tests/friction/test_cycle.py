@@ -240,8 +240,8 @@ def test_standing_still(forces: list[float]) -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(random_scenes(crowding=0.9), st.floats(1e-6, 1.0))
-def test_random_cycles(drawn: tuple[cr.Scene, float], fraction: float) -> None:
-    scene, approach = drawn
+def test_random_cycles(sampled: tuple[cr.Scene, float], fraction: float) -> None:
+    scene, approach = sampled
     contact = cr.press(with_friction(scene), approach=approach)
     if contact.load == 0:
         return

@@ -183,5 +183,5 @@ class Cycled(Result):
         from convexrough.plots import cycle_figures, fretting_figures  # only when it draws
 
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
-        drawn = cycle_figures(self.found, loops=self.loops, **units)
-        return {**drawn, **fretting_figures(widest, **units)}
+        figures = cycle_figures(self.found, loops=self.loops, **units)
+        return {**figures, **fretting_figures(widest, **units)}

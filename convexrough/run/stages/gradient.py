@@ -163,8 +163,8 @@ class Differentiated(Single):
     def figures(self, **units: Any) -> Mapping[str, Any]:
         from convexrough.plots import gradient_figures  # matplotlib: only when it draws
 
-        drawn = [gradient_figures(it, of=LETTERS[self.stage.of], **units) for it in self.found]
-        return drawn[0] if drawn else {}
+        figures = [gradient_figures(it, of=LETTERS[self.stage.of], **units) for it in self.found]
+        return figures[0] if figures else {}
 
 
 def _known(error: float) -> str:
