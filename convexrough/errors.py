@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -40,6 +41,20 @@ class InputError(ConvexroughError, ValueError):
         """The same error with the place `where` (a file, for example) in front."""
         place = f"{where}: {self.where}" if self.where else where
         return InputError(self.what, found=self.found, expected=self.expected, where=place)
+
+
+@contextmanager
+def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
+    """InputErrors of the body with this place (a file, a table) in front.
+
+    unless_known : those that name a place already stay as they are
+    """
+    try:
+        yield
+    except InputError as error:
+        if unless_known and error.where:
+            raise
+        raise error.within(str(where)) from error
 
 
 class MistakesError(InputError):

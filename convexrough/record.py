@@ -64,7 +64,7 @@ class Record:
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         """The name of each line, and what stands there."""
-        for name in (*self._shown, *(each.name for each in self._fields())):
+        for name in (*self._shown, *(each.name for each in self._fields() if each.repr)):
             if text := in_text(getattr(self, name)):  # nothing is said where there is nothing
                 yield name, text
 
@@ -130,6 +130,12 @@ class Table(Record):
         """The fields that are one number or word."""
         values = self.__getstate__()
         return {name: it for name, it in values.items() if isinstance(it, (str, int, float))}
+
+
+def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
+    """A mapping for each row of columns, in the numbers of Python."""
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def singular(name: str) -> str:

@@ -11,12 +11,11 @@ from convexrough.cli.speech import (
     DONE,
     NOT_CERTIFIED,
     SOLVER_FAILED,
-    blamed_on,
     echo,
     progress,
     say_aside,
 )
-from convexrough.errors import FileError
+from convexrough.errors import FileError, blamed_on
 
 
 @click.command()

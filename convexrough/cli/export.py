@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from convexrough.cli.options import PATH, json_option
-from convexrough.cli.speech import DONE, blamed_on, echo, progress, say_aside, written
+from convexrough.cli.speech import DONE, echo, progress, say_aside, written
+from convexrough.errors import blamed_on
 
 
 @click.command()

@@ -11,8 +11,8 @@ import click
 from convexrough.atomic import replacing, write_text
 from convexrough.cli.options import PATH, figure_options, html_option, output_options, proof_option
 from convexrough.cli.proof import proved
-from convexrough.cli.speech import DONE, NOT_CERTIFIED, blamed_on, progress, say, written
-from convexrough.errors import FileError
+from convexrough.cli.speech import DONE, NOT_CERTIFIED, progress, say, written
+from convexrough.errors import FileError, blamed_on
 
 if TYPE_CHECKING:
     from convexrough.proof import Proof

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from convexrough.errors import InputError
-
 if TYPE_CHECKING:
     from convexrough.run.stage import Result
     from convexrough.tabular.units import UnitNames
@@ -52,15 +50,6 @@ def echo(summary: dict[str, Any], lines: Iterable[str], as_json: bool) -> None:
 
 def say_aside(*parts: str) -> None:
     click.echo(": ".join(("convexrough", *parts)), err=True)
-
-
-@contextmanager
-def blamed_on(path: Path) -> Iterator[None]:
-    """Mistakes that show only in computing, with the file named."""
-    try:
-        yield
-    except InputError as error:
-        raise error.within(str(path)) from error
 
 
 @contextmanager

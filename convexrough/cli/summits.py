@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,17 +14,15 @@ from convexrough.cli.options import PATH, Command, json_option
 from convexrough.cli.speech import (
     DONE,
     NOT_CERTIFIED,
-    blamed_on,
     echo,
     progress,
     say_aside,
     written,
 )
-from convexrough.errors import FileError, InputError, SolverError
+from convexrough.errors import FileError, InputError, blamed_on
 
 if TYPE_CHECKING:
     from convexrough.contact import Contact
-    from convexrough.run.scene_file import SceneFile
     from convexrough.scene.asperities import Asperities
     from convexrough.surface import Surface
     from convexrough.surface.report import Scanned
@@ -100,16 +99,11 @@ def summits(
     if whole and how["scene"] is None and how["radius"] is None:
         raise click.UsageError("--whole needs --scene or --radius: how to press.")
     _claim(out, force)
-    with progress(f"reading {surface}") as show:
+    with progress(f"reading {surface}"):
         scan = _read(surface, **options)
-        show("finding summits")
         with blamed_on(surface):
-            scanned = _scan(scan, prune, fit, how)
-            if whole and scanned.contact is not None:
-                from convexrough.surface import press_whole
-
-                show("pressing the map whole")
-                scanned = replace(scanned, whole=press_whole(scanned.surface, scanned.contact))
+            scan, press = _pressing(scan, partial(scan.summits, prune, fit), **how)
+            scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
     with progress("writing"):
         files = _written(out, scanned, figures=not no_figures)
     lines = [*report.describe_surface(scanned), *written(out.parent, files)]
@@ -134,12 +128,11 @@ def _claim(path: Path, force: bool) -> None:
 def _written(path: Path, scanned: Scanned, *, figures: bool) -> list[Path]:
     """The table that a scene file reads, the curve and the figures beside it."""
     from convexrough.run.results import write_figures, write_tables
-    from convexrough.surface.report import curve_rows, summit_columns
+    from convexrough.surface.report import curve_columns, summit_columns
 
     tables = {path.stem: summit_columns(scanned.summits)}
     if scanned.curve is not None:
-        rows = curve_rows(scanned.curve)
-        tables[f"{path.stem}-provability"] = {key: [row[key] for row in rows] for key in rows[0]}
+        tables[f"{path.stem}-provability"] = curve_columns(scanned.curve)
     files = write_tables(path.parent, tables)
     if figures:
         from convexrough.plots.surface import surface_figures  # matplotlib: only when it draws
@@ -184,59 +177,34 @@ def _read(path: Path, *, pixel: str | None, detrend: str, **options: Any) -> Sur
     return read(path, pixel=size, detrend=trend, **options)
 
 
-def _scan(surface: Surface, prune: float, fit: int, how: dict[str, Any]) -> Scanned:
-    """All of it; in the unit of the scene, if that names one."""
-    from convexrough.surface import provability
-    from convexrough.surface.provability import LEVELS
-    from convexrough.surface.report import Scanned
-
-    chosen = surface.summits(prune, fit)
-    file: SceneFile | None = None
-    if how["scene"] is not None:
-        from convexrough.run.scene_file import read_scene
-
-        file = read_scene(how["scene"], asperities=chosen)
-        if file.units.length and not surface.unit:
-            expected = f"--unit, as the scene is in {file.units.length}"
-            raise InputError("unit", found="none", expected=expected)
-        if surface.unit and file.units.length and surface.unit != file.units.length:
-            surface = surface.to_unit(file.units.length)
-            chosen = surface.summits(prune, fit)
-    maxima = surface.summits(0.0, fit)
-    if file is None and how["radius"] is None:
-        return Scanned(surface, maxima, chosen)
-    press = _pressing(file, **how)
-    curve = provability(maxima, press, levels=[*LEVELS, prune])
-    try:
-        contact = press(chosen)
-    except SolverError:
-        contact = None
-    return Scanned(surface, maxima, chosen, curve, contact)
-
-
 def _pressing(
-    file: SceneFile | None,
+    surface: Surface,
+    summits: Callable[[], Asperities],
     *,
     scene: Path | None,
-    radius: float,
+    radius: float | None,
     approach: float | None,
     load: float | None,
     modulus: float | None,
-) -> Callable[[Asperities], Contact]:
+) -> tuple[Surface, Callable[[Asperities], Contact] | None]:
+    """The surface in the scene's unit, and how to press on its summits; None for not at all."""
+    if scene is not None:
+        from convexrough.run.scene_file import read_scene
+
+        file = read_scene(scene, asperities=summits())
+        if file.units.length and not surface.unit:
+            expected = f"--unit, as the scene is in {file.units.length}"
+            raise InputError("unit", found="none", expected=expected)
+        if file.units.length not in ("", surface.unit):
+            surface = surface.to_unit(file.units.length)
+        return surface, lambda it: replace(file, scene=replace(file.scene, asperities=it)).press()
+    if radius is None:
+        return surface, None
     from convexrough.contact import press
     from convexrough.scene.material import Material
     from convexrough.scene.scene import Scene
 
-    def as_in_file(asperities: Asperities) -> Contact:
-        assert file is not None
-        pressed = replace(file.scene, asperities=asperities)
-        return press(pressed, approach=file.approach, load=file.load, solver=file.solver,
-                     influence=file.influence)  # fmt: skip
-
-    def as_said(asperities: Asperities) -> Contact:
-        # Under a given approach no contact depends on the modulus; Poisson's ratio is for shear.
-        stuff = Material(1.0 if modulus is None else modulus, 0.3)
-        pressed = Scene(radius, asperities, stuff, geometry="closest")
-        return press(pressed, approach=approach, load=load)
-
-    return as_said if file is None else as_in_file
+    # Under a given approach no contact depends on the modulus; Poisson's ratio is for shear.
+    stuff = Material(1.0 if modulus is None else modulus, 0.3)
+    base = partial(Scene, radius, material=stuff, geometry="closest")
+    return surface, lambda it: press(base(asperities=it), approach=approach, load=load)

@@ -112,6 +112,7 @@ def _executor(workers: int | None, scheduler: str | None) -> AbstractContextMana
 
 
 def _say_summary(folder: Path, out: Path | None, as_json: bool, *, overwrite: bool) -> int:
+    from convexrough.record import rows_of
     from convexrough.sweeps import report
     from convexrough.sweeps.table import open_sweep
 
@@ -123,9 +124,7 @@ def _say_summary(folder: Path, out: Path | None, as_json: bool, *, overwrite: bo
     if out is not None:
         with progress("writing results"):
             lines += written(out, report.write_summary(out, table, found, overwrite=overwrite))
-    rows = zip(*(values.tolist() for values in found.values()), strict=True)
-    quantiles = [dict(zip(found, row, strict=True)) for row in rows]
-    echo({**said, "quantiles": quantiles}, lines, as_json)
+    echo({**said, "quantiles": rows_of(found)}, lines, as_json)
     return _status(said)
 
 

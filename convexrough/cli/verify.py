@@ -16,13 +16,12 @@ from convexrough.cli.proof import proved
 from convexrough.cli.speech import (
     DONE,
     NOT_CERTIFIED,
-    blamed_on,
     echo,
     progress,
     say_aside,
     written,
 )
-from convexrough.errors import FileError, InputError
+from convexrough.errors import FileError, InputError, blamed_on
 
 if TYPE_CHECKING:
     from convexrough.proof import Proof

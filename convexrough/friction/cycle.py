@@ -10,7 +10,7 @@ load, between L* and P (docs/theory/losses.md).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -75,6 +75,7 @@ class Cycle(Table, Plottable):
         loss and statuses are proved; "proved for one step": no loss is proved; "fails": the
         results come from general steps
     presses          : how many normal problems were solved
+    start            : [force] the load of the pressed contact that it starts from; 0 of none
 
     >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
     >>> print(f"{cycle.loss_factor:.4f}", f"{cycle.secant_stiffness:.4g}")
@@ -111,6 +112,7 @@ class Cycle(Table, Plottable):
     displacement_error: float
     order: Order
     presses: int
+    start: float = field(repr=False)
 
     @property
     def scene(self) -> Scene:
@@ -157,18 +159,18 @@ class Cycle(Table, Plottable):
         if self.order == "fails" and levels.proved:
             unknown = frozen(np.full(n, np.nan))
             return unknown, unknown, frozen(np.full(n, np.inf))
-        slip, slide = shared(levels, self._later, CELLS)
+        slip, slide = shared(levels, self._walk.later, CELLS)
         partial, gross = (frozen(levels.to_scene(each.value)) for each in (slip, slide))
         uncertainty = 0.0 if self.order == "proved" else np.inf
         return partial, gross, frozen(levels.to_scene(slip.error + slide.error) + uncertainty)
 
     @cached_property
-    def _later(self) -> list[Piece]:
-        """What the front runs through each time but the first."""
+    def _walk(self) -> _Closed:
+        """The path through the levels of the contact."""
         levels = self.contact.cached(FrictionLevels)
         pairs = zip(map(Fraction, self.loads.tolist()), self.forces.tolist(), strict=True)
         points = [(P, height_at(P, Q, self.scene)) for P, Q in pairs]
-        return _Closed.around(levels, MemoryCurve(), points).later
+        return _Closed.around(levels, MemoryCurve.pressed(self.start), points)
 
     @property
     def force_amplitude(self) -> float:
@@ -488,8 +490,9 @@ def _cycle(
         displacement_error=amplitude_error,
         order=order,
         presses=levels.presses,
+        start=float(closed.start.load),
     )
-    found.__dict__["_later"] = closed.later
+    found.__dict__["_walk"] = closed
     return found
 
 

@@ -1,20 +1,25 @@
 """Fretting: how far each asperity slips, what that costs, and the shear tractions that it bears.
 
-Slip in a contact disc of radius a whose stick disc has the radius c grows towards the rim, where
-its amplitude in a steady cycle is  f c_t [g + (a^2/R) h(c/a)],
+Slip in a contact disc whose stick disc has the radius c grows with the distance r from the centre:
+its amplitude in a steady cycle is  f c_t [g + (r^2/R) h(c/r)],
 
     h(x) = 1/2 - x^2 + [(2 x^2 - 1) asin(x) + x sqrt(1 - x^2)] / pi:
 
 g is the amplitude of gross slip over f c_t, 0 where a disc sticks, and the other term Hertz's gap
-at r = a of a contact of radius c. The traction of first loading to the largest force is f p outside
-the stick disc, and falls inwards from its edge: the largest is f p0 sqrt(1 - c^2/a^2).
-Source: Johnson, Contact Mechanics (1985), sections 4.2 and 7.2.
+at r of a contact of radius c. That holds up to the radius of the disc at the least load of the
+cycle; what lies beyond is not always in contact, and its slip is not known. Tractions are sums of
+Hertz pressures over the levels s_k of the memory curve, b_k its bends:
+
+    q(r) = f (2 E* / pi R) sum_k b_k sqrt(a(s_k)^2 - r^2).
+
+Source: Johnson, Contact Mechanics (1985), sections 4.2 and 7.2; docs/theory/paths.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,24 +28,32 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
-from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle
-from convexrough.friction.shear import shear
+from convexrough.friction.state import states_of, stick_radii
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
+#: How many distances from the centre are tried for the largest traction, besides where it has a
+#: kink: all that count at constant load. Else it is found to about 0.1 %.
+DISTANCES = 64
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fretting(Table, Plottable):
-    """Fretting of each asperity in a steady cycle at constant load; arrays are (n,), 0 where open.
+    """Fretting of each asperity in a steady cycle; arrays are (n,), 0 where open.
 
     status           : that of the cycle
-    slip_amplitudes  : [length] half the range of slip at the rim, where it is largest
-    gross_slip_amplitudes : [length] half the range of slip of the whole disc, 0 where some sticks
-    losses           : [force length] energy lost per cycle
-    mean_tractions   : [force / length^2] |Q_i| / (pi a_i^2) at the largest force of the cycle
-    largest_tractions : [force / length^2] the largest on the disc then
+    slip_amplitudes  : [length] half the range of slip at the rim of the disc at the least load: all
+        that is always in contact. nan where intermittent: slip between touches is not known
+    gross_slip_amplitudes : [length] half the range of slip of the whole disc, 0 where some sticks;
+        nan where intermittent
+    losses           : [force length] energy lost per cycle: `Cycle.asperity_losses`
+    mean_tractions   : [force / length^2] the largest |Q_i| / (pi a_i^2) at the points of the path
+    largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path; to
+        about 0.1 % where the load varies
+
+    All but statuses are nan where order fails.
 
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.25 * contact.load))
     >>> print(f"{worn.slip_amplitudes.max():.3g}", worn.losses.argmax())
@@ -66,24 +79,27 @@ class Fretting(Table, Plottable):
 
 
 def fretting(cycle: Cycle) -> Fretting:
-    """The fretting of each asperity in a steady cycle. Raises InputError where the load varies.
+    """The fretting of each asperity in a steady cycle, of `cycle` or `steady`.
 
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.1 * contact.load))
     >>> bool((worn.mean_tractions <= worn.largest_tractions).all())
     True
     """
     checks.instance("cycle", cycle, Cycle)
-    if np.ptp(cycle.loads) > 0:
-        raise InputError("cycle", found="a load that varies", expected="a constant normal load")
-    contact, scene = cycle.contact, cycle.scene
-    f, a, R = checks.friction(scene.friction), contact.contact_radii, scene.relative_radii
-    peak = max(cycle.maximum, cycle.minimum, key=abs)
-    state = shear(contact, force=peak)
-    gross = cycle.slips / 2.0
+    contact, scene, walk = cycle.contact, cycle.scene, cycle._walk
+    f, R, levels = checks.friction(scene.friction), scene.relative_radii, walk.levels
+    unknown = np.nan if walk.general is not None else 0.0  # the memory curve does not hold
+    gross = cycle.slips / 2.0 + unknown
+    a = stick_radii(levels, levels.at(walk.least))[0]
     rim = f * float(mindlin.ratio(scene.material.poisson_ratio)) * a**2 / R
     in_part = rim * rim_gap(np.minimum(_over(cycle.stick_radii, a), 1.0))
-    limits = f * hertz.peak_pressure(a, scene.material.contact_modulus, R)
-    stuck = np.minimum(_over(state.stick_radii, a), 1.0)
+    mean = largest = np.full(len(scene), unknown)
+    for curve, forces in zip(walk.steady, states_of(levels, walk.steady).forces, strict=True):
+        bends = [(load, float(bend)) for load, bend in curve.bends if bend and load]
+        radii = [stick_radii(levels, levels.at(load))[0] for load, _ in bends]
+        here = stick_radii(levels, levels.at(curve.load))[0]
+        mean = np.maximum(mean, _over(np.abs(forces), np.pi * here**2))
+        largest = np.maximum(largest, _largest(np.array([bend for _, bend in bends]), radii))
     return Fretting(
         contact=contact,
         maximum=cycle.maximum,
@@ -92,9 +108,26 @@ def fretting(cycle: Cycle) -> Fretting:
         slip_amplitudes=frozen(gross + in_part),
         gross_slip_amplitudes=frozen(gross),
         losses=cycle.asperity_losses,
-        mean_tractions=frozen(_over(np.abs(state.forces), np.pi * a**2)),
-        largest_tractions=frozen(limits * np.sqrt((1.0 - stuck) * (1.0 + stuck))),
+        mean_tractions=frozen(mean),
+        largest_tractions=frozen(
+            f * hertz.peak_pressure(largest, scene.material.contact_modulus, R)
+        ),
     )
+
+
+def _largest(bends: Array, radii: Sequence[Array]) -> Array:
+    """(n,) the largest |sum_k b_k sqrt(a_k^2 - r^2)| over r; radii : a_k, (n,) each, rising.
+
+    It is smooth in sqrt(a_k^2 - r^2) between two of the radii, where some distances are tried.
+    """
+    squares = np.square(radii)
+    parts = np.linspace(1.0, 0.0, max(4, DISTANCES // max(1, len(radii))), endpoint=False)
+    largest = np.zeros(squares.shape[1:])
+    for low, high in pairwise([0.0, *squares]):
+        for part in parts:
+            roots = np.sqrt(np.maximum(squares - low - (high - low) * (1.0 - part**2), 0.0))
+            largest = np.maximum(largest, np.abs(bends @ roots))
+    return largest
 
 
 def rim_gap(x: Array) -> Array:

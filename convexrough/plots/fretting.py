@@ -26,11 +26,10 @@ def fretting_figures(worn: Fretting, *, length_unit: str = "", force_unit: str =
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
     work = product(force_unit, length_unit)
     pressure, f = product(force_unit, under=length_unit), scale.limit / worn.contact.load
-    most = float(worn.largest_tractions.max()) if pressure else f * scale.peak
+    most = _largest(worn.largest_tractions) if pressure else f * scale.peak
     traction = measure(most, pressure, f"(f{scale.pressure.symbol})")
-    lost = float(worn.losses.max(initial=0.0, where=np.isfinite(worn.losses)))
     draw_slip(panels[0], worn, scale)
-    energy = measure(lost, work, "W_m")
+    energy = measure(_largest(worn.losses), work, "W_m")
     _draw(panels[1], scale, worn.losses, energy, "energy lost per cycle", "W_i")
     _draw(panels[2], scale, worn.mean_tractions, traction, "mean traction", "\\bar q_i")
     _draw(panels[3], scale, worn.largest_tractions, traction, "largest traction", "q_i")
@@ -44,9 +43,14 @@ def fretting_figures(worn: Fretting, *, length_unit: str = "", force_unit: str =
 
 def draw_slip(axes: Axes, worn: Fretting, scale: Scale) -> None:
     """The map of slip amplitudes."""
-    most = float(worn.slip_amplitudes.max(initial=0.0))
+    most = _largest(worn.slip_amplitudes)
     slip = measure(most if scale.length_unit else scale.travel, scale.length_unit, "X_0")
     _draw(axes, scale, worn.slip_amplitudes, slip, "slip amplitude at the rim", "s_i")
+
+
+def _largest(values: Array) -> float:
+    """Of those that are known."""
+    return float(values.max(initial=0.0, where=np.isfinite(values)))
 
 
 def _draw(axes: Axes, scale: Scale, values: Array, unit: Measure, name: str, symbol: str) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from convexrough.contact import Contact, solve
-from convexrough.errors import FileError, InputError, SceneFileError
+from convexrough.errors import FileError, InputError, SceneFileError, blamed_on
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
@@ -126,10 +126,8 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     if layout.pattern == "file" and asperities is None:
         sources.append(path.parent / layout.path)
     for stage in study.stages.values():
-        try:
+        with blamed_on(path):
             stage.fits(len(scene))
-        except InputError as error:
-            raise error.within(str(path)) from error
     return SceneFile(
         path=path,
         text=text,
@@ -287,6 +285,6 @@ def _blamed_on(path: Path, table: str) -> Iterator[None]:
     except InputError as error:
         if error.where:  # in another file, already named
             raise
-        raise InputError(
-            f"[{table}] {error.what}", found=error.found, expected=error.expected, where=str(path)
-        ) from error
+        what = f"[{table}] {error.what}"
+        where = str(path)
+        raise InputError(what, found=error.found, expected=error.expected, where=where) from error

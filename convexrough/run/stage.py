@@ -7,7 +7,6 @@ A new stage is a subclass of `Stage` and one of `Result` in a file of `run/stage
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -17,9 +16,8 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.contact import Contact
-from convexrough.errors import InputError
 from convexrough.plottable import Plottable
-from convexrough.record import Table, singular
+from convexrough.record import Table, rows_of, singular
 from convexrough.run.values import FileTable
 from convexrough.tabular.columns import aligned
 from convexrough.tabular.units import UnitNames
@@ -69,14 +67,6 @@ class Stage(FileTable):
 
     def fits(self, count: int) -> None:
         """Check that the stage exists for so many asperities. Raises InputError if not."""
-
-    @contextmanager
-    def blamed(self) -> Iterator[None]:
-        """Mistakes that show only in computing, with the table named."""
-        try:
-            yield
-        except InputError as error:
-            raise error.within(f"[{self.name}]") from error
 
 
 def limit(contact: Contact) -> float:
@@ -186,8 +176,7 @@ class Steps(Result):
     steps = True
 
     def rows(self) -> list[Summary]:
-        columns = self.columns_of_steps()
-        return [dict(zip(columns, row, strict=True)) for row in _rows(columns)]
+        return rows_of(self.columns_of_steps())
 
     def columns_of_steps(self) -> Columns:
         """By the names of the stage's numbers."""
@@ -229,10 +218,6 @@ def plain(value: Any) -> Any:
 
 def columns_of(rows: Sequence[Summary]) -> Columns:
     return {key: np.array([row[key] for row in rows]) for key in rows[0]} if rows else {}
-
-
-def _rows(columns: Columns) -> Iterator[tuple[Any, ...]]:
-    return zip(*(values.tolist() for values in columns.values()), strict=True)
 
 
 def repeated(labels: Columns, tables: Sequence[Columns]) -> Columns:

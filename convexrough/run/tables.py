@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from convexrough.errors import FileError, InputError
+from convexrough.errors import FileError, InputError, blamed_on
 from convexrough.scene.asperities import Asperities
 from convexrough.tabular.arrays import reading
 from convexrough.tabular.table import AS_IT_IS, Reading, read_table
@@ -45,7 +45,5 @@ def read_summits(
     positions = np.column_stack((columns["x"], columns["y"]))
     radii = tip_radius if given is None else given
     assert radii is not None  # one of the two
-    try:
+    with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
         return Asperities(positions, radii, columns.get("height", 0.0))
-    except InputError as error:
-        raise error.within(f"{path} ({table.rows[0]} holds asperity 0)") from error

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.errors import InputError
+from convexrough.errors import InputError, blamed_on
 from convexrough.surface.detrend import Trend
 from convexrough.surface.grid import HeightGrid, read_grid
 from convexrough.surface.holes import filled
@@ -59,39 +59,25 @@ def read(
     >>> cr.surface.read(folder / "scan.npz", pixel=2.5, unit="µm").size
     (160.0, 160.0)
     """
-    path = Path(path)
-    try:
-        grid = _grid(path, pixel, unit)
-        return _surface(path, grid, pixel, unit, height_unit, detrend, fill)
-    except InputError as error:
-        raise error if error.where else error.within(str(path)) from error
-
-
-def _surface(
-    path: Path,
-    grid: HeightGrid,
-    pixel: float | tuple[float, float] | None,
-    unit: str | None,
-    height_unit: str | None,
-    detrend: Trend | None,
-    fill: bool,
-) -> Surface:
-    length = one_unit("unit", unit, grid.unit)
-    upwards = one_unit("height_unit", height_unit, grid.height_unit)
-    if upwards and not length:
-        expected = f"that of a pixel, as heights are {upwards.name}"
-        raise InputError("unit", found="none", expected=expected)
-    heights, holes = _mended(grid.heights, fill)
-    if upwards and length:
-        heights = heights * upwards.into(length)
-    size = _pixel(grid.pixel, pixel)
-    name = length.name if length else ""
-    surface = Surface(heights, size, name, filled=holes, source=str(path))
-    if not upwards and not SLOPES[0] <= surface.rms_slope <= SLOPES[1]:
-        found = f"rms slope {surface.rms_slope:.3g}"
-        expected = f"{SLOPES[0]:g} to {SLOPES[1]:g}; if heights have another unit, give height_unit"
-        raise InputError("heights", found=found, expected=expected)
-    return surface if detrend is None else surface.detrend(detrend)
+    with blamed_on(path, unless_known=True):
+        grid = _grid(Path(path), pixel, unit)
+        length = one_unit("unit", unit, grid.unit)
+        upwards = one_unit("height_unit", height_unit, grid.height_unit)
+        if upwards and not length:
+            expected = f"that of a pixel, as heights are {upwards.name}"
+            raise InputError("unit", found="none", expected=expected)
+        heights, holes = _mended(grid.heights, fill)
+        if upwards and length:
+            heights = heights * upwards.into(length)
+        size = _pixel(grid.pixel, pixel)
+        name = length.name if length else ""
+        surface = Surface(heights, size, name, filled=holes, source=str(path))
+        slope = surface.rms_slope
+        if not upwards and not SLOPES[0] <= slope <= SLOPES[1]:
+            likely = f"{SLOPES[0]:g} to {SLOPES[1]:g}"
+            expected = f"{likely}; if heights have another unit, give height_unit"
+            raise InputError("heights", found=f"rms slope {slope:.3g}", expected=expected)
+        return surface if detrend is None else surface.detrend(detrend)
 
 
 def _pixel(

@@ -7,11 +7,25 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.contact import Contact
-from convexrough.surface import Provability, Summits, Surface, Whole, crowded, model_errors
-from convexrough.surface.provability import TOO_FAR
-from convexrough.tabular.columns import aligned
+from convexrough.errors import SolverError
+from convexrough.progress import LOGGER
+from convexrough.record import rows_of
+from convexrough.surface.boundary_elements import Whole, press_whole
+from convexrough.surface.provability import (
+    LEVELS,
+    TOO_FAR,
+    Press,
+    Provability,
+    crowded,
+    model_errors,
+    provability,
+)
+from convexrough.surface.summits import Summits
+from convexrough.surface.surface import Surface
+from convexrough.tabular.columns import aligned, listed
 from convexrough.version import __version__
 
 #: Columns of summits.csv beside x, y, height and tip_radius, which a scene file reads.
@@ -47,6 +61,23 @@ class Scanned:
     contact: Contact | None = None
     whole: Whole | None = None
 
+    @classmethod
+    def of(
+        cls, surface: Surface, prune: float, fit: int, press: Press | None, *, whole: bool = False
+    ) -> Scanned:
+        """The summits of a surface, pressed where `press` says how; and the whole map if asked."""
+        LOGGER.info("finding summits")
+        maxima, summits = surface.summits(0.0, fit), surface.summits(prune, fit)
+        if press is None:
+            return cls(surface, maxima, summits)
+        curve = provability(maxima, press, levels=[*LEVELS, prune])
+        try:
+            contact = press(summits)
+        except SolverError:
+            return cls(surface, maxima, summits, curve)
+        pressed = press_whole(surface, contact) if whole else None
+        return cls(surface, maxima, summits, curve, contact, pressed)
+
     @property
     def certified(self) -> bool:
         """Nothing was pressed, or what was is proved."""
@@ -56,7 +87,7 @@ class Scanned:
 def surface_summary(scanned: Scanned) -> dict[str, Any]:
     """What `--json` prints, in the unit of the map."""
     surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
-    moments = surface.moments
+    moments, statistics = surface.moments, scanned.maxima.statistics
     summary: dict[str, Any] = {
         "schema": 1,
         "version": __version__,
@@ -65,42 +96,26 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
             "shape": list(origin.shape),
             "pixel": list(surface.pixel),
             "unit": surface.unit,
-            "removed": [
-                asdict(each) | {"radius": _finite(each.radius)} for each in surface.removed
-            ],
-            "filled": surface.filled,
-            "max_height": surface.max_height,
-            "rms_height": surface.rms_height,
-            "rms_slope": surface.rms_slope,
+            "removed": [asdict(each) | {"radius": each.radius} for each in surface.removed],
+            **_named(surface, "filled", "max_height", "rms_height", "rms_slope"),
         },
         "summits": {
             "count": len(summits),
-            "maxima": origin.maxima,
-            "pruned": origin.pruned,
-            "at_edge": origin.at_edge,
-            "without_top": origin.without_top,
-            "prune": origin.prune,
-            "threshold": origin.threshold,
+            **_named(origin, "maxima", "pruned", "at_edge", "without_top", "prune", "threshold"),
             "fit": origin.fit,
         },
         "statistics": {
-            "all": scanned.maxima.statistics._asdict(),
+            "all": statistics._asdict(),
             "pruned": summits.statistics._asdict(),
-            "moments": {
-                name: getattr(moments, name)
-                for name in (*scanned.maxima.statistics._fields, "m0", "m2", "m4", "bandwidth")
-            },
+            "moments": _named(moments, *statistics._fields, "m0", "m2", "m4", "bandwidth"),
         },
     }
     if scanned.curve is not None:
-        summary["provability"] = [_without_nan(row) for row in curve_rows(scanned.curve)]
-        summary["trusted_from"] = _finite(scanned.curve.trusted_from)
+        summary["provability"] = rows_of(curve_columns(scanned.curve))
+        summary["trusted_from"] = scanned.curve.trusted_from
     if scanned.contact is not None:
         pairs, values = crowded(scanned.contact)
-        summary["crowded"] = [
-            {"summits": pair, "crowding": value}
-            for pair, value in zip(pairs.tolist(), values.tolist(), strict=True)
-        ]
+        summary["crowded"] = rows_of({"summits": pairs, "crowding": values})
         summary["strained"] = np.flatnonzero(model_errors(scanned.contact) > TOO_FAR).tolist()
     if scanned.whole is not None:
         summary["whole"] = {
@@ -108,6 +123,10 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
             for name, model, whole in scanned.whole.compared()
         } | {"resolution": scanned.whole.resolution}
     return summary
+
+
+def _named(found: object, *names: str) -> dict[str, Any]:
+    return {name: getattr(found, name) for name in names}
 
 
 def summit_columns(summits: Summits) -> dict[str, Any]:
@@ -120,22 +139,9 @@ def summit_columns(summits: Summits) -> dict[str, Any]:
     return named | {"row": summits.pixels[:, 0], "column": summits.pixels[:, 1]}
 
 
-def curve_rows(curve: Provability) -> list[dict[str, Any]]:
-    """A row for each pruning, as in the JSON and the table of the curve."""
-    names = ("prune", "heights", "summits", "contacts", "undecided", "scope", "crowding",
-             "model_error", "approaches", "loads", "trusted")  # fmt: skip
-    called = {"heights": "height", "approaches": "approach", "loads": "load"}
-    columns = [getattr(curve, name).tolist() for name in names]
-    keys = [called.get(name, name) for name in names]
-    return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
-
-
-def _without_nan(row: dict[str, Any]) -> dict[str, Any]:
-    return {key: _finite(it) if isinstance(it, float) else it for key, it in row.items()}
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+def curve_columns(curve: Provability) -> dict[str, NDArray[Any]]:
+    """The table of the curve, a row for each pruning."""
+    return curve.columns(*Provability._along["level",])
 
 
 def describe_surface(scanned: Scanned) -> list[str]:
@@ -167,19 +173,18 @@ def describe_surface(scanned: Scanned) -> list[str]:
         ("bandwidth", f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
                       f"m2 {surface.moments.m2:.4g}, m4 {surface.moments.m4:.4g})"),
     ]  # fmt: skip
-    described = [f"{name:<18}{text}" for name, text in lines]
+    described = listed(lines)
     described += ["", *_describe_statistics(scanned)]
     if scanned.curve is not None:
         described += ["", *_describe_curve(scanned.curve, surface.unit)]
     if scanned.contact is not None:
         described += _describe_crowded(scanned.contact)
     if scanned.whole is not None:
-        table = [["the same approach", "asperities", "whole map", "difference"]]
-        for name, model, whole in scanned.whole.compared():
-            table.append([name, f"{model:.6g}", f"{whole:.6g}", f"{model / whole - 1:+.1%}"])
+        table: list[Any] = [["the same approach", "asperities", "whole map", "difference"]]
+        table += [[*each, f"{each[1] / each[2] - 1:+.1%}"] for each in scanned.whole.compared()]
         described += ["", *aligned(table, left=1)]
         change = f"{100 * scanned.whole.resolution:.2g} %"
-        described.append(f"{'resolution':<18}pixels twice as wide change the load by {change}")
+        described += listed([("resolution", f"pixels twice as wide change the load by {change}")])
     return described
 
 
@@ -189,18 +194,18 @@ def _describe_statistics(scanned: Scanned) -> list[str]:
     moments, unit = scanned.surface.moments, scanned.surface.unit
     units = (f" [1/{unit}²]", f" [1/{unit}]", f" [{unit}]", f" [{unit}]") if unit else [""] * 4
     names = ("density", "mean curvature", "mean height", "height std")
-    table = [["statistics", "all maxima", "after pruning", "by moments"]]
+    table: list[list[Any]] = [["statistics", "all maxima", "after pruning", "by moments"]]
     for field, name, each in zip(maxima._fields, names, units, strict=True):
-        values = (getattr(maxima, field), getattr(left, field), getattr(moments, field))
-        table.append([name + each, *(f"{value:.4g}" for value in values)])
-    return aligned(table, left=1)
+        values = (getattr(found, field) for found in (maxima, left, moments))
+        table.append([name + each, *values])
+    return aligned(table, left=1, digits=4)
 
 
 def _describe_curve(curve: Provability, unit: str) -> list[str]:
     height = f"height [{unit}]" if unit else "height"
     table = [["pruning", height, "summits", "contacts", "undecided", "proof", "crowding",
               "model error", "trusted"]]  # fmt: skip
-    for row in curve_rows(curve):
+    for row in rows_of(curve_columns(curve)):
         table.append([
             f"{100 * row['prune']:.3g} %", f"{row['height']:.4g}", f"{row['summits']:,}",
             f"{row['contacts']:,}", f"{row['undecided']:,}", row["scope"],
@@ -211,7 +216,7 @@ def _describe_curve(curve: Provability, unit: str) -> list[str]:
     said = "at no pruning" if np.isnan(first) else f"from a pruning of {100 * first:.3g} % on"
     if not curve.contacts.any():
         said = "nothing, as nothing touches"
-    return [*aligned(table), "", f"{'to be trusted':<18}{said}"]
+    return [*aligned(table), "", *listed([("to be trusted", said)])]
 
 
 def _describe_crowded(contact: Contact) -> list[str]:
@@ -221,9 +226,9 @@ def _describe_crowded(contact: Contact) -> list[str]:
     if len(pairs):
         lines.append(f"{'overlapping':<18}{len(pairs):,} pairs, by row of the table from 0:")
         x, y = contact.scene.asperities.positions.T
-        table = [["summits", "", "crowding", "x", "y"]]
-        for (i, j), value in list(zip(pairs.tolist(), values, strict=True))[:MOST_LISTED]:
-            table.append([str(i), str(j), f"{value:.3g}", f"{x[i]:.6g}", f"{y[i]:.6g}"])
+        table: list[list[Any]] = [["summits", "", "crowding", "x", "y"]]
+        for (i, j), value in list(zip(pairs, values, strict=True))[:MOST_LISTED]:
+            table.append([str(i), str(j), f"{value:.3g}", x[i], y[i]])
         lines += [f"    {line}" for line in aligned(table)]
         if (more := len(pairs) - MOST_LISTED) > 0:
             lines.append(f"    and {more:,} more: --json has all")

@@ -112,21 +112,11 @@ class Summits(Table, Asperities, Plottable):
         positions: ArrayLike,
         tip_radii: ArrayLike,
         heights: ArrayLike,
-        prominences: Array,
-        largest_curvatures: Array,
-        smallest_curvatures: Array,
-        deviations: Array,
-        pixels: Indices,
+        *,
         origin: Origin,
+        **own: NDArray[Any],
     ) -> None:
         super().__init__(positions, tip_radii, heights)
-        own = {
-            "prominences": prominences,
-            "largest_curvatures": largest_curvatures,
-            "smallest_curvatures": smallest_curvatures,
-            "deviations": deviations,
-            "pixels": pixels,
-        }
         for name, values in own.items():
             object.__setattr__(self, name, frozen(np.array(values)))
         object.__setattr__(self, "origin", origin)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.contact import Contact, solve
-from convexrough.errors import InputError, TableError
+from convexrough.errors import TableError, blamed_on
 from convexrough.friction.verdict import claims_sliding, verify_shear
 from convexrough.normal.problem import NormalProblem
 from convexrough.verdict.claims import Claimed, Manner, read_loads, read_shear_forces
@@ -38,10 +38,8 @@ def verify_files(
         checks.positive("--within", within)
     given = read_loads(loads, problem.scene, how)
     forces = read_shear_forces(shear, problem.scene, how) if shear is not None else None
-    try:
+    with blamed_on(loads):
         verdict = verify_on(problem, given.values, within=within, floor=how.floor)
-    except InputError as error:
-        raise error.within(str(loads)) from error
     if shear is None or force is None or forces is None:
         return Verified(verdict, None, [given.note])
     contact = verdict.solution

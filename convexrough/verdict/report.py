@@ -14,6 +14,7 @@ from convexrough.compare import joined
 from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plausibility import described_modulus
+from convexrough.record import rows_of
 from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import aligned, bound, listed
 from convexrough.tabular.units import NAMELESS, UnitNames
@@ -51,9 +52,7 @@ def verdict_summary(found: Verified) -> dict[str, Any]:
     summary: dict[str, Any] = {"verdict": _claim_summary(found.verdict)}
     if found.sheared is not None:
         summary["shear_verdict"] = _claim_summary(found.sheared)
-    columns = asperity_columns(found)
-    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    return summary | {"asperities": [dict(zip(columns, row, strict=True)) for row in rows]}
+    return summary | {"asperities": rows_of(asperity_columns(found))}
 
 
 def _claim_summary(claim: Claim) -> dict[str, Any]:

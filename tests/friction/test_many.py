@@ -66,6 +66,7 @@ def assert_same(contacts: cr.Contacts, k: int, one: cr.Contact) -> None:
     assert contacts.load_errors[k] <= 1.1 * proof.load_errors.sum() + 8 * ulp * one.load + 1e-300
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("by_load", [False, True])
 @pytest.mark.parametrize("name", SETS)
 def test_scenes_together_are_those_alone(name: str, by_load: bool) -> None:

@@ -47,6 +47,7 @@ def assert_same(alone: Level, level: Level) -> None:
         assert (b.radius <= 2.0 * a.radius + 1e-29 * np.max(a.size)).all()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", NAMED)
 def test_levels_together_are_those_alone(name: str) -> None:
     scene, approach = NAMED[name]

@@ -272,7 +272,7 @@ def test_shells_prove_what_eigenvalues_show() -> None:
     scene, approach = scenes.scattered(5, 8, 0.5, 0.5)
     given = deepcopy(cr.press(scene, approach=approach).proof().document["scene"])
     accepted, overlapping = 0, 0
-    for trial in range(400):
+    for trial in range(150):
         points = rng.uniform(-1, 1, (8, 2)) if trial % 2 else rng.uniform(-9, 9, (8, 2))
         points[1] = points[0] + rng.uniform(0.01, 0.3, 2)
         given |= {"x": [x.hex() for x in points[:, 0]], "y": [y.hex() for y in points[:, 1]]}
@@ -290,7 +290,7 @@ def test_shells_prove_what_eigenvalues_show() -> None:
         accepted += 1
         overlapping += bool((shells[:, None] + shells > apart).any())
         assert np.linalg.eigvalsh(1 / (np.pi * apart) + np.diag(1 / (2 * radii))).min() > 0
-    assert accepted > overlapping > 20
+    assert accepted > overlapping > 8
 
 
 def test_a_base_with_two_radii(document: Any) -> None:

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from convexrough import checks
 from convexrough.contact import Contact
+from convexrough.errors import blamed_on
 from convexrough.friction.cycle import steady
 from convexrough.friction.path import load_path
 from convexrough.friction.phases import PhaseLosses, phase_losses
@@ -85,7 +86,7 @@ class Path(_Points):
     )
 
     def compute(self, contact: Contact) -> Pathed:
-        with self.blamed():
+        with blamed_on(f"[{self.name}]"):
             found = load_path(contact.scene, **self.points(contact), influence=contact.influence)
         return Pathed(self, contact, (found,))
 
@@ -155,7 +156,7 @@ class Steady(_Points):
 
     def compute(self, contact: Contact) -> Settled:
         scene, influence = contact.scene, contact.influence
-        with self.blamed():
+        with blamed_on(f"[{self.name}]"):
             found = [steady(scene, **self.points(contact), influence=influence)]
             return Settled(self, contact, (*found, *self._losses(contact)))
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from convexrough.contact import Contact
+from convexrough.errors import blamed_on
 from convexrough.melan.shakedown import Theory, shakedown
 from convexrough.run.stage import Columns, Single, Stage, Summary
 from convexrough.run.stages.path import unproved_order
@@ -48,7 +49,7 @@ class Shakedown(Stage):
 
     def compute(self, contact: Contact) -> Limit:
         swings = self.load_amplitudes or [0.0] * len(self.force_amplitudes)
-        with self.blamed():
+        with blamed_on(f"[{self.name}]"):
             found = shakedown(
                 contact.scene,
                 loads=self.reference * self.loads,
