@@ -52,6 +52,7 @@ def load(path: Path) -> Any:
     return module
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     "path",
     [path for path in SCRIPTS if path.stem not in ("boundary_elements", "measured_surface")],

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from convexrough import checks
-from convexrough.bench.reference import Reference
+from convexrough.arrays import Array
 from convexrough.bench.rows import Row
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import Contact, press
@@ -26,6 +26,10 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.threads import cores
+
+#: The largest proved error over the largest load at which loads are a reference: two units in the
+#: last place of that.
+ACCURATE = 2.0**-52
 
 #: Least and most runs of which the fastest counts; more than the least while patience lasts.
 LEAST_RUNS, MOST_RUNS = 3, 25
@@ -102,6 +106,27 @@ TASKS: dict[str, Task] = {
 }
 
 
+class Reference(NamedTuple):
+    """loads : (n,) [force];  bound : proved on the error of each, over the largest"""
+
+    loads: Array
+    bound: float
+
+    def error(self, loads: Array) -> float:
+        """max |P - P_ref| / max P_ref, of loads (n,) [force]."""
+        return float(np.abs(loads - self.loads).max() / self.loads.max())
+
+
+def reference(scene: Scene, approach: float) -> Reference:
+    """The loads at an approach. Raises SolverError where they are not proved to be so accurate."""
+    contact = press(scene, approach=approach)
+    bound = float(contact.certificate.load_errors.max() / contact.loads.max())
+    if not bound <= ACCURATE:
+        advice = "another approach, or asperities further apart"
+        raise SolverError(f"loads proved to {bound:.2g} only", solver="reference", advice=advice)
+    return Reference(contact.loads, bound)
+
+
 def measure_attempt(
     family: Family, scene: Scene, attempt: Attempt, reference: Reference | None, patience: float
 ) -> Row:
@@ -161,7 +186,7 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
         "asperities": {"pattern": "hexagonal", **lattice, "height_std": 1e-6 * a},
         "normal": {"load": 3.6e-7},
         "friction": {"coefficient": 0.5},
-        "cycle": {"maximum": [0.37]},
+        "cycle": {"maximum_fraction": [0.37]},
         "sweep": {"seeds": scenes, "measure": ["contact", "loss"]},
     }
     began = time.perf_counter()

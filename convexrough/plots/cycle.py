@@ -128,7 +128,7 @@ def loops_figure(
     upright.sharey(whole)
     upright.tick_params(labelleft=False)
     upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
-    which = f": {len(cycles)} of {count} cycles" if count > len(cycles) else ""
+    which = f": {len(cycles)} of {count}" if count > len(cycles) else ""
     title(whole, f"whole contact{which}")
     title(upright, "less an elastic part")
     _draw_asperity_loops(single, loops[-1], asperities, names, cycles[-1], scale)

@@ -246,8 +246,10 @@ class _Placing:
         distances, owners = _nearest(positions, points)
         far = distances > allowed
         self.how = f"matched by position, to {distances.max():.2g}"
-        if far.mean() > 0.5 and (moved := self._moved(points, allowed)):
+        doubtful = far.any() if len(points) == len(positions) else far.mean() > 0.5
+        if doubtful and (moved := self._moved(points, allowed)):
             self.mistakes.append(f"positions: {moved}")
+            return owners
         for i in np.flatnonzero(far):
             found = f"position {points[i].tolist()}, {distances[i]:g} from the nearest asperity"
             self._refuse(i, found, f"a position of the scene to {allowed:.3g}")
@@ -286,9 +288,10 @@ class _Placing:
             tried = [positions.mean(axis=0) - points.mean(axis=0)]
         for shift in tried:
             if fits(points[:20] + shift) and fits(points + shift):
-                rounded = np.round(-shift / allowed) * allowed
-                there = ", ".join(f"{each:.4g}" for each in rounded + 0.0)
-                return f"all are shifted by [{there}], expected them from the axis of the sphere"
+                digit = 0.1 * allowed
+                there = ", ".join(f"{each:.4g}" for each in np.round(-shift / digit) * digit + 0.0)
+                expected = f"expected them from the axis of the sphere, to {allowed:.3g}"
+                return f"all are shifted by [{there}], {expected}"
         return ""
 
 

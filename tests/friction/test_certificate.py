@@ -10,6 +10,7 @@ from scenes import MATERIAL, scattered, twins
 import convexrough as cr
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("ulps", [0, 2, -2, 8, -8])
 @pytest.mark.parametrize("fraction", [1e-9, 0.25, 0.9])
 def test_an_asperity_that_nearly_touches_is_decided(fraction: float, ulps: int) -> None:

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, KINDS, pressed, with_friction
+from friction_scenes import FRICTION, KINDS, pressed
 from numpy.testing import assert_allclose
-from scenes import NAMED, PAPER_APPROACH, paper
+from scenes import PAPER_APPROACH, paper
 
 import convexrough as cr
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("influence", KINDS)
 @pytest.mark.parametrize("share", [1e-6, 0.3, -0.7, 0.999, 1.0])
 def test_the_force_of_a_displacement(influence: str, share: float) -> None:
@@ -68,6 +69,7 @@ def test_stiffness_and_loss_factor() -> None:
     assert np.isnan(still.secant_stiffness)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("influence", KINDS)
 @pytest.mark.parametrize(("high", "low"), [(0.6, -0.6), (0.6, 0.2), (0.2, -0.8), (-0.3, -0.3)])
 def test_loops_are_the_history_that_they_stand_for(influence: str, high: float, low: float) -> None:
@@ -86,18 +88,6 @@ def test_loops_are_the_history_that_they_stand_for(influence: str, high: float, 
     theirs = np.where(loaded, past.asperity_displacements[body][:, chosen], 0.0)
     assert_allclose(loop.asperity_displacements, theirs, atol=1e-11 * scale)
     assert loop.asperities.tolist() == chosen
-
-
-def test_no_level_of_a_loop_is_pressed_twice() -> None:
-    scene, approach = NAMED["rough"]
-    contact = cr.press(with_friction(scene), approach=approach)
-    limit = FRICTION * contact.load
-    cycles = cr.cycles(contact, np.array([0.1, 0.37, 0.5]) * limit)
-    assert cycles[-1].presses == 4
-    loops = cr.loops(cycles, 40, asperities=[0])
-    assert cr.cycle(contact, maximum=0.5 * limit).presses <= 4 + 20
-    assert [len(loop.forces) for loop in loops][2] == 41
-    assert [loop.forces.max() for loop in loops] == [each.maximum for each in cycles]
 
 
 def test_bad_loops() -> None:

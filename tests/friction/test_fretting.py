@@ -28,6 +28,7 @@ def worn(name: str, high: float, low: float) -> tuple[cr.Cycle, cr.Fretting]:
     return cycle, cr.fretting(cycle)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("high", "low"), [(0.3, -0.3), (0.6, -0.6), (0.2, -0.7), (0.8, 0.1)])
 def test_tractions_are_those_of_the_field(high: float, low: float) -> None:
     _, found = worn("rough", high, low)
@@ -45,6 +46,7 @@ def test_tractions_are_those_of_the_field(high: float, low: float) -> None:
         assert found.mean_tractions[i] == pytest.approx(mean, rel=1e-5)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("high", "low"), [(0.3, -0.3), (0.6, -0.6), (0.8, 0.1)])
 def test_slip_against_friction_costs_the_energy(high: float, low: float) -> None:
     """Each asperity loses 4 times the integral of f p times the amplitude of slip, by either law.

@@ -31,6 +31,7 @@ def assert_known(values: Any, errors: Any, true: Any, bound: float) -> None:
     assert np.max(errors) <= bound * largest
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("fraction", FRACTIONS)
 @pytest.mark.parametrize("holding", ["approach", "load"])
 @pytest.mark.parametrize("name", SCENES)
@@ -71,6 +72,7 @@ def assert_state(state: cr.ShearState, true: Friction) -> None:
     assert (state.status[loaded] == np.where(true.sticks, "partial", "sliding")[loaded]).all()
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("share", [0.3, 0.9])
 @pytest.mark.parametrize("name", ["paper", "rough"])
 def test_a_prescribed_displacement(name: str, share: float) -> None:

@@ -103,6 +103,7 @@ def falls(contact: cr.Contact, low: float = 0.0) -> bool:
     return down or any((level.indentation.positive & ~rising).any() for level in here)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("influence", ["dense", "scattered"])
 def test_order_is_proved(name: str, influence: cr.influence.Kind) -> None:
@@ -111,6 +112,7 @@ def test_order_is_proved(name: str, influence: cr.influence.Kind) -> None:
     assert levels_of(contact).order([NOTHING]) == "proved"
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "patch", [(0.0102, 0.07, 3e-5), (0.02, 0.07, 1e-4), (0.03, 0.02, 4e-4), (0.03, 0.03, 4e-4)]
 )
@@ -130,6 +132,7 @@ def test_order_where_one_just_touches_is_proved() -> None:
     assert levels_of(contact).order([NOTHING]) == "proved"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("aim", [0.5, 0.7, 0.9])
 def test_order_of_random_layouts_is_proved(aim: float) -> None:
     for seed in range(5):
@@ -138,6 +141,7 @@ def test_order_of_random_layouts_is_proved(aim: float) -> None:
         assert found == ("fails" if falls(contact) else "proved")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("aim", [1.0, 1.5, 2.0, 2.5])
 def test_no_proof_where_an_indentation_falls(aim: float) -> None:
     for seed in range(5):
@@ -146,6 +150,7 @@ def test_no_proof_where_an_indentation_falls(aim: float) -> None:
             assert levels_of(contact).order([NOTHING]) == "fails"
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("load", [2.5, 3.0, 3.5, 4.0])
 @pytest.mark.parametrize("share", [0.0, 0.5])
 def test_no_proof_where_the_middle_is_lifted_out(load: float, share: float) -> None:
@@ -163,36 +168,6 @@ def test_ordered_ends_are_no_order() -> None:
     assert ends.positive.all()
     assert falls(contact, 0.5)
     assert levels.order([middle]) == "fails"
-
-
-@pytest.mark.parametrize("share", [0.0, 0.4])
-def test_bounds_of_rates_hold_for_all_softnesses_in_their_box(share: float) -> None:
-    """The bounds of the proof, against (I + A C)^-1 1 with C drawn from C~ - delta to C~."""
-    rng = np.random.default_rng(7)
-    for contact in (
-        hexagonal(0.0102, 0.07, 5e-5),
-        *(random_contact(s, 1.6) for s in range(20, 23)),
-    ):
-        levels = levels_of(contact)
-        upper, lower = levels.top, levels.at(levels.load * Fraction(share))
-        assert upper.solution is not None
-        span = order._Span.of(upper, lower, upper.solution)
-        inverse, on = span.inverse(), span.support
-        (below,), (most,) = inverse.bounds(lambda m, span=span: span.delta(m[0])[None])
-        if not (below > 0).all():
-            continue
-        delta, m = span.delta(most), np.ones(len(span.c))
-        m[on] = most
-        others = np.setdiff1d(np.arange(len(m)), on)
-        A = upper.problem.influence.matrix
-        elsewhere = inverse.elsewhere(A[None, others][:, :, on], (delta * most)[None])[0]
-        for _ in range(20):
-            c = span.c.copy()
-            c[on] -= delta * rng.choice([0.0, 1.0, rng.random()], len(on))
-            y = np.linalg.solve(np.eye(len(m)) + A * c, np.ones(len(m)))
-            assert (y[on] * inverse.matrix[0].diagonal() >= below * (1 - 1e-12)).all()
-            assert (y <= m + 1e-12).all()
-            assert (y[others] >= elsewhere - 1e-12).all()
 
 
 def test_onsets_are_enclosed_by_proofs() -> None:

@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
 from path_scenes import LARGEST, ONE, PAPER, TWO, path_of, shaded
 from scenes import random_scenes
 
 import convexrough as cr
 from convexrough.friction import conic_step
-from convexrough.friction.conic_pieces import ConePiece, pieces_of
-from convexrough.friction.curve import MemoryCurve
 from convexrough.solvers.programs import RawAnswer
 
 
@@ -31,8 +28,8 @@ def test_three_ways_to_one_path(points: list[tuple[float, float]]) -> None:
 
 @settings(max_examples=6, deadline=None)
 @given(random_scenes(crowding=0.7, most=10), st.integers(0, 2**32 - 1))
-def test_random_paths_as_cone_programs(drawn: tuple[cr.Scene, float], seed: int) -> None:
-    scene, approach = drawn
+def test_random_paths_as_cone_programs(sampled: tuple[cr.Scene, float], seed: int) -> None:
+    scene, approach = sampled
     largest = cr.press(scene, approach=approach).load
     if largest == 0:
         return
@@ -87,40 +84,6 @@ def test_a_wrong_answer_of_the_solver_shows(monkeypatch: pytest.MonkeyPatch) -> 
     scene, P, Q = path_of("paper", ONE)
     conic = cr.compare_paths(scene, loads=P, forces=Q).entries[2]
     assert conic.force_disagreement > 1e-3
-
-
-@pytest.mark.parametrize("own", [0.7, 1.0, 1.4])
-def test_the_pieces_join_to_the_deflection(own: float) -> None:
-    """Slopes of W are what one update of the curve gives, on a curve with three layers."""
-    k = 1.3
-    curve = MemoryCurve.pressed(0.5)
-    for point in ((0.6, 0.05), (1.0, 0.3), (1.0, 0.1)):
-        curve, _ = curve.go(*point)
-    pieces = pieces_of(curve, own, k)
-    load = (own / k) ** 1.5
-
-    def force(deflection: float) -> float:
-        after, _ = curve.go(own, deflection)
-        levels = np.array([float(each) for each in after.levels])
-        loads = (levels / k) ** 1.5 / load
-        return float(np.diff(loads) @ np.array([float(each) for each in after.slopes]))
-
-    for deflection in np.linspace(-0.98, 0.98, 29) * own:
-        part = force(deflection)
-        on = [piece for piece in pieces if piece.distance(part) < 1e-12]
-        assert on
-        for piece in on:
-            assert own * piece.deflection(part) == pytest.approx(deflection, abs=1e-9)
-        values = [piece.cost(part) + piece.energy for piece in on]
-        assert_allclose(values, values[0], atol=1e-12)
-
-
-def test_the_pieces_cover_all_that_friction_bears() -> None:
-    pieces = pieces_of(MemoryCurve.pressed(1.0).go(1.0, 0.4)[0], 1.2, 1.0)
-    ends = np.array([piece.forces() for piece in pieces])
-    assert ends.min() == pytest.approx(-1.0)
-    assert ends.max() == pytest.approx(1.0)
-    assert isinstance(pieces[0], ConePiece)
 
 
 def test_gross_sliding_is_left_to_the_curve() -> None:

@@ -60,6 +60,7 @@ CASES = [
 ]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(("name", "holding", "fraction"), CASES)
 def test_everything_that_changes(name: str, holding: str, fraction: float) -> None:
     contact = pressed(name, holding)
@@ -91,6 +92,7 @@ def test_everything_that_changes(name: str, holding: str, fraction: float) -> No
         np.testing.assert_allclose(found, true, rtol=0, atol=2e-13 * np.abs(true).max())
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("name", "holding", "fraction"), CASES)
 def test_forwards_and_backwards_agree(name: str, holding: Any, fraction: float) -> None:
     contact, rng = pressed(name, holding), np.random.default_rng(9)
@@ -161,6 +163,7 @@ def test_the_oracle_is_at_the_state() -> None:
         assert abs(float(oracle.approach) / contact.approach - 1) < 1e-14
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", ["sphere_radius", "friction", "load", "approach", "force"])
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), "1e-9", None])
 def test_a_direction_is_of_numbers(name: str, value: Any) -> None:

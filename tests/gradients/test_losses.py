@@ -45,6 +45,7 @@ def assert_both(
         assert max(loss.balance_defect, moved.balance_defect) < 1e-14
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("fraction", [1e-2, 0.4, 0.999])
 def test_every_derivative(name: str, fraction: float) -> None:
@@ -54,6 +55,7 @@ def test_every_derivative(name: str, fraction: float) -> None:
         assert_both(contact, state, fraction * FRICTION * contact.load, holding, SHARP)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("fraction", [1e-9, 1e-6, 1e-4, 1 - 1e-7])
 def test_bounds_are_honest_where_they_are_not_sharp(fraction: float) -> None:
     contact, state = pressed("rough", "load"), reference("rough", fraction, "load")
@@ -83,6 +85,7 @@ def random_scene(rng: np.random.Generator) -> tuple[cr.Scene, float]:
     return scene, float(approach - scene.offsets.max())
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("seed", range(40))
 def test_no_bound_is_too_small(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -136,6 +139,7 @@ def test_reference_values() -> None:
     assert values == pytest.approx((*true, 124.474817563, -12.2449270891), rel=1e-11)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("holding", ["load", "approach"])
 @pytest.mark.parametrize("fraction", [1e-3, 0.5])
 def test_identities(holding: Any, fraction: float) -> None:
@@ -213,6 +217,7 @@ def test_no_derivative_in_gross_sliding() -> None:
         cr.onset_gradient(together, 1)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("holding", ["load", "approach"])
 @pytest.mark.parametrize("name", ["rough", "rough, closest"])
 def test_normalised(name: str, holding: Any) -> None:

@@ -72,6 +72,7 @@ def test_the_approach_and_the_load(geometry: str) -> None:
     assert_slopes(of_contact(contact, "approach", lambda o: o.P.sum()), gradient, sharp=SHARP)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("holding", ["load", "approach"])
 def test_any_sum_of_loads_and_gaps(geometry: str, holding: Any) -> None:
@@ -107,6 +108,7 @@ def test_gaps_of_asperities_that_could_not_touch() -> None:
 STATES = [("summit", "load", 1e-3), ("summit", "approach", 0.5), ("closest", "load", 0.95)]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(("geometry", "holding", "fraction"), STATES)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_any_sum_of_forces_and_slips(

@@ -70,6 +70,7 @@ def test_exact_limits_around_ellipses(angle: float, a: float, b: float) -> None:
     assert found.upper >= a * (1 - 1e-12)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("angle", [None, 0, 45, 90])
 def test_paths_below_and_above_the_limit(angle: float | None) -> None:
     """1 % below no asperity of a ring slides in a later cycle; 1 % above all do, as L* says."""
@@ -110,6 +111,7 @@ def test_elastic_limit() -> None:
     assert (np.abs(found.witness) <= 0.5 * contact.loads * (1 + 1e-9)).all()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("ratio", "along", "across"),
     [
@@ -203,6 +205,7 @@ class Stuck:
         self.slip = raw.multipliers[2::3] * unit * scale
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ["elastic", "vector"])
 def test_cycles_below_and_above_melans_limit(kind: str) -> None:
     """From a first loading that slides: slip dies out 1 % below, and goes on 1 % above.
@@ -284,6 +287,7 @@ def exact_shares(scene: cr.Scene, load: float, vector: bool) -> tuple[list[arb],
     ]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ["elastic", "vector"])
 @pytest.mark.parametrize("name", ["paper", "rough"])
 def test_enclosures_hold_the_limit_in_ball_arithmetic(kind: str, name: str) -> None:
@@ -301,6 +305,7 @@ def test_enclosures_hold_the_limit_in_ball_arithmetic(kind: str, name: str) -> N
     assert found.gap < 1e-9
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("lie", ["nothing", "noise", "doubled", "backwards"])
 def test_a_solver_that_lies_does_not_move_the_limit(
     lie: str, monkeypatch: pytest.MonkeyPatch

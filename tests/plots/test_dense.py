@@ -76,7 +76,7 @@ def test_some_of_many_cycles_are_drawn_and_named() -> None:
     fits(figure)
     whole, upright, _ = figure.axes
     assert [text.get_text() for text in upright.texts] == ["±0.2", "±0.4", "±0.7", "±0.9"]
-    assert whole.get_title(loc="left") == "whole contact: 4 of 13 cycles"
+    assert whole.get_title(loc="left") == "whole contact: 4 of 13"
     assert len(whole.lines) == 8
 
 

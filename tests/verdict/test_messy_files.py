@@ -14,6 +14,8 @@ import pytest
 from scipy.io import savemat
 
 import convexrough as cr
+from convexrough.errors import TableError
+from convexrough.verdict.claims import Manner, read_loads
 
 COUNT = 12
 RNG = np.random.default_rng(5)
@@ -258,6 +260,10 @@ REFUSED: dict[str, tuple[Callable[[Path, Case], str], str]] = {
 }  # fmt: skip
 
 
+#: One cause is all there is to say.
+MOVED = ("x and y exchanged", "x mirrored", "shifted")
+
+
 @pytest.mark.parametrize("name", READ)
 def test_read_right(tmp_path: Path, command: Any, case: Case, name: str) -> None:
     write, options = READ[name]
@@ -273,7 +279,19 @@ def test_refused_with_the_cause(tmp_path: Path, command: Any, case: Case, name: 
     outcome = command("verify", "scene.toml", write(tmp_path, case))
     assert (outcome.status, outcome.out) == (2, "")
     assert cause in outcome.err
-    assert len(outcome.err.splitlines()) <= 11
+    assert len(outcome.err.splitlines()) <= (1 if name in MOVED else 11)
+
+
+def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
+    """Most rows lie on an asperity, the wrong one."""
+    asperities = cr.Asperities.square(spacing=1e-3, tip_radius=0.02, within=4e-3)
+    scene = cr.Scene(1.0, asperities, cr.Material(contact_modulus=1.0, poisson_ratio=0.3))
+    x, y = asperities.positions.T
+    name = text()(tmp_path, {"x": x + 1e-3, "y": y, "load": np.ones(len(x))})
+    with pytest.raises(TableError) as refused:
+        read_loads(tmp_path / name, scene, Manner())
+    cause = "all are shifted by [0.001, 0], expected them from the axis of the sphere, to 1e-05"
+    assert str(refused.value) == f"{tmp_path / name}: positions: {cause}"
 
 
 def test_own_results_are_read(command: Any, case: Case) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figure_checks import fits, statuses
+from figure_checks import fits, texts
 from scene_files import HEXAGONAL, scene_text, write_loads
 
 import convexrough as cr
@@ -224,7 +224,7 @@ def test_the_figure(contact: cr.Contact) -> None:
     forces[4] = 0.5 * contact.loads[4]
     sheared = verify_shear(contact, forces, force=force)
     for figures in (verdict_figures(verdict), verdict_figures(verdict, sheared, length_unit="m")):
-        said = {text.get_text() for text in statuses(figures["verdict"])}
+        said = {text.get_text() for text in texts(figures["verdict"])}
         assert {"36", "50", "claimed open, proved to touch (1)"} < said
         fits(figures["verdict"])
     assert {"4", "claimed to slide, proved not to (1)", "sliding", "partial slip"} < said
