@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from convexrough.errors import FileError
+from convexrough.errors import file_errors
 
 #: What is left of a file by a process that was killed while it wrote: its name, and the process.
 _UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<process>\d+)\.unfinished", re.DOTALL)
@@ -31,10 +31,9 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     temporary = unfinished(path)
     try:
-        yield temporary
-        os.replace(temporary, path)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
+        with file_errors(path, "be written"):
+            yield temporary
+            os.replace(temporary, path)
     finally:
         with suppress(OSError):  # a file system that became read-only has said so already
             temporary.unlink(missing_ok=True)

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -78,6 +80,15 @@ class TableError(MistakesError):
 
 class FileError(ConvexroughError):
     """A file or folder cannot be read or must not be overwritten."""
+
+
+@contextmanager
+def file_errors(path: Path, what: str) -> Iterator[None]:
+    """An OSError of the body as a FileError: what the path cannot do, and why."""
+    try:
+        yield
+    except OSError as error:
+        raise FileError(f"{path}: cannot {what}: {error.strerror or error}") from error
 
 
 class SolverError(ConvexroughError):

@@ -6,13 +6,11 @@ import os
 import platform
 from contextlib import suppress
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from convexrough.run.results import versions
 from convexrough.threads import cores
-
-PACKAGES = ("numpy", "scipy", "clarabel", "osqp", "cvxpy")
 
 #: Variables that limit the threads of linear algebra.
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -29,7 +27,7 @@ def describe_machine() -> dict[str, Any]:
         "memory": psutil.virtual_memory().total,
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
-        "versions": {name: version(name) for name in PACKAGES},
+        "versions": versions(),
         "linear_algebra_threads": ", ".join(limits) or "not limited",
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,

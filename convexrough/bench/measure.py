@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from convexrough import checks
-from convexrough.bench.reference import Reference
+from convexrough.arrays import Array
 from convexrough.bench.rows import Row
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import Contact, press
@@ -26,6 +26,10 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.threads import cores
+
+#: The largest proved error over the largest load at which loads are a reference: two units in the
+#: last place of that.
+ACCURATE = 2.0**-52
 
 #: Least and most runs of which the fastest counts; more than the least while patience lasts.
 LEAST_RUNS, MOST_RUNS = 3, 25
@@ -100,6 +104,27 @@ TASKS: dict[str, Task] = {
         lambda make: _cycled(_pressed(make())), lambda it: it.gradient(holding="load")
     ),
 }
+
+
+class Reference(NamedTuple):
+    """loads : (n,) [force];  bound : proved on the error of each, over the largest"""
+
+    loads: Array
+    bound: float
+
+    def error(self, loads: Array) -> float:
+        """max |P - P_ref| / max P_ref, of loads (n,) [force]."""
+        return float(np.abs(loads - self.loads).max() / self.loads.max())
+
+
+def reference(scene: Scene, approach: float) -> Reference:
+    """The loads at an approach. Raises SolverError where they are not proved to be so accurate."""
+    contact = press(scene, approach=approach)
+    bound = float(contact.certificate.load_errors.max() / contact.loads.max())
+    if not bound <= ACCURATE:
+        advice = "another approach, or asperities further apart"
+        raise SolverError(f"loads proved to {bound:.2g} only", solver="reference", advice=advice)
+    return Reference(contact.loads, bound)
 
 
 def measure_attempt(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from convexrough.atomic import replacing, write_text
 from convexrough.bench.measure import TASKS
 from convexrough.bench.rows import Bench, Row, frontier
-from convexrough.errors import FileError
+from convexrough.errors import FileError, file_errors
 from convexrough.run.results import write_figures, write_json, write_tables
 from convexrough.tabular.columns import aligned, markdown
 from convexrough.version import __version__
@@ -119,10 +119,8 @@ def _renew(page: Path, bench: Bench) -> list[Path]:
     """The figures first, so that the page never shows what is not there."""
     before, after = split_page(page)
     folder, written = page.parent / "figures", []
-    try:
+    with file_errors(folder, "be made"):
         folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{folder}: cannot be made: {error.strerror or error}") from error
     for stem, figure in _drawn(bench).items():
         with replacing(path := folder / f"{stem}.png") as temporary:
             figure.savefig(temporary, format="png", dpi=200)
@@ -133,10 +131,8 @@ def _renew(page: Path, bench: Bench) -> list[Path]:
 
 def split_page(page: Path) -> tuple[str, str]:
     """What is before and after the block of a page; FileError where there is not one block."""
-    try:
+    with file_errors(page, "be read"):
         text = page.read_text(encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{page}: cannot be read: {error.strerror or error}") from error
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end or BEGIN in after or END in after or END in before:

@@ -7,8 +7,13 @@ from contextlib import suppress
 from dataclasses import replace
 
 from convexrough.bench.machine import describe_machine
-from convexrough.bench.measure import Attempt, measure_attempt, measure_sweep, measure_task
-from convexrough.bench.reference import reference
+from convexrough.bench.measure import (
+    Attempt,
+    measure_attempt,
+    measure_sweep,
+    measure_task,
+    reference,
+)
 from convexrough.bench.rows import Bench, Row, better_than_default
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import press

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from convexrough.cli.options import PATH, json_option
+from convexrough.cli.options import PATH, force_option, json_option, out_option
 from convexrough.cli.speech import DONE, echo, progress, say_aside, written
 from convexrough.errors import blamed_on
 
@@ -18,8 +18,8 @@ from convexrough.errors import blamed_on
               multiple=True, help="Only this format; may be repeated.")  # fmt: skip
 @click.option("--bristles", metavar="M", type=click.IntRange(1), default=64, show_default=True,
               help="Bristles per asperity in the quadratic program.")  # fmt: skip
-@click.option("--out", metavar="DIR", type=PATH, help="Folder for the programs.")
-@click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
+@out_option
+@force_option
 @json_option
 def export(
     scene: Path, formats: tuple[str, ...], bristles: int, out: Path | None, force: bool,

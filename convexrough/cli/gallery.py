@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.options import PATH, json_option, solver_option
+from convexrough.cli.options import PATH, force_option, json_option, solver_option
 from convexrough.cli.speech import DONE, echo, progress
 
 
 @click.command()
 @click.option("--list", "show_list", is_flag=True, help="List the cases (default).")
 @click.option("--export", metavar="DIR", type=PATH, help="Folder for programs and answers.")
-@click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
+@force_option
 @click.option("--profile", is_flag=True, help="Time every solver and check its solutions.")
 @solver_option
 @click.argument("names", nargs=-1)

@@ -21,6 +21,10 @@ solver_option = click.option(
     help="A solver of the package, or your package.Class; may be repeated.",
 )  # fmt: skip
 html_option = click.option("--html", is_flag=True, help="Write slider.html, an interactive page.")
+force_option = click.option(
+    "--force", is_flag=True, help="Overwrite the results of an earlier run."
+)
+out_option = click.option("--out", metavar="DIR", type=PATH, help="Folder for the results.")
 json_option = click.option(
     "--json", "as_json", is_flag=True, help="Print one JSON object instead of text."
 )
@@ -57,9 +61,9 @@ def output_options(command: Command) -> Command:
     """The options of every command that writes a folder of results."""
     for option in (
         json_option,
-        click.option("--force", is_flag=True, help="Overwrite the results of an earlier run."),
+        force_option,
         click.option("--no-figures", is_flag=True, help="Do not write figures."),
-        click.option("--out", metavar="DIR", type=PATH, help="Folder for the results."),
+        out_option,
     ):
         command = option(command)
     return command

@@ -85,9 +85,7 @@ def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: 
 
     if given:
         raise click.UsageError("--proof and --html are of one scene, not of a sweep.")
-    options: dict[str, Any] = dict(sweep=sweep, out=out, as_json=as_json)
-    if any(each.name == "force" for each in command.params):
-        options["force"] = force
+    options: dict[str, Any] = dict(sweep=sweep, out=out, as_json=as_json, force=force)
     status: int = click.get_current_context().invoke(command, **options)
     return status
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from convexrough.cli.options import PATH, json_option
+from convexrough.cli.options import PATH, force_option, json_option, out_option
 from convexrough.cli.speech import (
     DONE,
     INTERRUPTED,
@@ -40,7 +40,7 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 @click.argument("sweep", type=PATH, required=False)
 @json_option
 @click.option("--part", metavar="K/N", callback=_part, help="The K-th of N parts of the sweep.")
-@click.option("--force", is_flag=True, help="Overwrite the results of an earlier run.")
+@force_option
 @click.option("--resume", is_flag=True, help="Compute the missing parts.")
 @click.option(
     "--scheduler", metavar="ADDRESS", help='Dask scheduler: tcp://..., a file, or "local".'
@@ -52,7 +52,7 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
     help="Number of processes; default: all cores.",
 )
 @click.option("--summary", metavar="DIR", type=PATH, help="Print quantiles of a folder.")
-@click.option("--out", metavar="DIR", type=PATH, help="Folder for results.")
+@out_option
 def sweep(
     sweep: Path | None,
     out: Path | None,

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from convexrough.atomic import write_text
-from convexrough.cli.options import PATH, Command, json_option, proof_option
+from convexrough.cli.options import (
+    PATH,
+    Command,
+    force_option,
+    json_option,
+    out_option,
+    proof_option,
+)
 from convexrough.cli.proof import proved
 from convexrough.cli.speech import (
     DONE,
@@ -36,8 +43,8 @@ def claim_options(command: Command) -> Command:
     called = "Header or number (from 1) of the column of load, x, y, ..."
     for option in (
         click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML."),
-        click.option("--force", is_flag=True, help="Overwrite the results of an earlier run."),
-        click.option("--out", metavar="DIR", type=PATH, help="Folder for the results."),
+        force_option,
+        out_option,
         click.option("--explain", is_flag=True, help="Report how the files are read, and stop."),
         click.option("--shear-force", metavar="Q", type=float, help="Total shear force of FORCES."),
         click.option("--shear", metavar="FORCES", type=PATH, help="Also check these shear forces."),

@@ -23,6 +23,7 @@ from convexrough.friction.path import LoadPath, history
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
+from convexrough.tabular.columns import bound
 from convexrough.tabular.units import UnitNames
 
 #: Forces of the slider for up to so many touching asperities; fewer for still more.
@@ -125,7 +126,7 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
         "force": _digits(fractions * limit),
         "length": _digits(moved),
         "displacement": _digits(moved / X0),
-        "displacement_error": [_bound(each.displacement_error) for each in steady],
+        "displacement_error": [bound(each.displacement_error) for each in steady],
         "loss": _digits([each.loss_normalised for each in steady]),
         "smooth_loss": _digits([each.smooth_normalised for each in steady]),
         "smooth_displacement": _digits(1.0 - stuck**2),
@@ -163,15 +164,10 @@ def _followed(contact: Contact, loading: LoadPath, which: Indices, X0: float) ->
         "y": _digits(y),
         "status": certificate.status[which].tolist(),
         "load": _digits(contact.loads[which]),
-        "load_error": [_bound(error) for error in certificate.load_errors[which]],
+        "load_error": [bound(error) for error in certificate.load_errors[which]],
         "share": [_digits(curve) for curve in _shares(contact, loading, which).T],
         "moved": [_digits(curve) for curve in loading.asperity_displacements[:, which].T / X0],
     }
-
-
-def _bound(error: float) -> str:
-    """Two digits, never below the error."""
-    return f"{1.05 * error:.2g}" if np.isfinite(error) else "unknown"
 
 
 def _digits(values: ArrayLike) -> Any:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from convexrough.atomic import remove_unfinished, replacing, to_json, unfinished, write_text
-from convexrough.errors import FileError
+from convexrough.errors import FileError, file_errors
 from convexrough.progress import LOGGER
 from convexrough.run.scene_file import SceneFile
 from convexrough.run.stage import Result, Summary
@@ -50,27 +50,22 @@ def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
     Raises FileError before anything is computed.
     """
     new = unfinished(folder / "results" if folder.is_dir() else folder)
-    try:
+    with file_errors(folder, "hold results"):
         folder.parent.mkdir(parents=True, exist_ok=True)
         remove_unfinished(folder if folder.is_dir() else folder.parent)
         if folder.exists() and not folder.is_dir():
             raise FileExistsError(17, "File exists")
         if folder.is_dir() and any(folder.iterdir()) and not force:
-            raise FileError(
-                f"{folder}: not empty; --force replaces its results, --out takes another"
-            )
+            advice = "--force replaces its results, --out takes another"
+            raise FileError(f"{folder}: not empty; {advice}")
         new.mkdir()
-    except OSError as error:
-        raise FileError(f"{folder}: cannot hold results: {error.strerror or error}") from error
-    try:
-        yield new
-        names = sorted(path.name for path in new.iterdir())
-        write_json(new / MANIFEST, headed(files=names, **said))
-        _moved(new, folder)
-    except OSError as error:
-        raise FileError(f"{folder}: cannot hold results: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
+        try:
+            yield new
+            names = sorted(path.name for path in new.iterdir())
+            write_json(new / MANIFEST, headed(files=names, **said))
+            _moved(new, folder)
+        finally:
+            shutil.rmtree(new, ignore_errors=True)
 
 
 def _moved(new: Path, folder: Path) -> None:
@@ -97,13 +92,17 @@ def _earlier(folder: Path) -> list[str]:
 
 def origin(source: SceneFile) -> Summary:
     """Where results are from: files read with their hashes, seed, and versions."""
-    packages = {name: metadata.version(name) for name in NUMERICAL}
     return {
         "scene": str(source.path),
         "inputs": dict(source.inputs),
         "seed": source.seed,
-        "versions": {"python": platform.python_version(), **packages},
+        "versions": {"python": platform.python_version(), **versions()},
     }
+
+
+def versions() -> dict[str, str]:
+    """Of the packages that numbers may depend on."""
+    return {name: metadata.version(name) for name in NUMERICAL}
 
 
 def write_results(

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from convexrough.contact import Contact, solve
-from convexrough.errors import FileError, InputError, SceneFileError, blamed_on
+from convexrough.errors import FileError, InputError, SceneFileError, blamed_on, file_errors
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
@@ -147,10 +147,8 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
 
 def digest(path: Path) -> str:
     """The SHA-256 of a file."""
-    try:
+    with file_errors(path, "be read"):
         return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
 def parsed(path: Path, text: str) -> dict[str, Any]:

@@ -122,9 +122,8 @@ class Result(Table, Plottable):
 
     def doubts(self) -> Iterator[str]:
         """What keeps this from being certified, a line for each reason."""
-        unsure = sum(1 for row in self.known if row.get("undecided"))
-        if unsure:
-            yield f"not certified: {unsure} of the rows in {self.name} have undecided statuses"
+        if unsure := sum(row.get("undecided", 0) for row in self.known):
+            yield f"not certified: {unsure} statuses in {self.name} undecided"
 
     @property
     def certified(self) -> bool:

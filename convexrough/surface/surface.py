@@ -216,12 +216,7 @@ def checked_pixel(pixel: float | tuple[float, float]) -> tuple[float, float]:
 
 
 def _checked(heights: ArrayLike) -> Array:
-    try:
-        if np.iscomplexobj(heights) or np.asarray(heights).dtype.kind in "USVO":
-            raise TypeError("no real numbers")
-        grid = np.array(heights, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError("heights", found=repr(heights)[:60], expected="numbers") from error
+    grid = checks.numbers("heights", heights)
     if grid.ndim != 2 or min(grid.shape) < 3:
         expected = "rows and columns, at least 3 of each"
         raise InputError("heights", found=f"shape {grid.shape}", expected=expected)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from convexrough.atomic import to_json, write_text
-from convexrough.errors import ExtraError, FileError
+from convexrough.errors import ExtraError, FileError, file_errors
 from convexrough.sweeps.batch import Columns, different
 
 MANIFEST, PARTS = "manifest.json", "parts"
@@ -35,10 +35,8 @@ class Folder:
 
     def parts(self) -> list[range]:
         """The scenes of each part, in their order; other files are not looked at."""
-        try:
+        with file_errors(self.path / PARTS, "be read"):
             names = [each.stem for each in (self.path / PARTS).glob("*.parquet")]
-        except OSError as error:
-            raise _unreadable(self.path / PARTS, error) from error
         return [self.scenes(int(name)) for name in sorted(names, key=int) if name.isdecimal()]
 
     def file(self, part: range) -> Path:
@@ -108,14 +106,15 @@ class Folder:
 
 def open_folder(path: Path) -> Folder:
     """A folder that holds a sweep; FileError if it does not."""
+    if not (path / MANIFEST).exists():
+        raise FileError(f"{path}: no sweep: there is no {MANIFEST}")
     try:
-        manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
+        with file_errors(path / MANIFEST, "be read"):
+            manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
         if not isinstance(manifest, dict) or manifest.get("schema") != 2:
             raise ValueError("no sweep of this version")
-    except FileNotFoundError as error:
-        raise FileError(f"{path}: no sweep: there is no {MANIFEST}") from error
-    except (OSError, ValueError) as error:
-        raise _unreadable(path / MANIFEST, error) from error
+    except ValueError as error:
+        raise FileError(f"{path / MANIFEST}: cannot be read: {error}") from error
     return Folder(path, manifest)
 
 
@@ -129,12 +128,10 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
             part.unlink(missing_ok=True)
         (path / MANIFEST).unlink()
     if not (path / MANIFEST).exists():
-        try:
+        with file_errors(path, "hold results"):
             (path / PARTS).mkdir(parents=True, exist_ok=True)
             # A manifest may come while this looks: of another process, of the same sweep or not.
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
-        except OSError as error:
-            raise FileError(f"{path}: cannot hold results: {error.strerror or error}") from error
         if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
             raise FileError(f"{path}: holds {strangers[0]}, and no sweep; --out takes another")
         if not (path / MANIFEST).exists():
@@ -166,7 +163,3 @@ def arrow() -> tuple[Any, Any]:
     except ImportError as error:
         raise ExtraError("parquet") from error
     return pyarrow, pyarrow.parquet
-
-
-def _unreadable(path: Path, error: Exception) -> FileError:
-    return FileError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}")

@@ -16,9 +16,8 @@ from matplotlib.text import Text
 import convexrough as cr
 from convexrough.bench import measure, page, suite
 from convexrough.bench.figures import bench_figures
-from convexrough.bench.measure import Attempt
+from convexrough.bench.measure import Attempt, reference
 from convexrough.bench.profile import Profile, profile_of
-from convexrough.bench.reference import reference
 from convexrough.bench.rows import Bench, Row, better_than_default, exponent, frontier
 from convexrough.bench.scenes import APPROACH, scene
 from convexrough.solvers import BristleQP, Conic, Newton

@@ -60,7 +60,7 @@ def test_what_is_printed(command: Any) -> None:
     lines = printed(outcome.out)
     for name, slope in summary["by"].items():
         assert lines[f"by {name}"] == f"{slope + 0.0:.8g}"
-    known = float(lines["by height"].split("known to ")[1].rstrip(")"))
+    known = float(lines["by height"].split("error at most ")[1].rstrip(")"))
     assert summary["height_error"] <= known <= 1.2 * summary["height_error"]
     table = read("gradient")
     far = np.hypot(table["by_x"], table["by_y"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -18,6 +17,7 @@ from convexrough.gradients.gradient import Gradient as Slopes
 from convexrough.gradients.gradient import Holding
 from convexrough.run.stage import Columns, Single, Stage, Summary, limit
 from convexrough.run.values import Mistake, Share, expected
+from convexrough.tabular.columns import bound, listed
 from convexrough.tabular.units import UnitNames
 
 #: What a scene file may ask the gradient of, and its letter.
@@ -149,24 +149,21 @@ class Differentiated(Single):
         held, under = f"{said['holding']} held", ""
         if "fraction" in said:
             under, held = f" at Q/(fP) = {said['fraction']:g}", f"{held}, and so is the force"
-        rows = [("value", f"{said['value'] + 0.0:.10g}")]  # no -0
-        rows += [(f"by {name}", f"{slope + 0.0:.8g}") for name, slope in said["by"].items()]
+        rows = [("  value", f"{said['value'] + 0.0:.10g}")]  # no -0
+        rows += [(f"  by {name}", f"{slope + 0.0:.8g}") for name, slope in said["by"].items()]
         for name, most in said["largest"].items():
-            known = f", {_known(said['height_error'])}" if name == "heights" else ""
+            error = bound(said["height_error"])
+            known = f", error at most {error}" if name == "heights" else ""
             slopes = np.ravel(most["slope"]) + 0.0
             text = ", ".join(f"{slope:.8g}" for slope in slopes)
             text = f"({text})" if len(slopes) > 1 else text
-            rows.append((f"by {EACH[name]}", f"up to {text}  (asperity {most['asperity']}{known})"))
-        lines = [f"  {name:<20}{text}" for name, text in rows]
-        return [f"gradient of the {said['of']}{under}, {held}", *lines]
+            rows.append(
+                (f"  by {EACH[name]}", f"up to {text}  (asperity {most['asperity']}{known})")
+            )
+        return [f"gradient of the {said['of']}{under}, {held}", *listed(rows, 22)]
 
     def figures(self, **units: Any) -> Mapping[str, Any]:
         from convexrough.plots import gradient_figures  # matplotlib: only when it draws
 
         drawn = [gradient_figures(it, of=LETTERS[self.stage.of], **units) for it in self.found]
         return drawn[0] if drawn else {}
-
-
-def _known(error: float) -> str:
-    """Two digits of a proved bound, never below it."""
-    return f"all known to {1.05 * error:.2g}" if math.isfinite(error) else "no bound"

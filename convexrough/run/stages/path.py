@@ -24,6 +24,7 @@ from convexrough.run.stage import (
     Stage,
     Steps,
     Summary,
+    numbers_of,
     plain,
     titled,
 )
@@ -124,16 +125,11 @@ class Pathed(Steps):
         return {**super().tables(), "path_asperities": places | each}
 
     def doubts(self) -> Iterator[str]:
-        (path,) = self.found
-        if unsure := int((path.status == "undecided").sum()):
-            yield f"not certified: {unsure} statuses in path undecided"
-        yield from unproved_order(self, path.order)
+        yield from super().doubts()
+        yield from unproved_order(self, self.found[0].order)
 
     def lines(self, units: UnitNames) -> list[str]:
-        return [
-            *super().lines(units),
-            f"indentations increase with the load: {self.found[0].order}",
-        ]
+        return [*super().lines(units), f"{INCREASE}{self.found[0].order}"]
 
     def figures(self, **units: Any) -> Mapping[str, Any]:
         from convexrough.plots import path_figures  # matplotlib: only when it draws
@@ -187,8 +183,7 @@ class Settled(Single):
     }
 
     def rows(self) -> list[Summary]:
-        first = Result(self.stage, self.contact, self.found[:1])
-        return Result.rows(first)
+        return [numbers_of(self.found[0], self.stage.numbers)]
 
     def summary(self) -> Summary:
         found = self.found[0]
@@ -207,16 +202,12 @@ class Settled(Single):
         return tables
 
     def doubts(self) -> Iterator[str]:
-        if unsure := self.known[0]["undecided"]:
-            yield f"not certified: {unsure} statuses in steady undecided"
+        yield from super().doubts()
         for each in self.found:
             yield from unproved_order(self, each.order)
 
     def lines(self, units: UnitNames) -> list[str]:
-        said = [
-            *super().lines(units),
-            f"indentations increase with the load: {self.found[0].order}",
-        ]
+        said = [*super().lines(units), f"{INCREASE}{self.found[0].order}"]
         for losses in self.found[1:]:
             columns = _by_phase(losses)
             printed = {name: name.replace("_", " ") for name in ("phase", "factor", "loss")}
