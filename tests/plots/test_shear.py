@@ -109,12 +109,12 @@ def test_discs_have_the_radii_of_the_state() -> None:
     (state,) = states("rough", [0.5])
     (axes,) = plots.shear_figures([state])["stick_slip"].axes
     a_H = smooth(state.contact.scene, load=state.contact.load).contact_radius
-    drawn: Any = {each.get_label(): each for each in axes.collections}
+    lines: Any = {each.get_label(): each for each in axes.collections}
     partial = state.status == "partial"
-    assert_allclose(drawn["stick"].get_widths(), 2 * state.stick_radii[partial] / a_H, rtol=1e-12)
+    assert_allclose(lines["stick"].get_widths(), 2 * state.stick_radii[partial] / a_H, rtol=1e-12)
     whole = state.contact.contact_radii[partial]
-    assert_allclose(drawn["partial"].get_widths(), 2 * whole / a_H, rtol=1e-12)
-    assert_allclose(drawn["sliding"].get_facecolor(), [to_rgba(SLIDING)])
+    assert_allclose(lines["partial"].get_widths(), 2 * whole / a_H, rtol=1e-12)
+    assert_allclose(lines["sliding"].get_facecolor(), [to_rgba(SLIDING)])
 
 
 @pytest.mark.parametrize(("scope", "count"), [("global", 4), ("none", 37)])
@@ -199,14 +199,14 @@ def test_rings_have_the_letters_of_the_paper() -> None:
 def test_the_traction_drawn_is_the_field() -> None:
     _, profile, _ = of_paper("paper")["fig5_traction"].axes
     (state,) = states("paper", [0.5])
-    drawn = {line.get_label(): np.asarray(line.get_data(), dtype=float) for line in profile.lines}
+    lines = {line.get_label(): np.asarray(line.get_data(), dtype=float) for line in profile.lines}
     a, c = state.contact.contact_radii[0], state.stick_radii[0]
     mega = 1e-3  # Pa, of mN/µm²
-    x, q = drawn["$q$"]
+    x, q = lines["$q$"]
     points = np.column_stack((x * a, 0 * x))
     assert_allclose(q, fields.traction(state, points) / mega, rtol=1e-9, atol=1e-12)
     assert x[q.argmax()] == pytest.approx(-c / a, abs=1e-9) or x[q.argmax()] == pytest.approx(c / a)
-    _, fp = drawn["$fp$"]
+    _, fp = lines["$fp$"]
     slipping = np.abs(x) > c / a * (1 + 1e-9)
     assert_allclose(q[slipping], fp[slipping], rtol=1e-9)
 
