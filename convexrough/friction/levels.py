@@ -90,11 +90,6 @@ class FrictionLevels:
         return self.top.solution is not None
 
     @property
-    def top_error(self) -> Array:
-        """(N,) bounds on the errors of the loads at P, in own units."""
-        return self.to_scene(np.asarray(self.top.loads.error))
-
-    @property
     def presses(self) -> int:
         """How many normal problems were solved, with that of P."""
         return 1 + self._levels.presses

@@ -29,15 +29,22 @@ def both_controls(scene: cr.Scene, approach: float) -> list[cr.Contact]:
     return [contact, cr.press(scene, load=contact.load)] if contact.load else [contact]
 
 
+def small(name: str, friction: float | None = None) -> tuple[cr.Scene, float]:
+    """The inner asperities of a named scene, of which some touch: exact arithmetic takes time."""
+    scene, approach = scenes.NAMED[name]
+    a = scene.asperities
+    inner = cr.Asperities(a.positions[:19], a.tip_radii[:19], a.heights[:19])
+    return replace(scene, asperities=inner, friction=friction), 0.4 * approach
+
+
 def width(bounds: list[str]) -> float:
     low, high = (Fraction(float.fromhex(text)) for text in bounds)
     return float(high - low)
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", scenes.NAMED)
 def test_named_scenes_are_proved_and_sharply(name: str) -> None:
-    for contact in both_controls(*scenes.NAMED[name]):
+    for contact in both_controls(*small(name)):
         claims = judged(contact.proof())
         assert claims["scope"] == "global"
         assert claims["status"] == list(contact.status)
@@ -45,11 +52,9 @@ def test_named_scenes_are_proved_and_sharply(name: str) -> None:
             assert width(bounds) <= np.spacing(float.fromhex(bounds[0]))
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["paper", "rough, closest"])
 def test_friction_states_and_losses_are_proved(name: str) -> None:
-    scene, approach = scenes.NAMED[name]
-    for contact in both_controls(replace(scene, friction=0.5), approach):
+    for contact in both_controls(*small(name, friction=0.5)):
         forces = np.array([1e-6, 0.37, 0.99]) * 0.5 * contact.load
         states = [cr.shear(contact, force=float(force)) for force in forces]
         claims = judged(contact.proof(sheared=states))
@@ -88,7 +93,7 @@ def test_random_scenes() -> None:
 
 def test_loads_from_anywhere() -> None:
     """Bounds as wide as the loads are off; nothing false from loads that are far off."""
-    scene, approach = scenes.NAMED["paper"]
+    scene, approach = small("paper")
     loads = cr.press(scene, approach=approach).loads
     rng = np.random.default_rng(0)
     for off in (1e-9, 1e-4, 1e-2):
@@ -107,7 +112,7 @@ def test_loads_of_another_total_are_scaled() -> None:
 def test_a_dropped_asperity_is_not_proved_open() -> None:
     scene, approach = scenes.scattered(2, 6, 0.6, 0.0)
     loads = cr.press(scene, approach=approach).loads.copy()
-    for dropped in range(6):
+    for dropped in (0, 3, 5):
         given = np.where(np.arange(6) == dropped, 0.0, loads)
         with suppress(cr.ProofError):  # or nothing is proved
             judged(prove(scene, given, approach=approach))
@@ -134,8 +139,8 @@ def test_nothing_touches() -> None:
 
 def test_crowded_contacts_are_proved_with_others_held_open() -> None:
     """Where the certificate has a status there is a proof, by overlapping shells or by Cholesky."""
-    for drawn in ((9, 12, 3.0, 0.5), (2, 40, 2.5, 0.3), (9, 12, 4.0, 0.0)):
-        scene, approach = scenes.scattered(*drawn)
+    for sampled in ((9, 12, 3.0, 0.5), (2, 40, 2.5, 0.3), (9, 12, 4.0, 0.0)):
+        scene, approach = scenes.scattered(*sampled)
         contact = cr.press(scene, approach=approach)
         assert contact.crowding > 1
         assert contact.certificate.scope == "local"
