@@ -82,10 +82,10 @@ def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[ConePiece]:
     """Those of an asperity with this curve, once its indentation has become `own` > 0."""
     load = float(hertz.load(own, k))
     base = min(float(curve.load), own)
-    kept = curve.go(*_below(curve, base))[0] if base < float(curve.load) else curve
-    s = np.array([float(each) for each in kept.levels])
-    N, xi = hertz.load(s, k) / load, np.array([float(each) for each in kept.heights]) / own
-    slopes = [float(each) for each in kept.slopes]
+    inner = curve.go(*_below(curve, base))[0] if base < float(curve.load) else curve
+    s = np.array([float(each) for each in inner.levels])
+    N, xi = hertz.load(s, k) / load, np.array([float(each) for each in inner.heights]) / own
+    slopes = [float(each) for each in inner.slopes]
     T = np.concatenate(([0.0], np.cumsum(np.array(slopes) * np.diff(N))))
     top, moved = float(N[-1]), float(xi[-1])
     found = []

@@ -30,7 +30,7 @@ from convexrough.friction.loss import losses, shared, trapezoid_loss
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
 from convexrough.friction.path import points_of, pressed_for
-from convexrough.friction.state import by_status, displacements_of, stick_radii
+from convexrough.friction.state import by_status, displacements_of, states_of, stick_radii
 from convexrough.friction.walk import Point, Walk, levels_needed
 from convexrough.influence import Kind
 from convexrough.numbers.balls import Ball
@@ -330,8 +330,8 @@ def _at_the_load(
     """Cycles between two T each, at the load of the contact."""
     load = contact.cached(FrictionLevels).load
     paths = [[(load, T) for T in each] for each in heights]
-    held = np.full(2, float(load))
-    asked = [(path, held.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
+    load_twice = np.full(2, float(load))
+    asked = [(path, load_twice.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
     return _cycles(contact, MemoryCurve.pressed(load), asked)
 
 
@@ -405,12 +405,6 @@ class _Closed(Walk):
         pieces = self.first, self.later
         return levels_needed(self.steady, pieces) | {self.stuck[0], self.least}
 
-    @property
-    def height(self) -> Fraction:
-        """Half the range of T."""
-        heights = [height for _, height in self.points]
-        return (max(heights) - min(heights)) / 2
-
 
 def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
@@ -450,7 +444,8 @@ def _cycle(
         (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
     )
     radii, radius_errors = stick_radii(levels, rest)
-    constant = all(load == levels.load for load, _ in closed.points)
+    loaded, heights = zip(*closed.points, strict=True)
+    constant = set(loaded) == {levels.load}
     defect = np.nan
     if constant:
         other = trapezoid_loss(top, rest) * 4.0 * levels.loss_unit
@@ -466,11 +461,13 @@ def _cycle(
         amplitude = float(np.ptp(closed.general.states.displacements[closed.once :])) / 2.0
     everywhere = {name: levels.to_scene(which) for name, which in statuses.items()}
     slides = everywhere.get("sliding", np.zeros(len(levels.scene), dtype=bool))
-    lost, kept = levels.to_scene(intermittent), levels.to_scene(bottom.touching)
+    lost, touching_below = levels.to_scene(intermittent), levels.to_scene(bottom.touching)
     doubtful = levels.to_scene(~(rest.touching | rest.open))
     slip_errors = np.where(slides | doubtful, slip_errors, 0.0) if statuses else slip_errors
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
-    whole = reference.energy_scale if reference else np.nan  # W0
+    whole, smooth = reference.energy_scale if reference else np.nan, np.nan  # W0, and e
+    if constant and reference:
+        smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
     found = Cycle(
         contact=contact,
         loads=frozen(loads),
@@ -480,7 +477,7 @@ def _cycle(
         loss_first=float(first),
         loss_first_error=float(first_error),
         status=by_status(levels, top, **statuses),
-        slips=frozen(np.where(lost, np.nan, np.where(kept, slips, 0.0))),
+        slips=frozen(np.where(lost, np.nan, np.where(touching_below, slips, 0.0))),
         slip_errors=frozen(slip_errors),
         stick_radii=radii,
         stick_radius_errors=frozen(radius_errors),
@@ -488,9 +485,7 @@ def _cycle(
         force_level=float(levels.coefficient.value) * float(closed.stuck[1]),
         balance_defect=defect,
         loss_normalised=float(loss) / whole,
-        smooth_normalised=float(mindlin.loss(float(closed.height / levels.load)))
-        if constant and reference
-        else np.nan,
+        smooth_normalised=smooth,
         displacement_amplitude=amplitude,
         displacement_error=amplitude_error,
         order=order,
@@ -541,9 +536,9 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
     heights += [min(bottom + drop, top) for drop in drops[1:]]
     heights[len(way) + 1], heights[-1] = bottom, top
     LOGGER.info(f"{len(way) - 1} levels of a loop")
-    steps = 1 if cycle.order == "fails" and levels.proved else None
-    walk = Walk(levels, MemoryCurve.pressed(P), [(P, height) for height in heights], steps)
-    found, loaded = walk.states(chosen), contact.loads[chosen] > 0
+    walk = Walk(levels, MemoryCurve.pressed(P), [(P, height) for height in heights], steps=1)
+    stepped, loaded = cycle.order == "fails" and levels.proved, contact.loads[chosen] > 0
+    found = walk.states(chosen) if stepped else states_of(levels, walk.curves, chosen)
     mine = (found.forces, found.asperity_displacements)
     return Loop(
         chosen,

@@ -139,10 +139,10 @@ def rim_gap(x: Array) -> Array:
 def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
     """The columns of fretting.csv: a row for each touching asperity in each cycle."""
     names = ("slip_amplitude", "gross_slip_amplitude", "mean_traction", "largest_traction")
-    kept = [(each, np.flatnonzero(each.contact.loads)) for each in worn]
+    cases = [(each, np.flatnonzero(each.contact.loads)) for each in worn]
 
     def column(values: Any) -> NDArray[Any]:
-        return np.concatenate([np.asarray(values(each, here)) for each, here in kept])
+        return np.concatenate([np.asarray(values(each, here)) for each, here in cases])
 
     return {
         "maximum": column(lambda each, here: np.full(len(here), each.maximum)),

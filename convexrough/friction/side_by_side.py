@@ -120,18 +120,16 @@ def compare_paths(
     >>> [each.way for each in found.entries if each.force_disagreement < 1e-4]
     ['general step', 'memory curve', 'conic step']
     """
-    given = (scene, loads, forces, start, influence)
-    entries = list[PathEntry]()
-
-    def enter(way: Way, found: Callable[[], LoadPath]) -> None:
+    given, entries, path = (scene, loads, forces, start, influence), list[PathEntry](), None
+    ways: dict[Way, Callable[[], LoadPath]] = {
+        "general step": lambda: walk(*given, steps=1),
+        "memory curve": lambda: walk(*given),
+        "conic step": lambda: walk(*given, steps=1, stepper=ConicStepper),
+    }
+    for way, found in ways.items():
         LOGGER.info(way)
-        answered = [each.path for each in entries if each.path is not None]
-        entries.append(_entry(way, found, answered[0] if answered else None))
-
-    enter("general step", lambda: walk(*given, steps=1))
-    enter("memory curve", lambda: walk(*given))
-    enter("conic step", lambda: walk(*given, steps=1, stepper=ConicStepper))
-    path = next((each.path for each in entries if each.path is not None), None)
+        entries.append(_entry(way, found, path))
+        path = path or entries[-1].path
     if path is None:
         raise SolverError(entries[0].message, solver="compare_paths", advice="use load_path")
     return PathComparison(scene, path.loads, path.forces, path.order, tuple(entries))

@@ -42,7 +42,7 @@ class States(NamedTuple):
     drifts: Array
     drift_errors: Array
 
-    def among(self, which: Indices | None) -> States:
+    def restricted(self, which: Indices | None) -> States:
         """Of some asperities."""
         some = slice(None) if which is None else which
         return States(*(part if part.ndim == 1 else part[:, some] for part in self))

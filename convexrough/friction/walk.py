@@ -79,7 +79,7 @@ class Walk:
         if self.general is None:
             found = states_of(self.levels, self.curves, which)
             return found.unproved() if self.order == "fails" else found
-        return self.general.states.among(which)
+        return self.general.states.restricted(which)
 
     def status(self) -> NDArray[np.str_]:
         """(m, N)"""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from bisect import bisect, insort
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
@@ -25,7 +25,7 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece
-from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.levels import FrictionLevels, height_at
 from convexrough.gradients.pulled import ZERO, Moves, Part
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
@@ -36,6 +36,10 @@ SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 #: Weights on V, D0 and S at a level.
 Weights: TypeAlias = tuple[Fraction, ...]
 NOTHING: Weights = (Fraction(0),) * 3
+
+#: Of each straight segment the point that it goes to, the weight on its loss, and that on the
+#: displacement at its end.
+Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
 #: A change of P and of T at all points.
 Direction: TypeAlias = tuple[Sequence[Fraction], Sequence[Fraction]]
@@ -86,42 +90,39 @@ class LevelWeights(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Walk:
-    """A path through numbered points, and what is asked of it.
+class Along:
+    """A path through numbered points, and what is asked of it, at the levels of a contact.
 
     start : load [force] at which the path begins, without shear
-    steps : of each straight segment the point that it goes to, the weight on its loss, and that
-        on the displacement at its end
+    loads, heights : P and T of the points
     """
 
+    known: FrictionLevels
     start: Fraction
-    steps: Sequence[tuple[int, Fraction, Fraction]]
+    steps: Steps
+    loads: Sequence[Fraction]
+    heights: Sequence[Fraction]
 
-    def sums(self, loads: Sequence[Fraction], heights: Sequence[Fraction]) -> LevelWeights:
-        """At these P and T."""
+    @classmethod
+    def of(
+        cls, known: FrictionLevels, start: Fraction, steps: Steps, loads: Array, forces: Array
+    ) -> Along:
+        """At these P and Q."""
+        pairs = list(zip(map(Fraction, loads.tolist()), forces.tolist(), strict=True))
+        heights = [height_at(load, force, known.scene) for load, force in pairs]
+        return cls(known, start, steps, [load for load, _ in pairs], heights)
+
+    @cached_property
+    def sums(self) -> LevelWeights:
         curve, found = MemoryCurve.pressed(self.start), LevelWeights({}, {})
         for point, lost, moved in self.steps:
-            curve, pieces = curve.go(loads[point], heights[point])
+            curve, pieces = curve.go(self.loads[point], self.heights[point])
             if lost:
                 for piece in pieces:
                     found.lose(piece, lost)
             if moved:
                 found.move(curve, moved)
         return found
-
-
-@dataclass(frozen=True)
-class Along:
-    """A walk through the levels of a contact, at P and T."""
-
-    known: FrictionLevels
-    walk: Walk
-    loads: Sequence[Fraction]
-    heights: Sequence[Fraction]
-
-    @cached_property
-    def sums(self) -> LevelWeights:
-        return self.walk.sums(self.loads, self.heights)
 
     def parts(self, moves: Moves) -> tuple[list[Part], Ball, Ball]:
         """What each level adds; the losses; the displacements.
@@ -149,10 +150,11 @@ class Along:
         longest = max(map(abs, (*loads, *heights)))
         by = sign * SHIFT * unit / longest if longest else SHIFT
         try:
-            moved = self.walk.sums(
-                [load + by * each for load, each in zip(self.loads, loads, strict=True)],
-                [height + by * each for height, each in zip(self.heights, heights, strict=True)],
-            )
+            moved = replace(
+                self,
+                loads=[load + by * each for load, each in zip(self.loads, loads, strict=True)],
+                heights=[T + by * each for T, each in zip(self.heights, heights, strict=True)],
+            ).sums
         except InputError:  # beyond gross sliding, or less than no load
             return NONE
         total = ZERO
@@ -210,8 +212,8 @@ def _slopes(
     slopes = {level: tuple(w / by for w in weights) for level, weights in found.items()}
     sizes = [abs(w) / unit**k for weights in slopes.values() for k, w in enumerate(weights)]
     least = NEAR * max(sizes, default=Fraction(0))
-    kept = {
+    nonzero = {
         level: tuple(w if abs(w) > least * unit**k else Fraction(0) for k, w in enumerate(weights))
         for level, weights in slopes.items()
     }
-    return {level: weights for level, weights in kept.items() if any(weights)}
+    return {level: weights for level, weights in nonzero.items() if any(weights)}

@@ -1,7 +1,7 @@
 """Forward derivatives: what changes when a scene and its load change a little, in one direction.
 
 One linear system at each level that a result hangs on: the same as of gradients, read the other way
-(docs/theory/gradients.md, "Forwards").
+(docs/theory/gradients.md, "The change in one direction").
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import control_held, levels
 from convexrough.gradients.pulled import ZERO, product
-from convexrough.gradients.scene import Geometry, curvatures
+from convexrough.gradients.scene import Bending, Geometry, curvatures
 from convexrough.gradients.states import Frictional
 from convexrough.influence.choice import couple
 from convexrough.normal.level import Level
@@ -205,14 +205,6 @@ class _Moved(NamedTuple):
     total: Ball
 
 
-class _Bending(NamedTuple):
-    """What a direction does to some asperities: dd [length], dlog k, and dc [length]."""
-
-    offsets: Ball
-    local: Ball
-    points: Ball
-
-
 @dataclass(frozen=True)
 class _Bent:
     """What a direction does to a scene.
@@ -221,8 +213,8 @@ class _Bent:
     """
 
     geometry: Geometry
-    everywhere: _Bending
-    here: _Bending
+    everywhere: Bending
+    here: Bending
     modulus: float
 
     @classmethod
@@ -241,9 +233,9 @@ class _Bent:
             Ball.exact(scene.asperities.tip_radii),
             curvatures(scene),
         )
-        bent = _bending(every, Ball.exact(heights), Ball.exact(tips), Ball.exact(moved), sphere)
+        bent = every.bent(Ball.exact(heights), Ball.exact(tips), Ball.exact(moved), sphere)
         bent = bent._replace(local=bent.local - modulus * 2.0 / 3.0)
-        here = _Bending(*(each[problem.candidates] for each in bent))
+        here = Bending(*(each[problem.candidates] for each in bent))
         return cls(Geometry.of(problem), bent, here, float(modulus.value))
 
     def of_level(self, level: Level, total: Ball) -> _Moved:
@@ -264,21 +256,6 @@ class _Bent:
             for k in (0, 1):
                 change = change - self.geometry.slopes(points[:, k] * loads, every)[:, k]
         return change
-
-
-def _bending(geometry: Geometry, heights: Ball, tips: Ball, moved: Ball, sphere: Ball) -> _Bending:
-    points, rho, curvature = geometry.points, geometry.tips[:, None], geometry.curvature
-    straighter, tips = curvature * curvature * -sphere, tips[:, None]  # d(1/R), drho
-    share = geometry.share * geometry.share
-    flatter = straighter - curvature * curvature * tips if geometry.closest else straighter
-    sunk = points * moved * geometry.bend + points * points * (share * flatter) * 0.5
-    local = (
-        geometry.relative * (straighter.sum() * 0.5 - tips[:, 0] / (rho[:, 0] * rho[:, 0])) / 3.0
-    )
-    if geometry.closest:
-        moved = moved * geometry.share - points * (share * (straighter * rho + curvature * tips))
-    sunk = sunk.sum()
-    return _Bending(heights - sunk, local, moved)
 
 
 def _moved(positions: ArrayLike, n: int) -> Array:

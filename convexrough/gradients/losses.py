@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.arrays import Array
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle
-from convexrough.friction.levels import height_at
 from convexrough.friction.path import LoadPath
-from convexrough.gradients.along import NONE, Along, Walk
+from convexrough.gradients.along import NONE, Along
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held
 from convexrough.gradients.pulled import Part
 from convexrough.gradients.states import Frictional
@@ -32,8 +30,9 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         m = len(cycle.loads)
         first = [(k % m, Fraction(0), Fraction(0)) for k in range(m + 1)]
         again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
-        walk = Walk(Fraction(0), first + again)
-        return _gradient(sheared, walk, cycle.loads, cycle.forces, holding, paths=True)
+        given = cycle.loads, cycle.forces
+        asked = Along.of(sheared.known, Fraction(0), first + again, *given)
+        return _gradient(sheared, asked, holding, paths=True)
     amplitude = (Fraction(cycle.maximum) - Fraction(cycle.minimum)) / 2
     top, low = sheared.known.top, sheared.below("maximum", amplitude, holding)
     T, mean = top.load - low.load, (top.approach + low.approach) * 0.5
@@ -71,29 +70,22 @@ def path_gradient(
     )
     if losses is None and displacements is None:
         spent = np.eye(m)[-1]
-    known = sheared.known
-    if path.load_constant and any(
-        abs(known.height(force)) == known.load for force in path.forces.tolist()
-    ):
-        expected = "forces below f P: where all slide, a history has no derivative"
-        raise InputError("forces", found="gross sliding", expected=expected)
     later = np.cumsum(spent[::-1])[::-1]  # what is lost at a step counts in all that follow
     steps = [(k, Fraction(later[k]), Fraction(far[k])) for k in range(m)]
-    walk = Walk(Fraction(path.start), steps)
-    return _gradient(sheared, walk, path.loads, path.forces, holding, paths=not path.load_constant)
+    along = Along.of(sheared.known, Fraction(path.start), steps, path.loads, path.forces)
+    sliding = [load == abs(T) for load, T in zip(along.loads, along.heights, strict=True)]
+    if path.load_constant and any(sliding):
+        expected = "forces below f P: where all slide, a history has no derivative"
+        raise InputError("forces", found="gross sliding", expected=expected)
+    return _gradient(sheared, along, holding, paths=not path.load_constant)
 
 
-def _gradient(
-    sheared: Frictional, walk: Walk, loads: Array, applied: Array, holding: Holding, *, paths: bool
-) -> Gradient:
-    """Of what a walk is asked for; of paths also by their loads."""
+def _gradient(sheared: Frictional, along: Along, holding: Holding, *, paths: bool) -> Gradient:
+    """Of what is asked along a path; of paths also by their loads."""
     if paths and holding == "approach":
         expected = '"load": the loads of all points are prescribed'
         raise InputError("holding", found='"approach"', expected=expected)
-    m, scene = len(applied), sheared.contact.scene
-    P = [Fraction(load) for load in loads.tolist()]
-    T = [height_at(p, q, scene) for p, q in zip(P, applied.tolist(), strict=True)]
-    along = Along(sheared.known, walk, P, T)
+    m, T = len(along.loads), along.heights
     parts, spent, far = along.parts({} if paths else sheared.top_moves)
     nothing = [Fraction(0)] * m
     each = [[Fraction(int(i == k)) for i in range(m)] for k in range(m)]

@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.gradients.pulled import ZERO, Pulled
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.stack import of_rows
-from convexrough.numbers.balls import Ball, where
+from convexrough.numbers.balls import Ball, of_rows, where
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along, named
@@ -30,6 +30,14 @@ PAIRWISE = 1000
 
 #: Pairs on balls that are worked on together.
 BLOCK = 2**16
+
+
+class Bending(NamedTuple):
+    """What a change does to asperities: (n,) dd [length] and dlog k, and (n, 2) dc [length]."""
+
+    offsets: Ball
+    local: Ball
+    points: Ball
 
 
 @dataclass(frozen=True)
@@ -78,6 +86,33 @@ class Geometry:
     @cached_property
     def relative(self) -> Ball:
         return 1.0 / (self.curvature.sum() * 0.5 + 1.0 / self.tips)
+
+    @cached_property
+    def by_tip(self) -> Bending:
+        """Per change of rho."""
+        r, local = self.points, -self.relative / (3.0 * self.tips * self.tips)
+        if not self.closest:
+            return Bending(0.0 * local, local, 0.0 * r)
+        outwards = r * self.share * self.share * self.curvature
+        return Bending((r * r * self.bend * self.bend).sum() * 0.5, local, -outwards)
+
+    @cached_property
+    def by_radius(self) -> Bending:
+        """Per change of the radius of a sphere."""
+        squared = self.curvature[0] * self.curvature[0]
+        flatter = self.points * self.share * self.share * squared
+        outwards = flatter * self.tips[:, None] if self.closest else 0.0 * flatter
+        local = -self.relative * squared / 3.0
+        return Bending((self.points * flatter).sum() * 0.5, local, outwards)
+
+    def bent(self, heights: Ball, tips: Ball, moved: Ball, radius: Ball) -> Bending:
+        """By changes of heights (n,), rho (n,), summits (n, 2) and the radius of a sphere."""
+        a, b, sunk = self.by_tip, self.by_radius, (self.points * self.bend * moved).sum()
+        return Bending(
+            heights - sunk + tips * a.offsets + radius * b.offsets,
+            tips * a.local + radius * b.local,
+            self.share * moved + tips[:, None] * a.points + radius * b.points,
+        )
 
     def slopes(self, loads: Ball, which: Indices) -> Ball:
         """(m, 2) [1 / length] -scale sum_j (c_i - c_j) P_j / r_ij^3 among some, loads (m,) P.
@@ -152,8 +187,8 @@ class Derivatives:
             if left.size.any():
                 total = total + left[:, None] * geometry.slopes(loads, which)
                 total = total + loads[:, None] * geometry.slopes(left, which)
-        among: Ball = of_rows(partial(among_zeros, places=which, count=n), total)
-        return among
+        everywhere: Ball = of_rows(partial(among_zeros, places=which, count=n), total)
+        return everywhere
 
     @cached_property
     def coupled(self) -> Ball:
@@ -167,38 +202,21 @@ class Derivatives:
         sinking = self.offsets[:, None] * geometry.bend * geometry.points
         return self.turning * geometry.share - sinking
 
-    @cached_property
-    def straightened(self) -> Ball:
-        """(n, 2) by minus the curvatures b of the drops."""
-        points = self.geometry.points
-        return self.offsets[:, None] * points * points * 0.5
-
-    @cached_property
-    def outwards(self) -> Ball:
-        """(n, 2) G r share^2, by minus rho/R of the contact points."""
-        geometry = self.geometry
-        return self.turning * geometry.points * geometry.share * geometry.share
+    def along(self, by: Bending) -> Ball:
+        """(n,) by a parameter that bends the geometry so."""
+        found = self.offsets * by.offsets + self.local * by.local
+        return found + (self.turning * by.points).sum() if self.geometry.closest else found
 
     @property
     def tip_radii(self) -> Ball:
-        geometry = self.geometry
-        bent = -self.local * geometry.relative / (3.0 * geometry.tips * geometry.tips)
-        if geometry.closest:
-            bends = self.straightened * geometry.bend * geometry.bend
-            bent = bent + (bends - self.outwards * geometry.curvature).sum()
-        return bent
+        return self.along(self.geometry.by_tip)
 
     @property
     def sphere_radius(self) -> Ball | None:
         """None of other bases than a sphere."""
-        geometry, scene = self.geometry, self.geometry.problem.scene
-        if named(scene.sphere_radius) != "a sphere":
+        if named(self.geometry.problem.scene.sphere_radius) != "a sphere":
             return None
-        squared = geometry.curvature[0] * geometry.curvature[0]
-        bends = self.straightened * geometry.share * geometry.share
-        if geometry.closest:
-            bends = bends + self.outwards * geometry.tips[:, None]
-        return (bends.sum() - self.local * geometry.relative / 3.0).sum() * squared
+        return self.along(self.geometry.by_radius).sum()
 
     @property
     def contact_modulus(self) -> Ball:

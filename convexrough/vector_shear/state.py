@@ -228,7 +228,9 @@ def _certificate(
     status[problem.to_scene(bounds.partial)] = "partial"
     status[problem.to_scene(bounds.sliding)] = "sliding"
     loaded = problem.to_scene(np.ones(len(problem), dtype=bool))
-    strays = np.where(loaded, 0.0, problem.levels.top_error * problem.force_unit)
+    levels = problem.levels
+    off = levels.to_scene(np.asarray(levels.top.loads.error))
+    strays = np.where(loaded, 0.0, off * problem.force_unit)
     return ShearCertificate(
         scope=problem.scope if bounds.proved else "none",
         order="proved for one step",
