@@ -126,17 +126,17 @@ class Contact(Cached, Table, Plottable):
 
         refuse_many(self.scene)
         by_load, n = self.prescribed_load is not None, len(self.scene)
-        levels, held = self.cached(levels_of), []
+        levels, states = self.cached(levels_of), []
         for state in sheared:
             drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
             level = levels.below(Ball.exact(drop / Fraction(levels.problem.units.force)))
-            held.append((state.force, NearState.of(level, n)))
+            states.append((state.force, NearState.of(level, n)))
         return prove(
             self.scene,
             NearState.of(levels.top, n),
             approach=None if by_load else self.approach,
             load=self.prescribed_load,
-            sheared=held,
+            sheared=states,
         )
 
     def gradient(

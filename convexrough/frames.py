@@ -41,10 +41,10 @@ def dataset(variables: Variables, attributes: dict[str, Any]) -> xarray.Dataset:
     arrays = {name: (along, np.array(values)) for name, (along, values) in variables.items()}
     known = {"x", "y", "asperity"} & set(arrays)
     vectors = any("direction" in along for along, _ in arrays.values())
-    held: xarray.Dataset = _loaded("xarray").Dataset(
+    dataset: xarray.Dataset = _loaded("xarray").Dataset(
         arrays, DIRECTION if vectors else {}, attributes
     )
-    return held.set_coords(sorted(known))
+    return dataset.set_coords(sorted(known))
 
 
 def _loaded(extra: str) -> Any:

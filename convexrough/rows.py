@@ -59,7 +59,7 @@ class PressedRows(NamedTuple):
         found, force, length = self.high, self.problem.units.force, self.problem.units.length
         loads = found.loads.value * force
         off = np.abs(loads.sum(axis=1) - found.load.value * force)
-        words = np.where(found.touching, "contact", np.where(found.open, "open", "undecided"))
+        status = np.where(found.touching, "contact", np.where(found.open, "open", "undecided"))
         return {
             "loads": loads.sum(axis=1),
             "load_errors": (off + found.load.error * force) * (1 + SAFETY),
@@ -67,7 +67,7 @@ class PressedRows(NamedTuple):
             "approach_errors": found.approach.error * length,
             "asperity_loads": loads,
             "asperity_load_errors": found.loads.error * force,
-            "status": words,
+            "status": status,
         }
 
     def cycles(
@@ -94,15 +94,15 @@ class PressedRows(NamedTuple):
         travel = f * ((2.0 - nu) / ((1.0 - nu) * 2.0)) * units.length
         loss = (slip + slide).sum() * 4.0 * (f * units.force) * travel
         moved = (high.approach - low.approach) * travel
-        words = np.where(high.open, "open", np.full(high.open.shape, "undecided", dtype="<U12"))
-        words[high.touching & low.touching] = "partial"
-        words[high.touching & low.open] = "sliding"
+        status = np.where(high.open, "open", np.full(high.open.shape, "undecided", dtype="<U12"))
+        status[high.touching & low.touching] = "partial"
+        status[high.touching & low.open] = "sliding"
         return found.good & ordered & inside, {
             "losses": loss.value,
             "loss_errors": loss.error,
             "displacement_amplitudes": moved.value,
             "displacement_errors": moved.error,
-            "status": words,
+            "status": status,
         }
 
 

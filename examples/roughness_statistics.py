@@ -52,7 +52,7 @@ def sweep_tables(surfaces: int) -> dict[str, Any]:
         },
         "normal": {"load": LOAD},
         "friction": {"coefficient": FRICTION},
-        "cycle": {"maximum": list(AMPLITUDES)},
+        "cycle": {"maximum_fraction": list(AMPLITUDES)},
         "sweep": {
             "seeds": max(1, surfaces // (len(SPREADS) * len(TIPS))),
             "measure": ["loss", "loss_over_smooth"],
@@ -128,9 +128,9 @@ def compare() -> Pairs:
     pairs = []
     found = crossings(ratios)
     for row in (0, len(ratios) - 3):
-        drawn = columns["asperities.height_std"][row], columns["asperities.tip_radius_cv"][row]
-        contact = surface(*drawn, int(columns["seed"][row]))
-        name = f"heights {drawn[0]:g}, tips {drawn[1]:g}, seed {columns['seed'][row]}"
+        parameters = columns["asperities.height_std"][row], columns["asperities.tip_radius_cv"][row]
+        contact = surface(*parameters, int(columns["seed"][row]))
+        name = f"heights {parameters[0]:g}, tips {parameters[1]:g}, seed {columns['seed'][row]}"
         pairs.append((f"crossing, {name}", found[row], crossing_by_bisection(contact)))
         amplitude = 0.75
         loss = columns[f"loss_{amplitude!r}"][row]

@@ -43,8 +43,8 @@ def pytest_configure(config: pytest.Config) -> None:
     """The seed is drawn once: processes of pytest-xdist inherit it from the first."""
     config.addinivalue_line("markers", "sample(n): so many cases of a test, drawn anew each time")
     if config.option.seed is None:
-        drawn = str(random.SystemRandom().randrange(10**6))
-        config.option.seed = int(os.environ.setdefault("CONVEXROUGH_SAMPLES", drawn))
+        sample = str(random.SystemRandom().randrange(10**6))
+        config.option.seed = int(os.environ.setdefault("CONVEXROUGH_SAMPLES", sample))
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
@@ -66,8 +66,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         marker = found[0].get_closest_marker("sample")
         assert marker is not None
         many = min(marker.args[0], len(found))
-        drawn = random.Random(f"{config.option.seed} {test}").sample(found, many)
-        left_out |= set(found) - set(drawn)
+        sample = random.Random(f"{config.option.seed} {test}").sample(found, many)
+        left_out |= set(found) - set(sample)
     config.hook.pytest_deselected(items=[item for item in items if item in left_out])
     items[:] = [item for item in items if item not in left_out]
 

@@ -40,7 +40,7 @@ coefficient = 0.5
 [shear]
 fractions = [0.25, 0.5]
 [cycle]
-maximum = [0.3]
+maximum_fraction = [0.3]
 loop_points = 40
 [history]
 fractions = [0.3, -0.3, 0.1]

@@ -11,7 +11,7 @@ from matplotlib.text import Text
 def texts(figure: Figure) -> list[Text]:
     """Every text that is drawn, after drawing the figure."""
     figure.draw_without_rendering()
-    ticks, drawn = set(), []
+    ticks, found = set(), []
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             low, high = sorted(axis.get_view_interval())
@@ -20,9 +20,9 @@ def texts(figure: Figure) -> list[Text]:
             places = axis.get_majorticklocs()
             for place, tick in zip(places, axis.get_major_ticks(), strict=True):
                 if low - slack <= place <= high + slack:
-                    drawn += [tick.label1, tick.label2]
+                    found += [tick.label1, tick.label2]
     others = [t for t in figure.findobj(Text) if isinstance(t, Text) and t not in ticks]
-    return [t for t in drawn + others if t.get_visible() and t.get_text().strip()]
+    return [t for t in found + others if t.get_visible() and t.get_text().strip()]
 
 
 def fits(figure: Figure) -> None:

@@ -22,7 +22,7 @@ STAGES = """
 [shear]
 fractions = [0.25, 0.5]
 [cycle]
-maximum = [0.3]
+maximum_fraction = [0.3]
 loop_points = 8
 [history]
 fractions = [0.3, -0.3, 0.1]

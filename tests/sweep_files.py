@@ -26,7 +26,7 @@ SMALL: dict[str, Any] = {
     },
     "normal": {"load": 3e-7},
     "friction": {"coefficient": 0.5},
-    "cycle": {"maximum": [0.37]},
+    "cycle": {"maximum_fraction": [0.37]},
     "sweep": {
         "seeds": 4,
         "measure": ["contact", "load", "loss"],

@@ -159,9 +159,9 @@ def test_two_equal_asperities_by_hand() -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(random_cases(), st.floats(-3, 3), st.floats(-3, 3))
-def test_units_do_not_matter(drawn: Case, length: float, force: float) -> None:
+def test_units_do_not_matter(sampled: Case, length: float, force: float) -> None:
     """Lengths times lambda and moduli times mu: loads times lambda^2 mu, the same statuses."""
-    scene, approach, kind = drawn
+    scene, approach, kind = sampled
     lam, mu = 10**length, 10**force
     a = scene.asperities
     scaled = cr.Scene(
@@ -180,8 +180,8 @@ def test_units_do_not_matter(drawn: Case, length: float, force: float) -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(random_cases(), st.randoms(use_true_random=False), st.floats(0, 6.28))
-def test_order_and_orientation_do_not_matter(drawn: Case, random: object, angle: float) -> None:
-    scene, approach, kind = drawn
+def test_order_and_orientation_do_not_matter(sampled: Case, random: object, angle: float) -> None:
+    scene, approach, kind = sampled
     a = scene.asperities
     order = list(range(len(a)))
     random.shuffle(order)  # type: ignore[attr-defined]

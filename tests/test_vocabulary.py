@@ -1,4 +1,4 @@
-"""Turns of phrase that readers had to read twice: not in pages, help texts or docstrings."""
+"""Turns of phrase that readers had to read twice, and names that they guessed wrong."""
 
 import io
 import re
@@ -18,6 +18,35 @@ BANNED = {
     r"\bknows? no\b|\bknow nothing\b": "say what does not depend on what",
     r"\bmended\b|\bspoiled\b|\bguilty\b": '"fixed", "corrupted", "wrong"',
     r"\bis no \w+ness\b|\bwhat is no\b": "say what it is",
+}
+
+#: A name that the code had, and the term of the field that took its place.
+FORMER_NAMES = {
+    "accept": "assemble",
+    "among": "restricted",
+    "announce": "the logger `convexrough`",
+    "at_hand": "stored",
+    "beside": "what is next to what",
+    "blur": "site_error, or what is uncertain",
+    "ceilings": "thresholds",
+    "doubt": "uncertainty",
+    "different_words": "different_statuses",
+    "Drawn": "Plottable",
+    "drawn": "random, or plotted",
+    "felt": "coupled",
+    "first_loading": "from_rest",
+    "judge": "check",
+    "Judged": "Checked",
+    "Keeper": "Cached",
+    "lacking": "missing",
+    "listed": "joined",
+    "rise": "displacement",
+    "rival": "other solution",
+    "rivals": "other solutions",
+    "sharp": "cheap_sums",
+    "told": "reported",
+    "word": "status",
+    "words": "statuses",
 }
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -44,6 +73,27 @@ def found_in(text: str) -> list[str]:
         for turn, advice in BANNED.items()
         for found in re.finditer(turn, text, re.I)
     ]
+
+
+def names_of_a_module(path: Path) -> set[str]:
+    """Names of modules, classes, functions, parameters, attributes and variables."""
+    tokens = tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline)
+    return {path.stem, *(t.string for t in tokens if t.type == tokenize.NAME)}
+
+
+def test_former_names_do_not_come_back() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}: {name}: write {FORMER_NAMES[name]}"
+        for path in MODULES
+        for name in sorted(names_of_a_module(path) & FORMER_NAMES.keys())
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_former_names_are_found(tmp_path: Path) -> None:
+    module = tmp_path / "rivals.py"
+    module.write_text("def solve(problem, announce=None):\n    return problem.at_hand  # rise\n")
+    assert names_of_a_module(module) & FORMER_NAMES.keys() == {"rivals", "announce", "at_hand"}
 
 
 def test_no_banned_turn() -> None:

@@ -186,7 +186,7 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
         "asperities": {"pattern": "hexagonal", **lattice, "height_std": 1e-6 * a},
         "normal": {"load": 3.6e-7},
         "friction": {"coefficient": 0.5},
-        "cycle": {"maximum": [0.37]},
+        "cycle": {"maximum_fraction": [0.37]},
         "sweep": {"seeds": scenes, "measure": ["contact", "loss"]},
     }
     began = time.perf_counter()

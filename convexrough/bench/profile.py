@@ -115,7 +115,7 @@ def profile_of(
         for row, entry in enumerate(entries):
             outcomes[row][column] = entry.outcome
             if (found := entry.contact) is not None:
-                near = hard.judge(found.loads).error <= within
+                near = hard.check(found.loads).error <= within
                 outcomes[row][column] = "right" if near else "wrong"
                 seconds[row, column] = found.seconds if near else np.inf
     return Profile(

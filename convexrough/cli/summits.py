@@ -137,10 +137,10 @@ def _written(path: Path, scanned: Scanned, *, figures: bool) -> list[Path]:
     if figures:
         from convexrough.plots.surface import surface_figures  # matplotlib: only when it draws
 
-        drawn = surface_figures(
+        pictures = surface_figures(
             scanned.surface, scanned.maxima, scanned.summits, scanned.curve, scanned.contact
         )
-        named = {f"{path.stem}-{stem}": figure for stem, figure in drawn.items()}
+        named = {f"{path.stem}-{stem}": figure for stem, figure in pictures.items()}
         files += write_figures(path.parent, named)
     return files
 

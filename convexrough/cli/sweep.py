@@ -82,7 +82,7 @@ def sweep(
         raise click.UsageError("--resume and --force exclude each other.")
     from convexrough.errors import WorkerError
     from convexrough.sweeps.file import read_sweep
-    from convexrough.sweeps.report import describe, failures, kept, summarise
+    from convexrough.sweeps.report import describe, failures, progress_kept, summarise
     from convexrough.sweeps.sweep import run
 
     assert sweep is not None  # one of the two
@@ -93,10 +93,10 @@ def sweep(
         with progress(str(sweep)), _executor(workers, scheduler) as executor:
             done = run(plan, executor, out=folder, resume=resume, overwrite=force, part=part)
     except KeyboardInterrupt:
-        say_aside("interrupted", kept(folder, plan))
+        say_aside("interrupted", progress_kept(folder, plan))
         return INTERRUPTED
     except WorkerError as error:
-        say_aside("error", str(error), kept(folder, plan))
+        say_aside("error", str(error), progress_kept(folder, plan))
         return SOLVER_FAILED
     said = summarise(done.table, done)
     echo(said, describe(said), as_json)

@@ -83,10 +83,10 @@ def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[ConePiece]:
     load = float(hertz.load(own, k))
     base = min(float(curve.load), own)
     old, heights = ([float(each) for each in of] for of in (curve.levels, curve.heights))
-    kept = curve if base >= old[-1] else curve.go(base, float(np.interp(base, old, heights)))[0]
-    s = np.array([float(each) for each in kept.levels])
-    N, xi = hertz.load(s, k) / load, np.array([float(each) for each in kept.heights]) / own
-    slopes = [float(each) for each in kept.slopes]
+    inner = curve if base >= old[-1] else curve.go(base, float(np.interp(base, old, heights)))[0]
+    s = np.array([float(each) for each in inner.levels])
+    N, xi = hertz.load(s, k) / load, np.array([float(each) for each in inner.heights]) / own
+    slopes = [float(each) for each in inner.slopes]
     T = np.concatenate(([0.0], np.cumsum(np.array(slopes) * np.diff(N))))
     top, moved = float(N[-1]), float(xi[-1])
     found = []

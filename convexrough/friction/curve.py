@@ -198,13 +198,13 @@ class MemoryCurve(Table, Plottable):
 
     def _cut(self, vertex: int) -> MemoryCurve:
         """The curve up to a vertex."""
-        kept = slice(vertex + 1)
-        return MemoryCurve(self.levels[kept], self.heights[kept], self.slopes[:vertex])
+        part = slice(vertex + 1)
+        return MemoryCurve(self.levels[part], self.heights[part], self.slopes[:vertex])
 
     def _with(self, slope: Fraction, load: Fraction, height: Fraction) -> MemoryCurve:
         """One layer more, up to a point; layers of equal slope are one."""
-        kept = len(self.slopes)
-        if kept and self.slopes[-1] == slope:
-            kept -= 1
-        below = self._cut(kept)
+        count = len(self.slopes)
+        if count and self.slopes[-1] == slope:
+            count -= 1
+        below = self._cut(count)
         return MemoryCurve((*below.levels, load), (*below.heights, height), (*below.slopes, slope))

@@ -330,8 +330,8 @@ def _at_the_load(
     """Cycles between two T each, at the load of the contact."""
     load = contact.cached(FrictionLevels).load
     paths = [[(load, T) for T in each] for each in heights]
-    held = np.full(2, float(load))
-    asked = [(path, held.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
+    load_twice = np.full(2, float(load))
+    asked = [(path, load_twice.copy(), np.array(Q)) for path, Q in zip(paths, forces, strict=True)]
     return _cycles(contact, MemoryCurve.pressed(load), asked)
 
 
@@ -461,7 +461,7 @@ def _cycle(
         amplitude = float(np.ptp(closed.general.states.displacements[closed.once :])) / 2.0
     everywhere = {name: levels.to_scene(which) for name, which in statuses.items()}
     slides = everywhere.get("sliding", np.zeros(len(levels.scene), dtype=bool))
-    lost, kept = levels.to_scene(intermittent), levels.to_scene(bottom.touching)
+    lost, touching_below = levels.to_scene(intermittent), levels.to_scene(bottom.touching)
     doubtful = levels.to_scene(~(rest.touching | rest.open))
     slip_errors = np.where(slides | doubtful, slip_errors, 0.0) if statuses else slip_errors
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
@@ -477,7 +477,7 @@ def _cycle(
         loss_first=float(first),
         loss_first_error=float(first_error),
         status=by_status(levels, top, **statuses),
-        slips=frozen(np.where(lost, np.nan, np.where(kept, slips, 0.0))),
+        slips=frozen(np.where(lost, np.nan, np.where(touching_below, slips, 0.0))),
         slip_errors=frozen(slip_errors),
         stick_radii=radii,
         stick_radius_errors=frozen(radius_errors),

@@ -4,6 +4,6 @@
 """
 
 from convexrough.gallery.any_size import Manufactured, manufactured
-from convexrough.gallery.cases import HardCase, Judged, case, names
+from convexrough.gallery.cases import Checked, HardCase, case, names
 
-__all__ = ["HardCase", "Judged", "Manufactured", "case", "manufactured", "names"]
+__all__ = ["Checked", "HardCase", "Manufactured", "case", "manufactured", "names"]

@@ -34,7 +34,7 @@ REVERSALS = 100_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Judged(Record):
+class Checked(Record):
     """Comparison of loads or forces with the answer. Indices are those of the scene's asperities.
 
     wrongly_open   : (m,) without a given load, and touching (for shear forces: loaded)
@@ -74,7 +74,7 @@ class HardCase(Record):
     displacement  : digits [length], both bodies; "" there
 
     >>> case = cr.gallery.case("grazing-gap-1e-9")
-    >>> case.judge(cr.press(case.scene, **case.control).loads).right
+    >>> case.check(cr.press(case.scene, **case.control).loads).right
     True
     """
 
@@ -107,7 +107,7 @@ class HardCase(Record):
         """(n,) which asperities touch."""
         return frozen(np.array([digits != "0" for digits in self.loads]))
 
-    def judge(self, loads: ArrayLike, *, within: float = 1e-6, floor: float = 0.0) -> Judged:
+    def check(self, loads: ArrayLike, *, within: float = 1e-6, floor: float = 0.0) -> Checked:
         """Compare loads (n,) [force] with the answer.
 
         within : largest error allowed, over the largest load
@@ -117,8 +117,8 @@ class HardCase(Record):
         claimed = given > checks.non_negative("floor", floor)
         return _judged(given, self.loads, claimed, self.touching, within)
 
-    def judge_shear(self, forces: ArrayLike, *, within: float = 1e-6) -> Judged:
-        """Shear forces (n,) [force] along the shear force, as `judge`; at the end of a history."""
+    def check_shear(self, forces: ArrayLike, *, within: float = 1e-6) -> Checked:
+        """Shear forces (n,) [force] along the shear force, as `check`; at the end of a history."""
         if not self.forces:
             found = "a case in which one is dragged along by the others"
             raise InputError("forces", found=found, expected="a case with an answer in shear")
@@ -132,12 +132,12 @@ def _judged(
     claimed: NDArray[np.bool_],
     touching: NDArray[np.bool_],
     within: float,
-) -> Judged:
+) -> Checked:
     """Subtracted exactly, as some answers are nearer to each other than float64 numbers."""
     exact = [Fraction(each) for each in digits]
     apart = max(abs(Fraction(float(a)) - b) for a, b in zip(given, exact, strict=True))
     largest = max(map(abs, exact))
-    return Judged(
+    return Checked(
         wrongly_open=frozen(np.flatnonzero(touching & ~claimed)),
         wrongly_loaded=frozen(np.flatnonzero(claimed & ~touching)),
         error=float(apart / largest) if largest else float(apart),
@@ -217,7 +217,7 @@ def _reversals(kind: str) -> list[float]:
     if kind == "random":
         numbers, turns = random.Random(8), [0.0]
         for k in range(1, REVERSALS):
-            kept = turns[-1] if k % 10 == 0 else 1.8 * numbers.random() - 0.9
-            turns.append(0.0 if k % 7 == 0 else kept)
+            value = turns[-1] if k % 10 == 0 else 1.8 * numbers.random() - 0.9
+            turns.append(0.0 if k % 7 == 0 else value)
         return [*turns, 1.0]
     return []

@@ -212,8 +212,8 @@ def _slopes(
     slopes = {level: tuple(w / by for w in weights) for level, weights in found.items()}
     sizes = [abs(w) / unit**k for weights in slopes.values() for k, w in enumerate(weights)]
     least = NEAR * max(sizes, default=Fraction(0))
-    kept = {
+    nonzero = {
         level: tuple(w if abs(w) > least * unit**k else Fraction(0) for k, w in enumerate(weights))
         for level, weights in slopes.items()
     }
-    return {level: weights for level, weights in kept.items() if any(weights)}
+    return {level: weights for level, weights in nonzero.items() if any(weights)}

@@ -188,8 +188,8 @@ class Derivatives:
             if left.size.any():
                 total = total + left[:, None] * geometry.slopes(loads, which)
                 total = total + loads[:, None] * geometry.slopes(left, which)
-        among: Ball = of_rows(partial(among_zeros, places=which, count=n), total)
-        return among
+        everywhere: Ball = of_rows(partial(among_zeros, places=which, count=n), total)
+        return everywhere
 
     @cached_property
     def coupled(self) -> Ball:

@@ -34,7 +34,7 @@ def scene() -> cr.Scene:
 def results() -> list[Result]:
     """Pressed, sheared to half of gross sliding, and cycled at the amplitudes the paper shows."""
     parts = [0.1, 0.37, 0.5]
-    stages = (Normal(approach=APPROACH), Shear(fractions=parts), Cycle(maximum=parts))
+    stages = (Normal(approach=APPROACH), Shear(fractions=parts), Cycle(maximum_fraction=parts))
     contact = cr.press(scene(), approach=APPROACH)
     return [stage.compute(contact) for stage in stages]
 

@@ -80,12 +80,15 @@ def slider_data(slides: Slides, proved: Sequence[str], units: UnitNames) -> dict
     sphere = smooth(contact.scene, load=contact.load) if contact.load else None
     a_H = sphere.contact_radius if sphere else 1.0
     X0 = float(sphere.displacement(limit)) if sphere else 1.0
-    drawn = _some(touching, MOST_DRAWN)
-    away = np.argsort(contact.scene.asperities.distances[drawn], kind="stable")
+    shown = _some(touching, MOST_DRAWN)
+    away = np.argsort(contact.scene.asperities.distances[shown], kind="stable")
     followed = np.array(evenly_chosen(away.tolist(), MOST_FOLLOWED), dtype=np.intp)
     x, y = (contact.scene.contact_points / a_H).T
-    points, radii = contact.scene.contact_points[drawn] / a_H, contact.contact_radii[drawn] / a_H
-    radii *= np.sqrt(len(touching) / max(1, len(drawn)))  # together they cover the same area
+    points, radii = (
+        contact.scene.contact_points[shown] / a_H,
+        contact.contact_radii[shown] / a_H,
+    )
+    radii *= np.sqrt(len(touching) / max(1, len(shown)))  # together they cover the same area
     reach = np.hypot(*points.T) + radii
     empty = _some(np.flatnonzero(contact.loads == 0), MOST_DRAWN)
     edge = 1.06 * max(1.0, float(reach.max(initial=0.0)))
@@ -96,13 +99,13 @@ def slider_data(slides: Slides, proved: Sequence[str], units: UnitNames) -> dict
         "edge": _digits(edge),
         "certificate": list(proved),
         "letters": _letters(limit, a_H, X0, units),
-        "left_out": _left_out(len(touching), len(drawn), len(followed), len(fractions)),
+        "left_out": _left_out(len(touching), len(shown), len(followed), len(fractions)),
         "states": _states(fractions, steady, X0, limit),
-        "discs": {"index": drawn.tolist(), "x": _digits(points[:, 0]), "y": _digits(points[:, 1]),
+        "discs": {"index": shown.tolist(), "x": _digits(points[:, 0]), "y": _digits(points[:, 1]),
                   "radius": _digits(radii)},
-        "stick": _stick(contact, loading, steady, drawn),
+        "stick": _stick(contact, loading, steady, shown),
         "open": {"x": _digits(x[empty]), "y": _digits(y[empty])},
-        "followed": {"disc": followed.tolist()} | _followed(contact, loading, drawn[followed], X0),
+        "followed": {"disc": followed.tolist()} | _followed(contact, loading, shown[followed], X0),
     }  # fmt: skip
 
 
@@ -138,12 +141,12 @@ def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> d
 
 
 def _stick(
-    contact: Contact, loading: LoadPath, steady: list[Cycle], drawn: Indices
+    contact: Contact, loading: LoadPath, steady: list[Cycle], shown: Indices
 ) -> list[list[int]]:
     """c_i / a_i = (1 - Q_i / (f P_i))^(1/3) in thousandths, 0 sliding, -1 undecided."""
-    left = np.maximum(1.0 - _shares(contact, loading, drawn), 0.0)
+    left = np.maximum(1.0 - _shares(contact, loading, shown), 0.0)
     rows = np.maximum(np.rint(1000.0 * np.cbrt(left)), 1.0).astype(int)
-    statuses = np.array([each.status[drawn] for each in steady])
+    statuses = np.array([each.status[shown] for each in steady])
     rows[statuses == "sliding"] = 0
     rows[statuses == "undecided"] = -1
     return [row.tolist() for row in rows]
@@ -191,11 +194,11 @@ def _letters(limit: float, a_H: float, X0: float, units: UnitNames) -> list[list
     ]
 
 
-def _left_out(touching: int, drawn: int, followed: int, forces: int) -> list[str]:
+def _left_out(touching: int, shown: int, followed: int, forces: int) -> list[str]:
     """What the page does not show of many asperities, in sentences; the counts are of all."""
     said = []
-    if drawn < touching:
-        said.append(f"{drawn:,} of {touching:,} touching asperities are drawn, by lot and larger.")
+    if shown < touching:
+        said.append(f"{shown:,} of {touching:,} touching asperities are drawn, by lot and larger.")
     if followed < touching:
         said.append(f"{followed:,} of the asperities can be followed.")
     if forces < next(iter(FORCES.values())):

@@ -161,10 +161,10 @@ def draw_density(axes: Axes, x: Array, y: Array, top: float, label: str) -> None
     fading = LinearSegmentedColormap.from_list("density", [(1, 1, 1, 0), to_rgba(ROUGH, 0.75)])
     axes.pcolormesh(across, up, share.T, cmap=fading, vmin=0.0, vmax=1.0, rasterized=True, lw=0)
     column = np.clip(np.searchsorted(across, x, side="right") - 1, 0, columns - 1)
-    held = np.unique(column)
-    middle = [np.median(y[column == each]) for each in held]
+    filled = np.unique(column)
+    middle = [np.median(y[column == each]) for each in filled]
     axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=label)
-    axes.plot((across[held] + across[held + 1]) / 2, middle, color=ROUGH, lw=1.3,
+    axes.plot((across[filled] + across[filled + 1]) / 2, middle, color=ROUGH, lw=1.3,
               label="their median")  # fmt: skip
 
 

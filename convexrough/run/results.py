@@ -128,8 +128,8 @@ def write_results(
         units = units or UnitNames()
         for result in results:
             LOGGER.info(f"drawing {result.name}")
-            drawn = result.figures(length_unit=units.length, force_unit=units.force)
-            written += write_figures(folder, drawn, **saved)
+            pictures = result.figures(length_unit=units.length, force_unit=units.force)
+            written += write_figures(folder, pictures, **saved)
     path = folder / "summary.json"
     write_json(path, summarise(results) | dict(more or {}))
     return [path, *written]

@@ -29,6 +29,7 @@ from convexrough.checks import SIZED, is_sized, nearest
 MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
 MEANT |= {"nu": "poisson_ratio", "R": "radius", "rho": "tip_radius", "f": "coefficient"}
 MEANT |= {"mu": "coefficient", "P": "load", "D": "approach"}
+MEANT |= {"maximum": "maximum_fraction", "minimum": "minimum_fraction"}  # forces in Python
 
 #: A mistake: the key, "" for all of the table, and what is said of it.
 Mistake = tuple[str, str]

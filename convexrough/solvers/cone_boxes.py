@@ -57,12 +57,12 @@ class TooDenseError(InputError):
     def __init__(self, solver: str, asperities: Indices, ratios: Array, limit: float) -> None:
         self.asperities, self.ratios = asperities, ratios
         worst = np.argsort(-ratios, kind="stable")[:8]
-        listed = ", ".join(f"{asperities[i]} ({ratios[i]:.4g})" for i in worst)
+        described = ", ".join(f"{asperities[i]} ({ratios[i]:.4g})" for i in worst)
         more = f" and {len(ratios) - len(worst)} more" if len(ratios) > len(worst) else ""
         super().__init__(
             "asperities too dense for a convex program",
             found="contact radii pressed towards these multiples of pi/4 of the distance to the "
-            f"nearest neighbour, by asperity: {listed}{more}",
+            f"nearest neighbour, by asperity: {described}{more}",
             expected=f"less than {limit:g}",
             where=solver,
         )

@@ -25,7 +25,7 @@ from convexrough.surface.provability import (
 )
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
-from convexrough.tabular.columns import aligned, listed
+from convexrough.tabular.columns import aligned, labelled
 from convexrough.version import __version__
 
 #: Columns of summits.csv beside x, y, height and tip_radius, which a scene file reads.
@@ -173,7 +173,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
         ("bandwidth", f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
                       f"m2 {surface.moments.m2:.4g}, m4 {surface.moments.m4:.4g})"),
     ]  # fmt: skip
-    described = listed(lines)
+    described = labelled(lines)
     described += ["", *_describe_statistics(scanned)]
     if scanned.curve is not None:
         described += ["", *_describe_curve(scanned.curve, surface.unit)]
@@ -184,7 +184,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
         table += [[*each, f"{each[1] / each[2] - 1:+.1%}"] for each in scanned.whole.compared()]
         described += ["", *aligned(table, left=1)]
         change = f"{100 * scanned.whole.resolution:.2g} %"
-        described += listed([("resolution", f"pixels twice as wide change the load by {change}")])
+        described += labelled([("resolution", f"pixels twice as wide change the load by {change}")])
     return described
 
 
@@ -216,7 +216,7 @@ def _describe_curve(curve: Provability, unit: str) -> list[str]:
     said = "at no pruning" if np.isnan(first) else f"from a pruning of {100 * first:.3g} % on"
     if not curve.contacts.any():
         said = "nothing, as nothing touches"
-    return [*aligned(table), "", *listed([("to be trusted", said)])]
+    return [*aligned(table), "", *labelled([("to be trusted", said)])]
 
 
 def _describe_crowded(contact: Contact) -> list[str]:

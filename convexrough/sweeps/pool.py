@@ -119,15 +119,15 @@ class Processes(Executor):
         self._pool.shutdown(wait, cancel_futures=cancel_futures)
 
 
-def _end_with(held: Any) -> None:
+def _end_with(pipe: Any) -> None:
     """Let this process end with the process that started it, and not by an interrupt.
 
-    held : one end of a pipe whose other end only that process has
+    pipe : one end of a pipe whose other end only that process has
     """
 
     def watch() -> None:
         with suppress(EOFError, OSError):
-            held.recv_bytes()
+            pipe.recv_bytes()
         os._exit(1)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -15,7 +15,7 @@ from convexrough.sweeps.folder import MANIFEST
 from convexrough.sweeps.plan import Plan
 from convexrough.sweeps.sweep import Done
 from convexrough.sweeps.table import SweepTable, open_sweep
-from convexrough.tabular.columns import aligned, listed
+from convexrough.tabular.columns import aligned, labelled
 
 #: Quantiles in print, rows of a table in print, failed scenes that are named, and figures drawn.
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
@@ -48,7 +48,7 @@ def describe(summary: Summary) -> list[str]:
     if left_out := it["not_measured"]:
         lines.append(("left out", f"{', '.join(map('[{}]'.format, left_out))}: nothing measured"))
     lines.append(("folder", it["folder"]))
-    return listed(lines, 12)
+    return labelled(lines, 12)
 
 
 def describe_quantiles(found: Columns) -> list[str]:
@@ -76,11 +76,11 @@ def write_summary(
     """quantiles.csv, and a figure of each measured quantity over each swept one."""
     pairs = [(name, key) for key in table.swept for name in table.measured][:MOST_FIGURES]
     with results_folder(folder, force=overwrite) as new:
-        drawn: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
-        return write_tables(new, {"quantiles": found}) + write_figures(new, drawn)
+        figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
+        return write_tables(new, {"quantiles": found}) + write_figures(new, figures)
 
 
-def kept(folder: Path, plan: Plan) -> str:
+def progress_kept(folder: Path, plan: Plan) -> str:
     """What a folder holds of a sweep that was cut short, and how to go on."""
     if not (folder / MANIFEST).exists():
         return "nothing was computed yet"

@@ -124,16 +124,16 @@ def run(
         todo, found = folder.missing(todo, resume)
         LOGGER.info(found)
     count = sum(map(len, todo))
-    held = [table(plan.batch(range(0)), [])]  # no rows, all columns
+    parts = [table(plan.batch(range(0)), [])]  # no rows, all columns
     for columns in _report_progress(computed(map(plan.batch, todo), executor), count):
         if folder is None:
-            held.append(columns)
+            parts.append(columns)
         else:
             folder.write(columns)
     seconds = time.monotonic() - began
     if folder is not None:
         return Done(SweepTable(folder.manifest, folder), found, count, seconds)
-    joined = {name: np.concatenate([each[name] for each in held]) for name in held[0]}
+    joined = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
     order = np.argsort(joined["scene"])
     rows = {name: values[order] for name, values in joined.items()}
     return Done(SweepTable(plan.manifest(), None, rows), found, count, seconds)
@@ -173,7 +173,7 @@ def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
     found: dict[str, Stage] = {"normal": Normal(approach=0.0)}
     mistakes: list[str] = []
     models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
-    models = ((Shear, "fractions", shear), (Cycle, "maximum", cycle))
+    models = ((Shear, "fractions", shear), (Cycle, "maximum_fraction", cycle))
     for model, key, values in models:
         if len(values):
             table, wrong = validate_table(model.name, {key: [*map(float, values)]}, model)

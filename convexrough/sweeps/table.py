@@ -62,7 +62,7 @@ class SweepTable(Record):
 
     manifest: Mapping[str, Any]
     folder: Folder | None = None
-    held: Columns | None = None
+    in_memory: Columns | None = None
 
     @property
     def columns(self) -> list[str]:
@@ -94,15 +94,15 @@ class SweepTable(Record):
 
     def __len__(self) -> int:
         """How many rows there are."""
-        if self.held is not None:
-            return len(self.held["scene"])
+        if self.in_memory is not None:
+            return len(self.in_memory["scene"])
         return sum(map(len, self._parts()))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
         """Some columns, default all, a part after the other: for what exceeds memory."""
         self._refuse_unknown(names or ())
-        if self.held is not None:
-            yield {name: self.held[name] for name in names or self.columns}
+        if self.in_memory is not None:
+            yield {name: self.in_memory[name] for name in names or self.columns}
             return
         assert self.folder is not None  # or it is held
         for part in self._parts():

@@ -62,7 +62,11 @@ def measured_together(
     for number, each in asked.items():
         cycle = _cycle(each, columns)
         if each.plain and not (cycle and each.scene.friction is None):
-            key = len(each.scene), each.load is not None, len(cycle.maximum) if cycle else 0
+            key = (
+                len(each.scene),
+                each.load is not None,
+                len(cycle.maximum_fraction) if cycle else 0,
+            )
             groups.setdefault(key, []).append(number)
     found: dict[int, tuple[Numbers, str]] = {}
     for (_, by_load, _), numbers in groups.items():
@@ -105,7 +109,7 @@ def _known(
             for each, load in zip(asked, contacts["loads"], strict=True)
         ]
         scales = np.array([np.nan if each is None else each.energy_scale for each in smooth])
-        highs = np.array([stage.maximum for stage in stages]).T
+        highs = np.array([stage.maximum_fraction for stage in stages]).T
         lows = np.array([stage.lowest for stage in stages]).T
         for high, low in zip(highs, lows, strict=True):
             proved, fields = rows.cycles(high * limits, low * limits, friction)

@@ -10,7 +10,7 @@ from typing import Any
 TextTable = Sequence[Sequence[Any]]
 
 
-def listed(lines: Iterable[tuple[str, str]], width: int = 18) -> list[str]:
+def labelled(lines: Iterable[tuple[str, str]], width: int = 18) -> list[str]:
     """Lines of a name and a text, the texts below each other."""
     return [f"{name:<{width}}{text}" for name, text in lines]
 

@@ -16,7 +16,7 @@ from convexrough.normal.claims import Claim
 from convexrough.plausibility import described_modulus
 from convexrough.record import rows_of
 from convexrough.scene.scene import Scene
-from convexrough.tabular.columns import aligned, bound, listed
+from convexrough.tabular.columns import aligned, bound, labelled
 from convexrough.tabular.units import NAMELESS, UnitNames
 from convexrough.verdict.verdict import Verdict
 
@@ -94,7 +94,7 @@ def describe_verdict(found: Verified, units: UnitNames) -> list[str]:
 def describe_scene(scene: Scene, units: UnitNames) -> list[str]:
     """Lines about the scene: geometry and contact modulus."""
     modulus = described_modulus(scene.material.contact_modulus, units)
-    return listed([("geometry", scene.geometry), ("contact modulus", modulus)])
+    return labelled([("geometry", scene.geometry), ("contact modulus", modulus)])
 
 
 def _proved(claim: Claim) -> str:
@@ -126,19 +126,19 @@ def describe_claim(
         return [*lines, f"    and {more:,} more{others}"] if more > 0 else lines
 
     worst = np.argsort(-claim.errors, kind="stable")
-    lines = listed([
+    lines = labelled([
         ("result" if claim.one == "load" else claim.many, _proved(claim)),
         ("wrong statuses", str(len(claim.wrongly_claimed) or "none")),
     ])  # fmt: skip
     for what, which in claim.wrong.items():
         if len(which):
             lines += [f"  {what}: {len(which):,}", *table(worst[np.isin(worst, which)])]
-    lines += listed([("undecided", str(len(claim.undecided) or "none"))])
+    lines += labelled([("undecided", str(len(claim.undecided) or "none"))])
     lines += table(claim.undecided)
-    lines += [*listed([(f"{claim.one} error", _off(claim))]), *table(claim.off)]
-    lines += listed([(f"total {claim.one}", _total(claim, units.force))])
+    lines += [*labelled([(f"{claim.one} error", _off(claim))]), *table(claim.off)]
+    lines += labelled([(f"total {claim.one}", _total(claim, units.force))])
     if len(claim.suspects):
-        lines += [*listed([("suspects", "likeliest first")]), *table(claim.suspects)]
+        lines += [*labelled([("suspects", "likeliest first")]), *table(claim.suspects)]
     return lines
 
 

@@ -71,7 +71,7 @@ def guessing_loop(k: Array, A: Array, D: Array, passes: int = 200) -> tuple[Arra
 # overlap, and on which the loop has not ended after 200 passes.
 
 
-def drawn(rng: np.random.Generator) -> cr.Scene:
+def random_scene(rng: np.random.Generator) -> cr.Scene:
     """Four asperities whose discs do not overlap when pressed by APPROACH."""
     while True:
         points = rng.uniform(-0.0015, 0.0015, (4, 2)).round(5)
@@ -87,7 +87,7 @@ APPROACH = 2e-5
 rng = np.random.default_rng(6)
 sets: list[str] = []
 while len(sets) < 200:
-    scene = drawn(rng)
+    scene = random_scene(rng)
     loads, sets = guessing_loop(*law(scene, APPROACH))
 points, heights = scene.asperities.positions, scene.asperities.heights
 print("places: ", points.tolist())
@@ -195,7 +195,7 @@ assert off > 0.01
 DRAWN = 200
 ended, reached = 0, 0
 for _ in range(DRAWN):
-    values = law(drawn(rng), APPROACH)
+    values = law(random_scene(rng), APPROACH)
     ended += len(guessing_loop(*values)[1]) < 200
     reached += normal_map(*values)[1] < 50
 print(f"of {DRAWN} scenes the loop ends on {ended}, the normal map on {reached}")

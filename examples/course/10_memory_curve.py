@@ -107,10 +107,10 @@ def draw(curve: Curve, P: Fraction, T: Fraction) -> Curve:
 
 
 curve: Curve = [(Fraction(0), Fraction(0))]
-drawn = []
+curves = []
 for p, t in corners:
     curve = draw(curve, Fraction(p).limit_denominator(100), Fraction(t).limit_denominator(100))
-    drawn.append(curve)
+    curves.append(curve)
     print(" -> ".join(f"({float(s):g}, {float(h):g})" for s, h in curve))
 
 # %%
@@ -125,7 +125,7 @@ figure, places = plt.subplots(
     2, 2, figsize=(11, 8.5), sharex=True, sharey=True, layout="constrained"
 )
 for k, axes in enumerate(places.flat):
-    s, h = np.array([[float(x) for x in point] for point in drawn[k]]).T
+    s, h = np.array([[float(x) for x in point] for point in curves[k]]).T
     way = np.array([(0, 0), *corners[: k + 1]])
     axes.plot([0, 1], [0, 1], "k:", lw=0.7)
     axes.plot([0, 1], [0, -1], "k:", lw=0.7)
@@ -178,11 +178,11 @@ def read_off(curve: Curve) -> tuple[float, Array]:
     return X, Q
 
 
-for k, each in enumerate(drawn):
+for k, each in enumerate(curves):
     X, Q = read_off(each)
     assert abs(X - path.displacements[k]) < 1e-10 * path.displacements.max()
     assert np.allclose(Q, path.asperity_forces[k], atol=1e-10 * whole)
-print(f"{len(drawn[-1]) - 1} presses for the last state, {path.presses} for all four")
+print(f"{len(curves[-1]) - 1} presses for the last state, {path.presses} for all four")
 
 # %%
 # An independent check

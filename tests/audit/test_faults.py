@@ -21,8 +21,8 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="trials are fork
 def test_what_is_left(pytestconfig: pytest.Config) -> None:
     """In a process of its own, without the threads of this one."""
     quick = [seed for seed in range(42) if seed % 6 in (1, 5)]
-    drawn = random.Random(pytestconfig.option.seed).sample(quick, 4)
-    which = range(420) if pytestconfig.option.full else drawn
+    figures = random.Random(pytestconfig.option.seed).sample(quick, 4)
+    which = range(420) if pytestconfig.option.full else figures
     program = Path(faults.__file__)
     path = os.pathsep.join([str(program.parent.parent), str(program.parent)])
     done = subprocess.run(

@@ -50,8 +50,8 @@ def test_one_step_per_segment_is_the_memory_curve(points: list[tuple[float, floa
 
 @settings(max_examples=8, deadline=None)
 @given(random_scenes(crowding=0.7, most=10), st.integers(0, 2**32 - 1))
-def test_random_paths(drawn: tuple[cr.Scene, float], seed: int) -> None:
-    scene, approach = drawn
+def test_random_paths(sampled: tuple[cr.Scene, float], seed: int) -> None:
+    scene, approach = sampled
     largest = cr.press(scene, approach=approach).load
     if largest == 0:
         return

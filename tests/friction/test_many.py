@@ -20,11 +20,11 @@ PAPER = replace(NAMED["paper"][0], friction=F)
 
 
 def rough(count: int, *, tips: float = 0.0, geometry: Any = "summit") -> list[cr.Scene]:
-    drawn = [
+    sampled = [
         PAPER.asperities.roughened(height_std=1e-6, tip_radius_cv=tips, seed=k)
         for k in range(count)
     ]
-    return [replace(PAPER, asperities=each, geometry=geometry) for each in drawn]
+    return [replace(PAPER, asperities=each, geometry=geometry) for each in sampled]
 
 
 def scattered(count: int) -> list[cr.Scene]:
@@ -95,9 +95,9 @@ def test_scenes_together_are_those_alone(name: str, by_load: bool) -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(random_scenes(crowding=1.2, most=10), st.integers(0, 2**32 - 1))
-def test_random_scenes(drawn: tuple[cr.Scene, float], seed: int) -> None:
+def test_random_scenes(sampled: tuple[cr.Scene, float], seed: int) -> None:
     """Also of scenes where nothing touches, or that the rows do not prove."""
-    scene, approach = drawn
+    scene, approach = sampled
     rng = np.random.default_rng(seed)
     scenes = [
         replace(scene, asperities=scene.asperities.with_tips(scene.asperities.tip_radii, heights))

@@ -28,8 +28,8 @@ def test_three_ways_to_one_path(points: list[tuple[float, float]]) -> None:
 
 @settings(max_examples=6, deadline=None)
 @given(random_scenes(crowding=0.7, most=10), st.integers(0, 2**32 - 1))
-def test_random_paths_as_cone_programs(drawn: tuple[cr.Scene, float], seed: int) -> None:
-    scene, approach = drawn
+def test_random_paths_as_cone_programs(sampled: tuple[cr.Scene, float], seed: int) -> None:
+    scene, approach = sampled
     largest = cr.press(scene, approach=approach).load
     if largest == 0:
         return

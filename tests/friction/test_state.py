@@ -157,9 +157,9 @@ def test_nothing_loaded() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(random_scenes(crowding=0.9), st.floats(1e-6, 0.999), st.floats(0, 0.5))
-def test_random_scenes(drawn: tuple[cr.Scene, float], fraction: float, nu: float) -> None:
+def test_random_scenes(sampled: tuple[cr.Scene, float], fraction: float, nu: float) -> None:
     """The friction law holds, and where loads only fall it is the reduced normal contact."""
-    scene, approach = drawn
+    scene, approach = sampled
     contact = cr.press(with_friction(scene, nu=nu), approach=approach)
     if contact.load == 0 or contact.certificate.scope == "none":
         return

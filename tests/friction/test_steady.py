@@ -120,8 +120,8 @@ def test_constant_load_is_a_cycle(name: str) -> None:
 
 @settings(max_examples=8, deadline=None)
 @given(random_scenes(crowding=0.7, most=12), st.integers(0, 2**32 - 1))
-def test_every_later_cycle_is_the_same(drawn: tuple[cr.Scene, float], seed: int) -> None:
-    scene, approach = drawn
+def test_every_later_cycle_is_the_same(sampled: tuple[cr.Scene, float], seed: int) -> None:
+    scene, approach = sampled
     largest = cr.press(scene, approach=approach).load
     if largest == 0:
         return

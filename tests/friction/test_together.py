@@ -60,8 +60,8 @@ def test_levels_together_are_those_alone(name: str) -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(random_scenes(crowding=0.9, most=12), st.integers(0, 2**32 - 1))
-def test_random_scenes(drawn: tuple[cr.Scene, float], seed: int) -> None:
-    scene, approach = drawn
+def test_random_scenes(sampled: tuple[cr.Scene, float], seed: int) -> None:
+    scene, approach = sampled
     contact = cr.press(scene, approach=approach)
     if contact.load == 0.0:
         return

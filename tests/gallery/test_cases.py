@@ -119,7 +119,7 @@ def test_statuses_and_bounds_when_pressed(name: str, operator: Any) -> None:
     case, contact = gallery.case(name), pressed(name, operator)
     proof = contact.certificate
     assert true_statuses(case, contact.status)
-    assert case.judge(contact.loads, floor=1e-12 * contact.loads.max()).error < 1e-12
+    assert case.check(contact.loads, floor=1e-12 * contact.loads.max()).error < 1e-12
     assert within(contact.loads, case.loads, proof.load_errors)
     assert within(proof.gaps, case.gaps, proof.gap_errors)
     assert within(proof.approach, [case.exact_approach], proof.approach_error)
@@ -161,7 +161,7 @@ def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
         return
     assert true_statuses(case, contact.status)
     assert within(contact.loads, case.loads, contact.certificate.load_errors)
-    assert case.judge(contact.loads).error < SQUARED
+    assert case.check(contact.loads).error < SQUARED
 
 
 @pytest.mark.sample(8)
@@ -175,7 +175,7 @@ def test_sheared_and_cycled(name: str) -> None:
     if not case.forces:
         return
     proof = state.certificate
-    assert case.judge_shear(state.forces).error < 1e-12
+    assert case.check_shear(state.forces).error < 1e-12
     assert true_shear_statuses(case, state.status)
     assert within(state.forces, case.forces, proof.force_errors)
     assert within(state.slips, case.slips, proof.slip_errors)
@@ -206,7 +206,7 @@ def test_a_hundred_thousand_reversals(name: str, pytestconfig: pytest.Config) ->
     every = 1 if pytestconfig.option.full else len(case.history) // 25
     past = cr.history(contact, forces=case.history[::-every][::-1])
     assert case.history[-1] == case.shear_force
-    assert case.judge_shear(past.asperity_forces[-1]).error < 1e-12
+    assert case.check_shear(past.asperity_forces[-1]).error < 1e-12
     assert within(past.displacements[-1], [case.displacement], past.displacement_errors[-1])
     assert (np.diff(past.losses) >= -1e-13 * past.losses[-1]).all()
 
@@ -307,26 +307,26 @@ def test_proofs_are_accepted_or_refused(name: str) -> None:
 def test_wrong_answers_are_judged_wrong() -> None:
     case = gallery.case("grazing-load-1e-12")
     loads = np.array([float(each) for each in case.loads])
-    assert case.judge(loads).right
+    assert case.check(loads).right
     dropped = loads.copy()
     dropped[-1] = 0.0
-    judged = case.judge(dropped)
+    judged = case.check(dropped)
     assert (judged.right, judged.wrongly_open.tolist(), judged.wrongly_loaded.size) == (
         False,
         [7],
         0,
     )
-    assert not case.judge(loads, floor=2e-12 * loads.max()).right
-    assert not case.judge(loads * (1 + 2e-6)).right
-    assert case.judge(loads * (1 + 2e-6), within=1e-5).right
+    assert not case.check(loads, floor=2e-12 * loads.max()).right
+    assert not case.check(loads * (1 + 2e-6)).right
+    assert case.check(loads * (1 + 2e-6), within=1e-5).right
     open_one = gallery.case("grazing-gap-1e-6")
     loads = np.array([float(each) for each in open_one.loads])
     loads[-1] = 1e-30
-    assert open_one.judge(loads).wrongly_loaded.tolist() == [7]
-    assert open_one.judge(loads, floor=1e-29).right
+    assert open_one.check(loads).wrongly_loaded.tolist() == [7]
+    assert open_one.check(loads, floor=1e-29).right
     forces = np.array([float(each) for each in open_one.forces])
-    assert open_one.judge_shear(forces).right
-    assert not open_one.judge_shear(forces[::-1]).right
+    assert open_one.check_shear(forces).right
+    assert not open_one.check_shear(forces[::-1]).right
 
 
 @pytest.mark.parametrize("count", [1, 2, 61, 700, 20_000])

@@ -43,7 +43,7 @@ def judged(name: str, about: Any, x: Any, near: float) -> None:
     loads = np.zeros(len(case))
     members = about["asperities"]
     loads[members] = np.maximum(about["force_unit"] * np.array(x[: len(members)]), 0.0)
-    assert case.judge(loads).error < near
+    assert case.check(loads).error < near
     assert true_statuses(case, cr.certify(case.scene, loads, **case.control).status)
 
 
@@ -141,10 +141,10 @@ def test_the_index(pack: Path, index: Any) -> None:
 
 
 def test_the_command(command: Any, tmp_path: Path) -> None:
-    listed = command("gallery", "--list", "few")
-    assert listed.status == 0
-    assert listed.out.count("\n") == 4
-    assert "two equal contacts" in listed.out
+    output = command("gallery", "--list", "few")
+    assert output.status == 0
+    assert output.out.count("\n") == 4
+    assert "two equal contacts" in output.out
     wrong = command("gallery", "grasing")
     assert (wrong.status, "grazing" in wrong.err) == (2, True)
     assert command("gallery", "few", "--export", "pack").status == 0

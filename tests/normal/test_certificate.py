@@ -77,9 +77,9 @@ def test_attacks_on_a_local_certificate(operator: Kind, kind: str) -> None:
 @settings(max_examples=12, deadline=None)
 @given(random_cases(crowding=1.2, most=10), st.sampled_from(ATTACKS), st.integers(0, 2**32 - 1))
 def test_attacks_on_random_scenes(
-    drawn: tuple[cr.Scene, float, Kind], kind: str, seed: int
+    sampled: tuple[cr.Scene, float, Kind], kind: str, seed: int
 ) -> None:
-    scene, approach, operator = drawn
+    scene, approach, operator = sampled
     contact = cr.press(scene, approach=approach)
     wrong = attack(kind, contact.loads, np.random.default_rng(seed))
     certificate = cr.certify(scene, wrong, approach=approach, influence=operator)

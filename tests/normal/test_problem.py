@@ -69,9 +69,9 @@ def test_screening_drops_only_those_that_cannot_touch() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(random_cases(crowding=1.5))
-def test_a_priori_bounds(drawn: Case) -> None:
+def test_a_priori_bounds(sampled: Case) -> None:
     """No solution carries more than an asperity would alone; no load, a higher approach."""
-    scene, approach, kind = drawn
+    scene, approach, kind = sampled
     contact = cr.press(scene, approach=approach)
     problem = assembled(scene, approach=approach, influence=kind)
     bounds = problem.bounds(problem.approach_bound) * problem.units.force
@@ -85,8 +85,8 @@ def test_a_priori_bounds(drawn: Case) -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(random_cases(crowding=1.5), st.integers(0, 2**32 - 1))
-def test_the_approach_bound_holds_for_any_weights(drawn: Case, seed: int) -> None:
-    scene, approach, kind = drawn
+def test_the_approach_bound_holds_for_any_weights(sampled: Case, seed: int) -> None:
+    scene, approach, kind = sampled
     contact = cr.press(scene, approach=approach)
     if contact.load == 0:
         return
@@ -98,9 +98,9 @@ def test_the_approach_bound_holds_for_any_weights(drawn: Case, seed: int) -> Non
 
 @settings(max_examples=25, deadline=None)
 @given(random_cases(crowding=2.0), st.floats(0.01, 1))
-def test_convexity_number(drawn: Case, size: float) -> None:
+def test_convexity_number(sampled: Case, size: float) -> None:
     """The smallest eigenvalue of the scaled Hessian is at least 1 - theta."""
-    scene, approach, kind = drawn
+    scene, approach, kind = sampled
     problem = assembled(scene, approach=approach, influence=kind)
     if len(problem) == 0:
         return
@@ -170,9 +170,9 @@ def test_manufactured_contacts(
 
 @settings(max_examples=15, deadline=None)
 @given(random_cases(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
-def test_newton_converges_from_any_start(drawn: Case, seed: int, size: float) -> None:
+def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) -> None:
     """On every convex scene, to the same answer."""
-    scene, approach, kind = drawn
+    scene, approach, kind = sampled
     contact = cr.press(scene, approach=approach)
     if contact.certificate.scope != "global" or contact.load == 0:
         return

@@ -14,7 +14,7 @@ from convexrough.numbers.pairs import MANY, PAIR_ROUNDOFF, Pair, in_parts, squar
 Exactly = Callable[[Fraction, Fraction], Fraction]
 
 
-def drawn(seed: int, count: int, scale: float = 1.0) -> Pair:
+def random_pair(seed: int, count: int, scale: float = 1.0) -> Pair:
     rng = np.random.default_rng(seed)
     high = scale * rng.choice([-1, 1], count) * 10.0 ** rng.uniform(-3, 3, count)
     return Pair(*two_sum(high, 2.0**-54 * high * rng.uniform(-1, 1, count)))
@@ -36,7 +36,7 @@ def off(found: Pair, exact: Callable[[int], Fraction]) -> float:
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1e-100, 1.0, 1e100]))
 def test_arithmetic(seed: int, scale: float) -> None:
     """Each operation loses less than a roundoff of pairs; differences of near numbers, too."""
-    a, b = drawn(seed, 20, scale), drawn(seed + 1, 20, scale)
+    a, b = random_pair(seed, 20, scale), random_pair(seed + 1, 20, scale)
     near = a + Pair(1e-20 * a.high, 1e-40 * a.low)
     x, y = (lambda i: value(a, i)), (lambda i: value(b, i))
     assert off(a + b, lambda i: x(i) + y(i)) < PAIR_ROUNDOFF
@@ -61,7 +61,7 @@ def _square(a: Pair, i: int) -> Fraction:
 @pytest.mark.parametrize("count", [0, 1, 2, 61, 1000, MANY + 3])
 def test_total(count: int) -> None:
     """To a few roundoffs of the sum of magnitudes; of rows as of one."""
-    a = drawn(count, count)
+    a = random_pair(count, count)
     total = a.total()
     off = fsum([*a.high, *a.low, -total.high, -total.low])  # correctly rounded
     assert abs(off) <= 2.0 * PAIR_ROUNDOFF * np.abs(a.high).sum()
@@ -72,7 +72,7 @@ def test_total(count: int) -> None:
 
 def test_in_parts() -> None:
     """By slices, as at once; what comes back cannot be changed."""
-    a = drawn(3, 40_000)
+    a = random_pair(3, 40_000)
     found = in_parts(40_000, lambda some: a.at(some) * a.at(some))
     np.testing.assert_array_equal(found, a * a)
     assert not found.high.flags.writeable

@@ -77,7 +77,7 @@ def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
 )  # fmt: skip
 def test_fit_to_print(name: str, shares: list[float]) -> None:
     fits(plots.shear_figures(states(name, shares), **UNITS)["stick_slip"])
-    fits(plots.history_figures(past(name, shares), **UNITS)["history"])
+    fits(plots.path_figures(past(name, shares), **UNITS)["history"])
     many = steady(name, np.abs(shares), np.minimum(shares, -np.abs(shares) / 9))
     for figure in plots.cycle_figures(many, **UNITS).values():
         fits(figure)
@@ -109,12 +109,12 @@ def test_discs_have_the_radii_of_the_state() -> None:
     (state,) = states("rough", [0.5])
     (axes,) = plots.shear_figures([state])["stick_slip"].axes
     a_H = smooth(state.contact.scene, load=state.contact.load).contact_radius
-    drawn: Any = {each.get_label(): each for each in axes.collections}
+    lines: Any = {each.get_label(): each for each in axes.collections}
     partial = state.status == "partial"
-    assert_allclose(drawn["stick"].get_widths(), 2 * state.stick_radii[partial] / a_H, rtol=1e-12)
+    assert_allclose(lines["stick"].get_widths(), 2 * state.stick_radii[partial] / a_H, rtol=1e-12)
     whole = state.contact.contact_radii[partial]
-    assert_allclose(drawn["partial"].get_widths(), 2 * whole / a_H, rtol=1e-12)
-    assert_allclose(drawn["sliding"].get_facecolor(), [to_rgba(SLIDING)])
+    assert_allclose(lines["partial"].get_widths(), 2 * whole / a_H, rtol=1e-12)
+    assert_allclose(lines["sliding"].get_facecolor(), [to_rgba(SLIDING)])
 
 
 @pytest.mark.parametrize(("scope", "count"), [("global", 4), ("none", 37)])
@@ -166,7 +166,7 @@ def test_the_loss_is_that_of_the_cycles() -> None:
 
 def test_the_path_passes_through_every_step() -> None:
     done = past("paper", [0.6, -0.2, 0.3, -0.6, 0.6])
-    path, cost = plots.history_figures(done)["history"].axes
+    path, cost = plots.path_figures(done)["history"].axes
     sphere = smooth(done.contact.scene, load=done.contact.load)
     X0 = sphere.displacement(sphere.largest_force)
     ends, energies = (axes.lines[0].get_xydata() for axes in (path, cost))
@@ -199,14 +199,14 @@ def test_rings_have_the_letters_of_the_paper() -> None:
 def test_the_traction_drawn_is_the_field() -> None:
     _, profile, _ = of_paper("paper")["fig5_traction"].axes
     (state,) = states("paper", [0.5])
-    drawn = {line.get_label(): np.asarray(line.get_data(), dtype=float) for line in profile.lines}
+    lines = {line.get_label(): np.asarray(line.get_data(), dtype=float) for line in profile.lines}
     a, c = state.contact.contact_radii[0], state.stick_radii[0]
     mega = 1e-3  # Pa, of mN/µm²
-    x, q = drawn["$q$"]
+    x, q = lines["$q$"]
     points = np.column_stack((x * a, 0 * x))
     assert_allclose(q, fields.traction(state, points) / mega, rtol=1e-9, atol=1e-12)
     assert x[q.argmax()] == pytest.approx(-c / a, abs=1e-9) or x[q.argmax()] == pytest.approx(c / a)
-    _, fp = drawn["$fp$"]
+    _, fp = lines["$fp$"]
     slipping = np.abs(x) > c / a * (1 + 1e-9)
     assert_allclose(q[slipping], fp[slipping], rtol=1e-9)
 
@@ -233,7 +233,7 @@ def test_no_contact_is_said() -> None:
     figures = (
         plots.shear_figures([cr.shear(nothing, force=0.0)] * 2, **UNITS)
         | plots.cycle_figures(cr.cycles(nothing, [0.0, 0.0]), **UNITS)
-        | plots.history_figures(cr.history(nothing, forces=[0.0, 0.0]), **UNITS)
+        | plots.path_figures(cr.history(nothing, forces=[0.0, 0.0]), **UNITS)
         | paper_figures(nothing, **UNITS)
     )
     assert len(figures) == 10

@@ -81,8 +81,8 @@ def grazing() -> cr.Contact:
     return pressed(high)
 
 
-def crowded(*drawn: float) -> cr.Contact:
-    scene, approach = scenes.scattered(*drawn)
+def crowded(*sampled: float) -> cr.Contact:
+    scene, approach = scenes.scattered(*sampled)
     return cr.press(scene, approach=approach)
 
 

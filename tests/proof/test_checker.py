@@ -327,12 +327,12 @@ def exact(x: Fraction) -> arb:
 def test_intervals_hold_what_they_should() -> None:
     rng = random.Random(1)
 
-    def drawn() -> Fraction:
+    def random_number() -> Fraction:
         size = Fraction(2) ** rng.randrange(-400, 400)
         return Fraction(rng.randrange(-(10**50), 10**50), rng.randrange(1, 10**50)) * size
 
     for _ in range(300):
-        x, y = drawn(), drawn()
+        x, y = random_number(), random_number()
         a, b = Interval(x), Interval(min(y, y / 3), max(y, y / 3))
         for held, value in ((a + b, x + y), (a - b, x - y), (a * b, x * y)):
             assert held.low <= value <= held.high

@@ -139,8 +139,8 @@ def test_nothing_touches() -> None:
 
 def test_crowded_contacts_are_proved_with_others_held_open() -> None:
     """Where the certificate has a status there is a proof, by overlapping shells or by Cholesky."""
-    for drawn in ((9, 12, 3.0, 0.5), (2, 40, 2.5, 0.3), (9, 12, 4.0, 0.0)):
-        scene, approach = scenes.scattered(*drawn)
+    for sampled in ((9, 12, 3.0, 0.5), (2, 40, 2.5, 0.3), (9, 12, 4.0, 0.0)):
+        scene, approach = scenes.scattered(*sampled)
         contact = cr.press(scene, approach=approach)
         assert contact.crowding > 1
         assert contact.certificate.scope == "local"

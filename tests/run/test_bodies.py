@@ -115,7 +115,7 @@ coefficient = 0.5
 [shear]
 fractions = [0.3]
 [cycle]
-maximum = [0.1, 0.4]
+maximum_fraction = [0.1, 0.4]
 [history]
 fractions = [0.5, -0.2]
 [gradient]

@@ -162,8 +162,8 @@ coefficient = 0.5
 [shear]
 fractions = [0.1, 0.37, 0.5]
 [cycle]
-maximum = [0.37, 0.5]
-minimum = [-0.37, 0.1]
+maximum_fraction = [0.37, 0.5]
+minimum_fraction = [-0.37, 0.1]
 [history]
 fractions = [0.6, -0.2, 0.3, -0.6, 0.6]
 """
@@ -213,13 +213,15 @@ def test_shear_cycle_and_history(command: Any, tmp_path: Path) -> None:
 
     cycles = rows(tmp_path / "a-results" / "cycle.csv")
     partial = cr.cycle(contact, maximum=0.5 * limit, minimum=0.1 * limit)
-    assert [float(row["minimum"]) for row in cycles] == [-0.37, 0.1]
+    assert [float(row["minimum_fraction"]) for row in cycles] == [-0.37, 0.1]
     assert float(cycles[1]["loss"]) == summary["cycle"][1]["loss"]
     assert float(cycles[1]["loss"]) == pytest.approx(partial.loss, rel=1e-13)
     assert all(float(row["balance_defect"]) < 1e-10 for row in cycles)
     loop = rows(tmp_path / "a-results" / "loop.csv")
     assert {row["curve"] for row in loop} == {"total", *map(str, (0, 1, 7, 13, 19, 31))}
-    total = [row for row in loop if row["curve"] == "total" and float(row["maximum"]) == 0.5]
+    total = [
+        row for row in loop if row["curve"] == "total" and float(row["maximum_fraction"]) == 0.5
+    ]
     area = np.trapezoid(
         [float(row["force"]) for row in total], [float(row["displacement"]) for row in total]
     )

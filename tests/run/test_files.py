@@ -58,7 +58,7 @@ coefficient = 0.5
 [shear]
 fractions = [0, 0.5, 1]
 [cycle]
-maximum = [0.1, 0.5]
+maximum_fraction = [0.1, 0.5]
 [history]
 fractions = [1, -1, 0.25]
 [solver]
@@ -77,7 +77,10 @@ force = "N"
     assert (file.approach, file.load) == (None, 1.0)
     assert list(file.stages) == ["normal", "shear", "cycle", "history"]
     assert file.stages["shear"].fractions == [0.0, 0.5, 1.0]
-    assert (file.stages["cycle"].maximum, file.stages["cycle"].lowest) == ([0.1, 0.5], [-0.1, -0.5])
+    assert (file.stages["cycle"].maximum_fraction, file.stages["cycle"].lowest) == (
+        [0.1, 0.5],
+        [-0.1, -0.5],
+    )
     assert file.stages["history"].fractions == [1.0, -1.0, 0.25]
     assert file.solver == cr.solvers.Newton()
     assert file.units == ("mm", "N")
@@ -145,13 +148,15 @@ def test_a_wrong_key(tmp_path: Path, asperities: str, expected: str) -> None:
         ),
         (
             "approach = 1e-5",
-            "[friction]\ncoefficient = 1\n[cycle]\nmaximum = [0.1, 0.2]\nminimum = [0]",
-            "[cycle] minimum: found 1 values, expected 2, as in maximum",
+            "[friction]\ncoefficient = 1\n[cycle]\n"
+            "maximum_fraction = [0.1, 0.2]\nminimum_fraction = [0]",
+            "[cycle] minimum_fraction: found 1 values, expected 2, as in maximum_fraction",
         ),
         (
             "approach = 1e-5",
-            "[friction]\ncoefficient = 1\n[cycle]\nmaximum = [0.1]\nminimum = [0.1]",
-            "[cycle] maximum[0]: found 0.1, expected a number above its minimum, 0.1",
+            "[friction]\ncoefficient = 1\n[cycle]\n"
+            "maximum_fraction = [0.1]\nminimum_fraction = [0.1]",
+            "[cycle] maximum_fraction[0]: found 0.1, expected a number above its minimum, 0.1",
         ),
         (
             "approach = 1e-5",
@@ -168,6 +173,14 @@ def test_a_wrong_key(tmp_path: Path, asperities: str, expected: str) -> None:
 def test_a_wrong_table(tmp_path: Path, normal: str, more: str, expected: str) -> None:
     (line,) = mistakes(tmp_path, normal=normal, more=more)
     assert line.startswith(expected)
+
+
+def test_the_former_name_of_the_largest_forces(tmp_path: Path) -> None:
+    """A maximum is a force in Python and was a fraction in files: it is refused, not guessed."""
+    more = "[friction]\ncoefficient = 1\n[cycle]\nmaximum = [0.1]"
+    missing, unknown = mistakes(tmp_path, normal="approach = 1e-5", more=more)
+    assert missing.startswith("[cycle] maximum_fraction: missing")
+    assert unknown.startswith('[cycle] maximum: unknown key, did you mean "maximum_fraction"?')
 
 
 def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:

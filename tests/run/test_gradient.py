@@ -100,7 +100,7 @@ def test_where_there_is_none(command: Any) -> None:
     keys = 'of = "loss"\nfraction = 1.0\nholding = "approach"'
     said = "[gradient] fraction: found 1, a force of 1.804266945e-07: gross sliding, expected a "
     said += "force below f P: with the approach held f P may fall below the force"
-    write(f"[gradient]\n{keys}\n[cycle]\nmaximum = [0.5]\n")
+    write(f"[gradient]\n{keys}\n[cycle]\nmaximum_fraction = [0.5]\n")
     outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 3
     summary = json.loads(Path("out/summary.json").read_text())

@@ -59,7 +59,7 @@ def test_a_folder_says_where_its_results_are_from(command: Any, tmp_path: Path) 
 
 
 def test_a_cycle_says_how_stiff_and_how_lossy(command: Any, tmp_path: Path) -> None:
-    more = FRICTION + '[cycle]\nmaximum = [0.5]\n[units]\nlength = "mm"\nforce = "N"'
+    more = FRICTION + '[cycle]\nmaximum_fraction = [0.5]\n[units]\nlength = "mm"\nforce = "N"'
     (tmp_path / "a.toml").write_text(scene_text(more=more))
     text = command("run", "a.toml", "--no-figures").out
     assert "steady cycles  (Qa N, Xa mm, Qa/Xa N/mm, W N mm)" in text
@@ -86,7 +86,7 @@ def test_a_cycle_says_how_stiff_and_how_lossy(command: Any, tmp_path: Path) -> N
     ],
 )
 def test_wrong_loops(command: Any, tmp_path: Path, asked: str, said: str) -> None:
-    more = FRICTION + f"[cycle]\nmaximum = [0.5]\n{asked}"
+    more = FRICTION + f"[cycle]\nmaximum_fraction = [0.5]\n{asked}"
     (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + "within = 0.0102", more=more))
     outcome = command("run", "a.toml")
     assert outcome.status == 2

@@ -152,9 +152,9 @@ def test_a_load_that_no_convex_state_carries_is_refused() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(random_scenes(crowding=1.4), st.sampled_from(CONTROLS))
-def test_any_scene_is_solved_or_refused(drawn: tuple[cr.Scene, float], control: str) -> None:
+def test_any_scene_is_solved_or_refused(sampled: tuple[cr.Scene, float], control: str) -> None:
     """Solved where Newton's answer is in the convex range, and refused where it is not."""
-    scene, approach = drawn
+    scene, approach = sampled
     if cr.press(scene, approach=approach).load == 0:
         return
     problem = problem_of(scene, approach, control)

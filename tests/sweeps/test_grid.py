@@ -52,16 +52,16 @@ def test_a_sweep_of_any_length_is_counted_at_once() -> None:
 
 
 def test_draws_belong_to_the_seed_alone() -> None:
-    def drawn(*draws: Draw) -> list[float]:
+    def samples(*draws: Draw) -> list[float]:
         grid = Grid({"asperities": {}}, (), (("normal.load", (1, 2)),), draws, range(5))
         return [grid.point(i).values["friction.coefficient"] for i in range(grid.count)]
 
     friction = Draw("friction.coefficient", "uniform", 0.2, 0.6)
-    alone = drawn(friction)
+    alone = samples(friction)
     assert alone[:5] == alone[5:]
     assert len(set(alone)) == 5
     assert all(0.2 <= value <= 0.6 for value in alone)
-    assert drawn(Draw("sphere.radius", "normal", 1.0, 0.1), friction) == alone
+    assert samples(Draw("sphere.radius", "normal", 1.0, 0.1), friction) == alone
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_draws_belong_to_the_seed_alone() -> None:
         tables(sweep={"seeds": 5}),
         tables(sweep={"measure": ["load"]}),
         tables(sweep={"seeds": [0, 1, 2, 4]}),
-        tables(cycle={"maximum": [0.38]}),
+        tables(cycle={"maximum_fraction": [0.38]}),
         tables(sweep={"over": {"normal.load": [1e-7, 3e-7], "asperities.height_std": [0.0, 1e-6]}}),
     ],
 )
@@ -123,7 +123,7 @@ WRONG = {
         "swept twice, by seeds too",
     ),
     "fractions swept": (
-        sweeping(over={"cycle.maximum": [[0.1]]}),
+        sweeping(over={"cycle.maximum_fraction": [[0.1]]}),
         "values of [cycle] are columns",
     ),
     "of unequal length": (

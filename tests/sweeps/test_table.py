@@ -24,7 +24,7 @@ def here() -> Iterator[Executor]:
 
 ALL = tables(
     shear={"fractions": [0.2, 0.5]},
-    cycle={"maximum": [0.37, 0.5], "minimum": [-0.37, 0.1]},
+    cycle={"maximum_fraction": [0.37, 0.5], "minimum_fraction": [-0.37, 0.1]},
     history={"fractions": [0.5, -0.2, 0.5]},
     steady={"ellipse": {"load": 3e-7, "load_amplitude": 5e-8, "force_amplitude": 4e-8}},
     sweep={
@@ -114,7 +114,7 @@ def test_scenes_made_in_python(here: Executor) -> None:
      ({"measure": ["loss"], "load": 1e-7}, '[sweep] measure: found "loss"'),
      ({"load": 1e-7}, "measure: found None, expected a list"),
      ({"load": [1e-7, 2e-7], "measure": ["load"]}, "expected 1 values"),
-     ({"load": 1e-7, "measure": ["loss"], "cycle": [1.2]}, "[cycle] maximum[0]: found 1.2"),
+     ({"load": 1e-7, "measure": ["loss"], "cycle": [1.2]}, "[cycle] maximum_fraction[0]"),
      ({"load": 1e-7, "measure": ["load"], "workers": 0}, "workers: found 0"),
      ({"load": 1e-7, "measure": ["load"], "part": (3, 2)}, "part: found 3/2"),
      ({"load": 1e-7, "measure": ["load"], "executor": 3}, "executor: found type int")],

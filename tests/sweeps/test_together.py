@@ -19,8 +19,8 @@ SCENES: dict[str, dict[str, Any]] = {
     "load": {"sweep.over": {"normal.load": [1e-7, 3e-7], "asperities.height_std": [1e-7, 1e-6]}},
     "approach": {"normal": {"approach": 5e-5}},
     "tips": {"asperities": {"tip_radius_cv": 0.2, "geometry": "summit"}},
-    "one end": {"cycle": {"maximum": [0.3, 0.4], "minimum": [0.1, -0.2]}},
-    "gross sliding": {"cycle": {"maximum": [1.0, 0.2]}},
+    "one end": {"cycle": {"maximum_fraction": [0.3, 0.4], "minimum_fraction": [0.1, -0.2]}},
+    "gross sliding": {"cycle": {"maximum_fraction": [1.0, 0.2]}},
     "friction": {"sweep.draw": {"friction.coefficient": {"uniform": [0.3, 0.6]}}},
     "crowded": {"asperities": {"spacing": 0.0006, "within": 0.0012}},
 }
@@ -34,7 +34,7 @@ def tables(changes: dict[str, Any], measure: list[str]) -> dict[str, Any]:
                        "within": 0.0102, "height_std": 1e-6},
         "normal": {"load": 3e-7},
         "friction": {"coefficient": 0.5},
-        "cycle": {"maximum": [0.2, 0.7]},
+        "cycle": {"maximum_fraction": [0.2, 0.7]},
         "sweep": {"seeds": 3, "measure": measure},
     }  # fmt: skip
     for name, table in changes.items():

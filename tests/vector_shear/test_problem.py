@@ -73,9 +73,9 @@ def test_the_residual_sees_every_fault() -> None:
 @settings(max_examples=15, deadline=None)
 @given(random_scenes(crowding=0.9), st.floats(1e-3, 0.999), st.floats(0, 0.5))
 def test_the_duality_gap_bounds_what_forces_cost_too_much(
-    drawn: tuple[cr.Scene, float], fraction: float, nu: float
+    sampled: tuple[cr.Scene, float], fraction: float, nu: float
 ) -> None:
-    scene, approach = drawn
+    scene, approach = sampled
     contact = cr.press(with_friction(scene, nu=nu), approach=approach)
     if contact.load == 0 or contact.certificate.scope == "none":
         return
@@ -97,12 +97,12 @@ def test_the_duality_gap_bounds_what_forces_cost_too_much(
 @settings(max_examples=15, deadline=None)
 @given(random_scenes(crowding=0.9), st.floats(1e-3, 0.99), st.floats(0, 0.5), st.floats(0, 6.3))
 def test_the_duality_gap_counts_its_rounding(
-    drawn: tuple[cr.Scene, float], fraction: float, nu: float, angle: float
+    sampled: tuple[cr.Scene, float], fraction: float, nu: float, angle: float
 ) -> None:
     """The least energy is convex in the total, with the slope X: forces that add up to a little
     more cost X times that at least. The sum is exact here.
     """
-    scene, approach = drawn
+    scene, approach = sampled
     contact = cr.press(with_friction(scene, nu=nu), approach=approach)
     if contact.load == 0 or contact.certificate.scope == "none":
         return

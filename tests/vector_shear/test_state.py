@@ -191,10 +191,10 @@ def test_small_forces_keep_their_digits() -> None:
     st.integers(0, 2**32 - 1),
 )
 def test_random_scenes(
-    drawn: tuple[cr.Scene, float], fraction: float, nu: float, angle: float, seed: int
+    sampled: tuple[cr.Scene, float], fraction: float, nu: float, angle: float, seed: int
 ) -> None:
     """The law holds at every asperity, and no other forces that friction bears cost less energy."""
-    scene, approach = drawn
+    scene, approach = sampled
     contact = cr.press(with_friction(scene, nu=nu), approach=approach)
     if contact.load == 0 or contact.certificate.scope == "none":
         return

@@ -41,7 +41,7 @@ OWN = ("force_amplitude", "displacement_amplitude", "displacement_error", "secan
 class Cycle(Stage):
     """Maxima and minima of steady cycles, as fractions of f P.
 
-    minimum     : as many; default: the negatives of the maxima
+    minimum_fraction : as many; default: the negatives of the maxima
     loop_points : of each loop, about; default: what is affordable
     loop_asperities : whose loops to keep: indices or "all"; default: one at each distance from the
         axis, of at most 12 distances
@@ -49,25 +49,29 @@ class Cycle(Stage):
 
     name = "cycle"
     numbers = (*OWN, "loss_over_smooth", "partial_slip_loss", "sliding_loss")
-    labels = ("maximum", "minimum")
+    labels = ("maximum_fraction", "minimum_fraction")
 
-    maximum: Fractions
-    minimum: Fractions | None = None
+    maximum_fraction: Fractions
+    minimum_fraction: Fractions | None = None
     loop_points: Points | None = None
     loop_asperities: Chosen | None = None
 
     @property
     def lowest(self) -> list[float]:
         """The minimum of each cycle."""
-        return [-value for value in self.maximum] if self.minimum is None else self.minimum
+        if self.minimum_fraction is not None:
+            return self.minimum_fraction
+        return [-value for value in self.maximum_fraction]
 
     def mistakes_within(self) -> Iterator[Mistake]:
-        if (n := len(self.lowest)) != len(self.maximum):
-            yield "minimum", f"found {n} values, expected {len(self.maximum)}, as in maximum"
+        if (n := len(self.lowest)) != len(self.maximum_fraction):
+            expected = f"expected {len(self.maximum_fraction)}, as in maximum_fraction"
+            yield "minimum_fraction", f"found {n} values, {expected}"
             return
-        for i, (low, high) in enumerate(zip(self.lowest, self.maximum, strict=True)):
+        for i, (low, high) in enumerate(zip(self.lowest, self.maximum_fraction, strict=True)):
             if not low < high:
-                yield f"maximum[{i}]", f"found {high}, expected a number above its minimum, {low}"
+                expected = f"expected a number above its minimum, {low}"
+                yield f"maximum_fraction[{i}]", f"found {high}, {expected}"
 
     def fits(self, count: int) -> None:
         """Whether there are the asperities whose loops are asked for. Raises InputError."""
@@ -79,7 +83,7 @@ class Cycle(Stage):
 
     def compute(self, contact: Contact) -> Cycled:
         f_p = limit(contact)
-        found = cycles(contact, f_p * np.array(self.maximum), f_p * np.array(self.lowest))
+        found = cycles(contact, f_p * np.array(self.maximum_fraction), f_p * np.array(self.lowest))
         return Cycled(self, contact, tuple(found))
 
 
@@ -91,8 +95,8 @@ class Cycled(Result):
     title = "steady cycles"
     digits = 6
     printed: ClassVar[Mapping[str, str]] = {
-        "maximum": "max/(fP)",
-        "minimum": "min/(fP)",
+        "maximum_fraction": "max/(fP)",
+        "minimum_fraction": "min/(fP)",
         "force_amplitude": "Qa",
         "displacement_amplitude": "Xa",
         "secant_stiffness": "Qa/Xa",
@@ -105,9 +109,9 @@ class Cycled(Result):
 
     def rows(self) -> list[Summary]:
         found = []
-        ends = zip(self.stage.maximum, self.stage.lowest, strict=True)
+        ends = zip(self.stage.maximum_fraction, self.stage.lowest, strict=True)
         for (high, low), cycle in zip(ends, self.found, strict=True):
-            row = {"maximum": high, "minimum": low} | numbers_of(cycle, OWN)
+            row = {"maximum_fraction": high, "minimum_fraction": low} | numbers_of(cycle, OWN)
             row["loss_over_smooth"] = cycle.loss_normalised / (cycle.smooth_normalised or math.nan)
             row["partial_slip_loss"] = float(cycle.partial_slip_losses.sum())
             found.append(row | {"sliding_loss": float(cycle.sliding_losses.sum())})
@@ -139,19 +143,22 @@ class Cycled(Result):
     def tables(self) -> dict[str, Columns]:
         """With the fretting of each asperity, and loops: macroscopic ("total") and of some."""
         touching = int(np.count_nonzero(self.contact.loads))
-        worn = dict(fretting_columns(self.worn))
-        for name in self.stage.labels:  # as fractions, as in the other tables
-            worn[name] = np.repeat([row[name] for row in self.known], touching)
+        worn = {  # with fractions in place of forces, as in the other tables
+            name: np.repeat([row[name] for row in self.known], touching)
+            for name in self.stage.labels
+        }
+        given = fretting_columns(self.worn)
+        worn |= {name: it for name, it in given.items() if name not in ("maximum", "minimum")}
         parts: list[tuple[float, float, str, Any, Any]] = []
         for row, loop in zip(self.known, self.loops, strict=True):
-            ends = (row["maximum"], row["minimum"])
+            ends = (row["maximum_fraction"], row["minimum_fraction"])
             parts.append((*ends, "total", loop.forces, loop.displacements))
             own = zip(
                 loop.asperities, loop.asperity_forces.T, loop.asperity_displacements.T, strict=True
             )
             parts += [(*ends, str(i), forces, moved) for i, forces, moved in own]
-        columns = dict(zip(("maximum", "minimum", "curve", "force", "displacement"),
-                           zip(*parts, strict=True), strict=True))  # fmt: skip
+        names = (*self.stage.labels, "curve", "force", "displacement")
+        columns = dict(zip(names, zip(*parts, strict=True), strict=True))
         sizes = [len(each) for each in columns["force"]]
         loop_table = {
             name: np.concatenate(it) if name in ("force", "displacement") else np.repeat(it, sizes)
@@ -176,5 +183,5 @@ class Cycled(Result):
         from convexrough.plots import cycle_figures, fretting_figures  # only when it draws
 
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
-        drawn = cycle_figures(self.found, loops=self.loops, **units)
-        return {**drawn, **fretting_figures(widest, **units)}
+        figures = cycle_figures(self.found, loops=self.loops, **units)
+        return {**figures, **fretting_figures(widest, **units)}

@@ -17,7 +17,7 @@ from convexrough.gradients.gradient import Gradient as Slopes
 from convexrough.gradients.gradient import Holding
 from convexrough.run.stage import Columns, Single, Stage, Summary, limit
 from convexrough.run.values import Mistake, Share, expected
-from convexrough.tabular.columns import bound, listed
+from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
 
 #: What a scene file may ask the gradient of, and its letter.
@@ -160,10 +160,10 @@ class Differentiated(Single):
             rows.append(
                 (f"  by {EACH[name]}", f"up to {text}  (asperity {most['asperity']}{known})")
             )
-        return [f"gradient of the {said['of']}{under}, {held}", *listed(rows, 22)]
+        return [f"gradient of the {said['of']}{under}, {held}", *labelled(rows, 22)]
 
     def figures(self, **units: Any) -> Mapping[str, Any]:
         from convexrough.plots import gradient_figures  # matplotlib: only when it draws
 
-        drawn = [gradient_figures(it, of=LETTERS[self.stage.of], **units) for it in self.found]
-        return drawn[0] if drawn else {}
+        figures = [gradient_figures(it, of=LETTERS[self.stage.of], **units) for it in self.found]
+        return figures[0] if figures else {}

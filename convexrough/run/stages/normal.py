@@ -17,7 +17,7 @@ from convexrough.errors import SolverError
 from convexrough.normal.certificate import Certificate
 from convexrough.run.stage import Columns, Single, Stage, Summary, unit_of
 from convexrough.run.values import Finite, Positive
-from convexrough.tabular.columns import bound, listed
+from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
 
 #: Loads of this part of the largest, and greater, are looked at for what the geometry does to them.
@@ -175,7 +175,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
             ("solver", f"{normal['solver']}, {steps}"),
             ("influence", INFLUENCES[normal["influence"]]),
         ]
-    return listed(lines)
+    return labelled(lines)
 
 
 def _neglected(normal: Summary) -> str:
