@@ -234,7 +234,10 @@ def certificate_of(
 def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Array) -> float:
     """Phi(P) - Phi(P*) <= e'|P - P*|, where the energy is convex between the two."""
     most = np.maximum(found.box.loads, start.loads.high * (1 + SAFETY))
-    if not found.box.problem.convexity_number(most) < 1 and (most > found.box.loads).any():
+    if (
+        not found.box.problem.convexity_at(problem.stiffness(most)) < 1
+        and (most > found.box.loads).any()
+    ):
         return np.inf
     excess = np.where(found.box.fixed_open, 0.0, start.excess)
     total = float(excess @ moved) + float(start.missing.size * found.approach.size)
