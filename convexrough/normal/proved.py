@@ -1,8 +1,10 @@
-"""The solution near trial loads, proved by the theorem of `convex.theorem` on a box.
+"""The proof that a solution exists near trial loads, and bounds on its distance.
 
-The way from a residual to a bound on each load, in order: a box on which the energy is convex
-(`boxes`), the theorem on it, the theorem again on the small box that then holds the solution, and
-from there the approach, the indentations and, through these, the loads once more.
+The steps: choose a box of loads on which the energy is convex (`boxes`); apply the theorem of
+`convex.theorem` on it; apply the theorem again on the smaller box that the result proves to hold
+the solution; bound the approach and the indentations; and bound the loads again through the
+indentations. Symbols are those of docs/theory/certificate.md: loads P, approach D0, compliance
+operator A, local Hessian H; a star marks the solution.
 """
 
 from __future__ import annotations
@@ -26,11 +28,11 @@ from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 
-#: Boxes of touching asperities that are tried: larger ones where the solution may lie outside, and
-#: with asperities added that are not proved open. Heuristics, as is the room that a box leaves.
+#: Number of boxes of touching asperities that are tried, and the factor by which a box exceeds the
+#: last error bounds. Each is larger than the last, or has more asperities. Heuristics.
 ATTEMPTS, ROOM = 6, 2.0
 
-#: Loads known to fewer digits than this are also bounded through their indentations.
+#: Relative error above which loads are also bounded through their indentations.
 POOR = 2.0**-60
 
 NONE = np.zeros(0, dtype=np.intp)
@@ -41,7 +43,7 @@ NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
 
 class Obstacle(NamedTuple):
-    """The reason why nothing is proved, and the candidates that cause it."""
+    """The reason why nothing is proved, and the indices of the candidates that cause it."""
 
     reason: str
     which: Indices
@@ -49,13 +51,15 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Proved:
-    """The solution, as balls over the candidates, in own units.
+    """A proved solution, as balls over the n candidates (asperities that may touch), in own units.
 
-    trial    : the loads that it was proved from
-    box      : in which there is exactly one solution
-    distance : bound on || P - P* ||_H of the trial loads;  stiffness : (n,) the diagonal of H
-    loads, indentation : (n,) P and D0 + d - A P, an indentation, or minus a gap
-    approach : D0
+    trial     : the loads P from which it was proved
+    box       : a box of loads that holds exactly one solution
+    distance  : bound on || P - P* ||_H
+    stiffness : (n,) diagonal of H
+    loads     : (n,) the loads of the solution
+    indentation : (n,) its indentations; negative values are gaps
+    approach  : its approach
     """
 
     problem: NormalProblem
@@ -69,23 +73,23 @@ class Proved:
 
     @cached_property
     def touching(self) -> NDArray[np.bool_]:
-        """(n,) proved to carry a load."""
+        """(n,) True where an asperity is proved to carry a load."""
         return self.indentation.positive | self.loads.positive
 
     @cached_property
     def open(self) -> NDArray[np.bool_]:
-        """(n,) proved to have a gap."""
+        """(n,) True where an asperity is proved to have a gap."""
         return self.indentation.negative
 
     @property
     def total(self) -> Ball:
-        """The sum of the loads; Cauchy's inequality bounds its error better than the terms do."""
+        """The sum of the loads, with an error bound by Cauchy's inequality."""
         trial = Ball.exact(self.trial.loads).sum()
         spread = self.distance * math.sqrt(float((1.0 / self.stiffness).sum())) * (1 + SAFETY)
         return Ball.around(trial.mid, trial.radius + spread + float(self.trial.missing.size))
 
     def moves(self, coupling: Coupling) -> Array:
-        """(m,) bounds on how far A (P - P*) is from 0 at other points."""
+        """(m,) bounds on |A (P - P*)| at the targets of a coupling."""
         missing = self.trial.missing.size * self.problem.largest_entry
         reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.stiffness)
         return np.asarray((self.distance * reach + missing) * (1 + SAFETY))
@@ -94,10 +98,10 @@ class Proved:
 def proved(
     problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None
 ) -> Proved | Obstacle:
-    """The solution in the first box that is proved to hold it.
+    """The solution in the first box that is proved to hold it, or the obstacle to a proof.
 
-    boxes : to try first, of all candidates; default `boxes.tried`. Where none holds the solution,
-        those of the touching candidates alone are tried, all others being open.
+    boxes : boxes of all candidates to try first; default `boxes.tried`. If none of them is proved
+        to hold the solution, boxes with only the touching candidates are tried, others fixed open
     """
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
@@ -125,7 +129,7 @@ def proved(
 
 
 def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
-    """The solution, or a bound on the error of the loads where it may leave the box."""
+    """The solution in this box, or (n,) bounds on load errors that are too large for the box."""
     loads = state.loads.high
     missing = float(state.missing.size)
     missing_effect, own = _of_missing(problem, state, missing)
@@ -147,7 +151,7 @@ def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
     h = problem.stiffness(near)
     margin = 1.0 - min(box.convexity_number, box.problem.convexity_at(h))
     within, errors = errors_on(h, margin)
-    # A (P - P*) by Cauchy's inequality
+    # Bound A (P - P*) by Cauchy's inequality.
     softest = float(h.min(initial=np.inf))
     moved = (within / np.sqrt(softest) * problem.row_norm + missing_effect) * (1 + SAFETY)
     shift = _approach_error(problem, state, errors, moved)
@@ -160,7 +164,7 @@ def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
 
 
 def _sharpened(problem: NormalProblem, loads: Ball, indentation: Ball) -> Ball:
-    """Loads that are poorly known also as (n / k)^(3/2) of their indentations n."""
+    """Loads, with poorly known ones also computed as (n / k)^(3/2) of their indentations n."""
     which = np.flatnonzero(loads.radius > POOR * loads.mid.high)
     if len(which) == 0:
         return loads
@@ -176,7 +180,10 @@ def _sharpened(problem: NormalProblem, loads: Ball, indentation: Ball) -> Ball:
 def _of_missing(
     problem: NormalProblem, state: Trial, missing: float
 ) -> tuple[float, tuple[int, float]]:
-    """What a missing part of the total, on the largest load, adds to each gap and to its own."""
+    """Residuals due to a missing part of the total load, which is added to the largest load.
+
+    The first is that of every asperity; then follow the index of the largest load and its own.
+    """
     if missing == 0.0 or len(state.loads.high) == 0:
         return 0.0, (0, 0.0)
     j = int(np.argmax(state.loads.high))
@@ -188,14 +195,17 @@ def _of_missing(
 
 
 def _approach_error(problem: NormalProblem, state: Trial, errors: Array, moved: float) -> float:
-    """|D0 - D0*|, as D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch."""
+    """Bound on |D0 - D0*| from D0* = k P*^(2/3) + (A P*) - d at asperities proved to touch.
+
+    k is the local coefficient and d the offset of an asperity; `moved` bounds A (P - P*).
+    """
     if problem.load is None:
         return float(state.approach.radius)
     least = state.loads.high - errors
     sure = least > 0
     if not sure.any():
         return np.inf
-    # k P^(2/3) is concave: from least to P it rises by at most its slope at the former
+    # k P^(2/3) is concave: between least and P its slope is at most that at least.
     slope = problem.stiffness(least[sure], np.flatnonzero(sure))
     each = state.gap.size[sure] + slope * errors[sure] * (1 + SAFETY)
     return float(each.min() + moved) * (1 + SAFETY) + float(state.approach.radius)
