@@ -1,7 +1,7 @@
 """Forward derivatives: what changes when a scene and its load change a little, in one direction.
 
 One linear system at each level that a result hangs on: the same as of gradients, read the other way
-(docs/theory/gradients.md, "Forwards").
+(docs/theory/gradients.md, "The change in one direction").
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from convexrough.plots.fretting import fretting_figures
 from convexrough.plots.gradient import gradient_figures
 from convexrough.plots.load_plane import phase_figures, steady_figures
 from convexrough.plots.notebook import save
-from convexrough.plots.path import history_figures, path_figures
+from convexrough.plots.path import path_figures
 from convexrough.plots.press import press_figures
 from convexrough.plots.shakedown import shakedown_figures
 from convexrough.plots.shear import shear_figures
@@ -26,7 +26,6 @@ __all__ = [
     "cycle_figures",
     "fretting_figures",
     "gradient_figures",
-    "history_figures",
     "path_figures",
     "phase_figures",
     "plot",

@@ -41,47 +41,34 @@ from convexrough.sphere import hertz
 MOST_MAPS = 8
 
 
-def history_figures(
-    past: LoadPath, *, fine: LoadPath | None = None, length_unit: str = "", force_unit: str = ""
+def path_figures(
+    path: LoadPath, *, fine: LoadPath | None = None, length_unit: str = "", force_unit: str = ""
 ) -> Figures:
-    """The figure of a history.
+    """The figures of a load path; of a history, whose load is held, one.
 
     fine : the same with points between its own, as `between` finds; None to find them
 
     "history" : Q against X, its steps numbered where they are few and in darkening colours; and
         the energy lost since the beginning against the step
-    """
-    if not past.contact.loads.any():
-        return no_contact("history")
-    scale = Scale(past.contact, length_unit, force_unit)
-    figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
-    loop, cost = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
-    fine = fine or between(past)
-    draw_loop(loop, past, scale, fine)
-    draw_cost(cost, past, scale, fine)
-    title(cost, "energy lost since the beginning")
-    figure.supxlabel(scale.footnote(), fontsize=TICK)
-    return Figures({"history": figure})
-
-
-def path_figures(
-    path: LoadPath, *, fine: LoadPath | None = None, length_unit: str = "", force_unit: str = ""
-) -> Figures:
-    """The figures of a load path.
-
-    fine : as in `history_figures`
-
-    "path" : its points in the load plane, with the memory curve at some; Q against X; energy lost
+    "path" : the same, and the points in the load plane with the memory curve at some of them
     "path_stick_slip" : which asperities stick and which slide, at some of its points
     """
+    if path.load_constant and not path.contact.loads.any():
+        return no_contact("history")
     scale = Scale(path.contact, length_unit, force_unit)
-    figure = Figure(figsize=(DOUBLE, 3.2), layout="constrained")
-    plane, loop, cost = figure.subplots(1, 3)
-    draw_path(plane, path, force_unit)
+    figure = Figure(figsize=(DOUBLE, 3.0 if path.load_constant else 3.2), layout="constrained")
+    *plane, loop, cost = figure.subplots(
+        1, 2 if path.load_constant else 3, gridspec_kw={"wspace": 0.06}
+    )
     fine = fine or between(path)
+    for axes in plane:
+        draw_path(axes, path, force_unit)
     draw_loop(loop, path, scale, fine)
     draw_cost(cost, path, scale, fine)
     figure.supxlabel(scale.footnote(), fontsize=TICK)
+    if path.load_constant:
+        title(cost, "energy lost since the beginning")
+        return Figures({"history": figure})
     return Figures({"path": figure, "path_stick_slip": _maps(path, scale)})
 
 

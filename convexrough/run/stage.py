@@ -209,6 +209,11 @@ class Steps(Result):
         if figures:
             _ = self.fine
 
+    def figures(self, **units: Any) -> Mapping[str, Figure]:
+        from convexrough.plots import path_figures  # matplotlib: only when it draws
+
+        return path_figures(self.found[0], fine=self.fine, **units)
+
     def summary(self) -> Summary:
         """A list along the steps for each number."""
         return {key: [row[key] for row in self.known] for key in self.known[0]}

@@ -77,7 +77,7 @@ def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
 )  # fmt: skip
 def test_fit_to_print(name: str, shares: list[float]) -> None:
     fits(plots.shear_figures(states(name, shares), **UNITS)["stick_slip"])
-    fits(plots.history_figures(past(name, shares), **UNITS)["history"])
+    fits(plots.path_figures(past(name, shares), **UNITS)["history"])
     many = steady(name, np.abs(shares), np.minimum(shares, -np.abs(shares) / 9))
     for figure in plots.cycle_figures(many, **UNITS).values():
         fits(figure)
@@ -166,7 +166,7 @@ def test_the_loss_is_that_of_the_cycles() -> None:
 
 def test_the_path_passes_through_every_step() -> None:
     done = past("paper", [0.6, -0.2, 0.3, -0.6, 0.6])
-    path, cost = plots.history_figures(done)["history"].axes
+    path, cost = plots.path_figures(done)["history"].axes
     sphere = smooth(done.contact.scene, load=done.contact.load)
     X0 = sphere.displacement(sphere.largest_force)
     ends, energies = (axes.lines[0].get_xydata() for axes in (path, cost))
@@ -233,7 +233,7 @@ def test_no_contact_is_said() -> None:
     figures = (
         plots.shear_figures([cr.shear(nothing, force=0.0)] * 2, **UNITS)
         | plots.cycle_figures(cr.cycles(nothing, [0.0, 0.0]), **UNITS)
-        | plots.history_figures(cr.history(nothing, forces=[0.0, 0.0]), **UNITS)
+        | plots.path_figures(cr.history(nothing, forces=[0.0, 0.0]), **UNITS)
         | paper_figures(nothing, **UNITS)
     )
     assert len(figures) == 10

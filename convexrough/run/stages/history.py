@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -40,8 +40,3 @@ class Followed(Steps):
 
     def columns_of_steps(self) -> Columns:
         return {"fraction": np.array(self.stage.fractions), **super().columns_of_steps()}
-
-    def figures(self, **units: Any) -> Mapping[str, Any]:
-        from convexrough.plots import history_figures  # matplotlib: only when it draws
-
-        return history_figures(self.found[0], fine=self.fine, **units)

@@ -131,11 +131,6 @@ class Pathed(Steps):
     def lines(self, units: UnitNames) -> list[str]:
         return [*super().lines(units), f"{INCREASE}{self.found[0].order}"]
 
-    def figures(self, **units: Any) -> Mapping[str, Any]:
-        from convexrough.plots import path_figures  # matplotlib: only when it draws
-
-        return path_figures(self.found[0], fine=self.fine, **units)
-
 
 class Steady(_Points):
     """A closed path, repeated.
