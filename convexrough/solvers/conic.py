@@ -4,10 +4,9 @@
     subject to  p = B y3,  four or five cones per asperity,  and sum p = load if prescribed.
 
 The unknowns are the loads p and, for each asperity, the lifted variables y1 to y5 and z. The loads
-lie in boxes 0 <= p <= B, D is the prescribed approach of each asperity, e = k B^(5/3) with the
-local coefficients k, and M = A + diag(shells) is positive semidefinite, where A is the compliance
-operator and S_i the convexity number of a box. The only solution is the contact
-state (docs/theory/exact-cones.md, which derives the program).
+lie in boxes 0 <= p <= B with convexity numbers S_i. D is the prescribed approach of each asperity,
+e = k B^(5/3) with the local coefficients k, and M = A + diag(shells), positive semidefinite, with
+the compliance operator A. The only solution is the contact state (docs/theory/exact-cones.md).
 """
 
 from __future__ import annotations
