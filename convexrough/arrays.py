@@ -22,6 +22,16 @@ def frozen(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
+def summed(values: NDArray[Any]) -> Any:
+    """The sum along the last axis: a number, or (m, 1) of rows."""
+    return values.sum(axis=-1, keepdims=values.ndim > 1)
+
+
+def largest(values: NDArray[Any]) -> Any:
+    """The largest along the last axis, at least 0: a number, or (m, 1) of rows."""
+    return values.max(axis=-1, initial=0.0, keepdims=values.ndim > 1)
+
+
 def even(value: float, length: int) -> Array:
     """(length,) read-only, this value everywhere: one number in memory stands for all."""
     return np.broadcast_to(np.float64(value), (length,))

@@ -23,8 +23,8 @@ from convexrough.influence.shells import shells
 from convexrough.normal.certificate import Certificate, certificate_of, certify_on
 from convexrough.normal.level import Level, Levels
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.proved import Obstacle, proved
-from convexrough.normal.refine import refined_loads, refines
+from convexrough.normal.proved import Obstacle, Proved, proved
+from convexrough.normal.refine import Trial, refined_loads, refines
 from convexrough.normal.units import Units
 from convexrough.numbers.balls import Ball
 from convexrough.plottable import Plottable
@@ -227,13 +227,7 @@ def levels_of(contact: Contact) -> Levels:
 
     `contact.cached(levels_of)` gives the same ones each time.
     """
-    scene, load = contact.scene, contact.prescribed_load
-    approach = contact.approach if load is None else None
-    problem = NormalProblem.assemble(
-        scene, approach=approach, load=load, influence=contact.influence
-    )
-    state = refined_loads(problem, contact.loads[problem.candidates] / problem.units.force)
-    found = proved(problem, state)
+    problem, state, found = vars(contact).get("_known") or _proved_again(contact)
     if isinstance(found, Obstacle):
         total = Ball.exact(state.loads).sum() if problem.load is None else problem.total
         top = Level.unproved(problem, state, total)
@@ -251,6 +245,17 @@ def levels_of(contact: Contact) -> Levels:
     return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 
 
+def _proved_again(contact: Contact) -> tuple[NormalProblem, Trial, Proved | Obstacle]:
+    """The problem of a contact, its loads refined, and the solution proved from them."""
+    load = contact.prescribed_load
+    approach = contact.approach if load is None else None
+    problem = NormalProblem.assemble(
+        contact.scene, approach=approach, load=load, influence=contact.influence
+    )
+    state = refined_loads(problem, contact.loads[problem.candidates] / problem.units.force)
+    return problem, state, proved(problem, state)
+
+
 def _contact(
     problem: NormalProblem,
     solver: Solver,
@@ -259,7 +264,7 @@ def _contact(
 ) -> Contact:
     scene = problem.scene
     force = problem.units.force
-    first = None
+    first, known = None, None
     if start is not None:
         given = checks.array("start", start, length=len(scene), sign="not negative")
         first = given[problem.candidates] / force
@@ -275,7 +280,9 @@ def _contact(
                 state = refined_loads(problem, solution.loads)
             solution = replace(solution, loads=state.loads.high)
             loads = frozen(problem.to_scene(solution.loads * force))
-            certificate = certificate_of(problem, loads, state, proved(problem, state))
+            found = proved(problem, state)
+            certificate = certificate_of(problem, loads, state, found)
+            known = (problem, state, found) if problem.influence.stored else None  # it is small
         else:
             loads = frozen(problem.to_scene(solution.loads * force))
             certificate = certify_on(problem, loads)
@@ -298,7 +305,8 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
-    contact.__dict__["_by"] = solver  # with its settings, which a copy knows by name alone
+    # A copy knows its solver by name alone, and proves again.
+    contact.__dict__.update(_by=solver, _known=known)
     return contact
 
 

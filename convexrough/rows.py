@@ -20,10 +20,11 @@ from convexrough.arrays import Array, Indices
 from convexrough.friction.levels import AT_THE_END
 from convexrough.friction.loss import asperity_losses
 from convexrough.friction.order import proved_in_rows
-from convexrough.normal import stack
-from convexrough.normal.problem import NormalProblem
-from convexrough.normal.stack import Boxes, Rows, Stack, joined
-from convexrough.numbers.balls import Ball, where
+from convexrough.normal.boxes import Box
+from convexrough.normal.problem import Data, NormalProblem
+from convexrough.normal.stack import Stack
+from convexrough.normal.together import NUMBERS, Rows, solved
+from convexrough.numbers.balls import Ball, joined, of_rows, where
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
@@ -50,7 +51,7 @@ class PressedRows(NamedTuple):
     places: Indices
     problem: NormalProblem
     stack: Stack
-    boxes: Boxes
+    box: Box
     high: Rows
     squares: Array
 
@@ -84,12 +85,11 @@ class PressedRows(NamedTuple):
         total = high.load - drop
         inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
         total = where(inside, total, high.load)[:, None]  # others are done one by one
-        rows = replace(self.stack, total=total, depth=None)
-        guess = stack.guessed(rows, rows.offsets.value, self.squares, _reach(problem, total.value))
-        state = stack.refined(rows, stack.pressed(rows, guess))
-        found = stack.proved(rows, state, self.boxes.closed)
+        rows = replace(self.stack, exact_load=total, exact_approach=None)
+        offsets, reach = rows.exact.offsets.value, _reach(problem, total.value)
+        found = solved(rows, offsets, self.squares, reach, self.box.closed)
         low = found.rows._replace(load=total[:, 0])
-        ordered = proved_in_rows(rows, self.boxes, high, low)
+        ordered = proved_in_rows(rows, self.box, high, low)
         slip, slide = asperity_losses(high, low)
         travel = f * ((2.0 - nu) / ((1.0 - nu) * 2.0)) * units.length
         loss = (slip + slide).sum() * 4.0 * (f * units.force) * travel
@@ -129,7 +129,7 @@ def _in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> Iterato
         if problem is not None:
             key = problem.units, *_family(problem.scene)[2:5]
             alike.setdefault(key, []).append((problem, places))
-    some = max(1, min(MATRICES // len(scenes[0]) ** 2, stack.NUMBERS // len(scenes[0])))
+    some = max(1, min(MATRICES // len(scenes[0]) ** 2, NUMBERS // len(scenes[0])))
     for group in alike.values():
         every = [(problem, k) for problem, places in group for k in places]
         for start in range(0, len(every), some):
@@ -167,28 +167,26 @@ def _proved(
         problem, m = family[0][0], len(family)
         coupled.append((slice(start, start + m), problem))
         offsets.append(_offsets(problem, [scenes[k] for _, k in family]))
-        known.append(stack.of_rows(partial(_repeated, shape=(m, n)), problem.exact.coefficients))
+        known.append(of_rows(partial(_repeated, shape=(m, n)), problem.exact.coefficients))
         wells.append(_repeated(problem.shells, shape=(m, n)))
         start += m
     unit = units.force if by_load else units.length
     given = Ball.exact(controls[places][:, None]).scaled(1.0 / unit)
     total, depth = (given, None) if by_load else (None, given)
     shelled = np.concatenate(wells)
-    rows = Stack(coupled, joined(known), joined(offsets), shelled, total, depth)
+    exact = Data(joined(known), joined(offsets), first.exact.scale)
+    rows = Stack(coupled, exact, shelled, total, depth)
     squares = np.array([scenes[k].asperities.distances for k in places]) ** 2
     if by_load:
-        prescribed, reach = rows.offsets.value, _reach(first, given.value)
+        prescribed, reach = rows.exact.offsets.value, _reach(first, given.value)
     else:
-        prescribed = rows.offsets.value + given.value
+        prescribed = rows.exact.offsets.value + given.value
         reach = first.scene.mean_radius * np.maximum(given.value, 0.0) * units.length
-    guess = stack.guessed(rows, prescribed, squares, reach)
-    state = stack.refined(rows, stack.pressed(rows, guess))
-    boxes = stack.widest(rows, state)
-    found = stack.proved(rows, state, boxes)
+    found = solved(rows, prescribed, squares, reach)
     good = np.flatnonzero(found.good)
     if len(good):
         high = found.rows if total is None else found.rows._replace(load=total[:, 0])
-        chosen = rows.only(good), Boxes._make(each[good] for each in boxes), high.at(good)
+        chosen = rows.only(good), found.box.at(good), high.at(good)
         yield PressedRows(places[good], first, *chosen, squares[good])
 
 

@@ -28,12 +28,12 @@ Where F(x) is a ball, e is the upper end of what its numbers leave, and (1) hold
 
 from __future__ import annotations
 
-import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, largest, summed
 from convexrough.numbers.balls import Ball
 from convexrough.roundoff import SAFETY
 
@@ -44,15 +44,13 @@ def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)
 
 
-def distance(excess: Array, stiffness: Array, margin: float) -> float:
-    """|| e ||_{H^-1} / mu, the right side of (1).
+def distance(excess: Array, stiffness: Array, margin: float | Array) -> Any:
+    """|| e ||_{H^-1} / mu, the right side of (1): a number, or (m, 1) of rows.
 
     excess : (n,) e;  stiffness : (n,) the diagonal of H, infinite where x is fixed;  margin : mu
     """
-    with np.errstate(over="ignore", invalid="ignore"):
-        largest = float(excess.max(initial=0.0))
-        if largest == 0.0:
-            return 0.0
-        squared = float(np.sum((excess / largest) ** 2 / stiffness))
-    found = largest * math.sqrt(squared) / margin * (1 + SAFETY + len(excess) * 2.0**-52)
-    return found if math.isfinite(found) else math.inf
+    most = largest(excess)
+    with np.errstate(all="ignore"):
+        squared = summed((excess / np.where(most > 0, most, 1.0)) ** 2 / stiffness)
+        found = most * np.sqrt(squared) / margin * (1 + SAFETY + excess.shape[-1] * 2.0**-52)
+    return np.where(most == 0, 0.0, np.where(np.isfinite(found), found, np.inf))[()]

@@ -24,8 +24,8 @@ from convexrough.errors import InputError
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level
-from convexrough.normal.stack import Rows, of_rows
-from convexrough.numbers.balls import TINY, Ball
+from convexrough.normal.together import Rows
+from convexrough.numbers.balls import TINY, Ball, of_rows
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene

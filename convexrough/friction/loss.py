@@ -22,8 +22,8 @@ from convexrough.arrays import Array
 from convexrough.friction.curve import Piece
 from convexrough.friction.levels import FrictionLevels, exactly
 from convexrough.normal.level import Level, energies
-from convexrough.normal.stack import NUMBERS, Rows, joined, of_rows
-from convexrough.numbers.balls import Ball, where
+from convexrough.normal.together import NUMBERS, Rows
+from convexrough.numbers.balls import Ball, joined, of_rows, where
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import annulus
 

@@ -50,9 +50,11 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
+from convexrough.normal.boxes import Box
 from convexrough.normal.level import Level
 from convexrough.normal.proved import Proved
-from convexrough.normal.stack import Boxes, Rows, Stack
+from convexrough.normal.stack import Stack
+from convexrough.normal.together import Rows
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
 #: "proved" for all loads between the levels in use; "proved for one step", where no load falls
@@ -148,14 +150,14 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
 
 
 @np.errstate(all="ignore")
-def proved_in_rows(rows: Stack, boxes: Boxes, high: Rows, low: Rows) -> NDArray[np.bool_]:
+def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.bool_]:
     """(m,) `proved_between` of rows of levels of which the upper are the highest of a path."""
-    k, support = rows.coefficients, ~high.open
+    k, support = rows.exact.coefficients, ~high.open
     c = np.where(support, 1.5 * np.cbrt(high.loads.upper) / k.lower * (1 + SAFETY), 0.0)
-    least = np.minimum(LEAST * c.max(axis=1, keepdims=True), 1.0 / boxes.stiffness)
+    least = np.minimum(LEAST * c.max(axis=1, keepdims=True), 1.0 / box.stiffness)
     c = np.where(support, np.maximum(c, least) * (1 + SAFETY), 0.0)
-    beyond = np.where(support, c * boxes.stiffness, 0.0).max(axis=1, keepdims=True) - 1.0
-    mu = 1.0 - boxes.number - np.maximum(beyond, 0.0) * (1 + SAFETY) - SAFETY
+    beyond = np.where(support, c * box.stiffness, 0.0).max(axis=1, keepdims=True) - 1.0
+    mu = 1.0 - box.convexity_number - np.maximum(beyond, 0.0) * (1 + SAFETY) - SAFETY
     drop = (high.approach - low.approach).upper[:, None]
     count = max(1, int(support.sum(axis=1).max()))
     order = np.argsort(~support, axis=1, kind="stable")[:, :count]  # others have c = 0

@@ -19,8 +19,7 @@ import numpy as np
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.gradients.pulled import ZERO, Pulled
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.stack import of_rows
-from convexrough.numbers.balls import Ball, where
+from convexrough.numbers.balls import Ball, of_rows, where
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along, named

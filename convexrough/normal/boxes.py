@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from convexrough.influence.coupling import Influence
 from convexrough.influence.shells import fitted_shells
 from convexrough.normal.overlap import Nearest, overlapping_margin
 from convexrough.normal.problem import FITTED, NormalProblem
+from convexrough.normal.stack import Stack
 from convexrough.roundoff import ROUNDOFF
 
 Scope = Literal["global", "local", "none"]
@@ -47,15 +48,25 @@ CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 
 class Box(NamedTuple):
-    """A box of loads that holds the solution, and how convex the energy is on it."""
+    """A box of loads that holds the solution, and how convex the energy is on it; or in rows."""
 
     scope: Scope
-    problem: NormalProblem  # with the shells that prove it
+    problem: NormalProblem | Stack  # with the shells that prove it
     loads: Array  # the upper corner
     stiffness: Array  # h there
-    convexity_number: float  # 1 - mu
+    convexity_number: Any  # 1 - mu
     faces: Array  # upper faces that the solution must be shown to stay below; else infinite
     fixed_open: NDArray[np.bool_]  # taken to be open, which has to be shown of the solution
+
+    def at(self, rows: Indices) -> Box:
+        """Some of the rows."""
+        return self._replace(
+            loads=self.loads[rows],
+            stiffness=self.stiffness[rows],
+            convexity_number=self.convexity_number[rows],
+            faces=self.faces[rows],
+            fixed_open=self.fixed_open[rows],
+        )
 
     @property
     def closed(self) -> Box:

@@ -240,7 +240,10 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
     P are the loads, P* the solution, and e the residuals of the contact law at P.
     """
     most = np.maximum(found.box.loads, start.loads.high * (1 + SAFETY))
-    if not found.box.problem.convexity_number(most) < 1 and (most > found.box.loads).any():
+    if (
+        not found.box.problem.convexity_at(problem.stiffness(most)) < 1
+        and (most > found.box.loads).any()
+    ):
         return np.inf
     excess = np.where(found.box.fixed_open, 0.0, start.excess)
     total = float(excess @ moved) + float(start.missing.size * found.approach.size)

@@ -24,11 +24,12 @@ from convexrough.arrays import Array
 from convexrough.convex.newton_step import correct
 from convexrough.convex.theorem import distance, excess
 from convexrough.errors import ProofError, SolverError
-from convexrough.normal import stack
 from convexrough.normal.boxes import Box
-from convexrough.normal.problem import NormalProblem
+from convexrough.normal.problem import REDUCTION, NormalProblem
 from convexrough.normal.proved import Obstacle, Proved, proved
-from convexrough.normal.refine import CORRECTIONS, REDUCTION, Trial, refined_loads
+from convexrough.normal.refine import CORRECTIONS, Trial, refined_loads
+from convexrough.normal.stack import Stack
+from convexrough.normal.together import NUMBERS, solved
 from convexrough.numbers.balls import Ball, where
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
@@ -311,7 +312,7 @@ class Levels:
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or found is None or found.box.fixed_open.any():
             return [None] * len(loads)
-        rows, levels = max(1, stack.NUMBERS // len(problem)), list[Level | None]()
+        rows, levels = max(1, NUMBERS // len(problem)), list[Level | None]()
         for start in range(0, len(loads), rows):
             levels += _together(problem, found.box.closed, loads[start : start + rows])
         self._known |= {_key(level.load): level for level in levels if level is not None}
@@ -338,20 +339,14 @@ def _key(load: Ball) -> tuple[float, float, float]:
 def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | None]:
     """The levels of these loads, in one box; None of those that are not proved there."""
     scene, exact, m, total = problem.scene, problem.exact, len(loads), loads[:, None]
-    rows = stack.Stack(
-        [(slice(0, m), problem)], exact.coefficients, exact.offsets, problem.shells, total, None
-    )
+    rows = Stack([(slice(0, m), problem)], exact, problem.shells, total, None)
     force, modulus = total.value * problem.units.force, scene.material.contact_modulus
     reach = hertz.contact_radius(force, modulus, scene.mean_radius) ** 2
     squares = scene.asperities.distances[problem.candidates] ** 2
-    guess = stack.guessed(rows, problem.offsets, squares, reach)
-    state = stack.refined(rows, stack.pressed(rows, guess))
-    number = np.asarray(box.convexity_number)
-    boxes = stack.Boxes(box.loads, box.stiffness, box.faces, number, box.problem.shells)
-    found = stack.proved(rows, state, boxes)
+    found = solved(rows, problem.offsets, squares, reach, box)
 
     def level(k: int) -> Level:
-        it = found.row(k, problem.at_load(loads[k]), box)
+        it = found.row(k, problem.at_load(loads[k]))
         known = it.approach, it.loads, it.indentation, found.rows.touching[k], found.rows.open[k]
         return Level(it.problem, loads[k], *known, it, it.trial)
 

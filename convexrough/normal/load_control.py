@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, largest, summed
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
 from convexrough.influence.choice import FEW_ASPERITIES
@@ -26,71 +26,76 @@ LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 STRAIGHT = 1e-11
 
 
-def shifted_to_load(indentation: Array, coefficients: Array, load: float) -> Array:
-    """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load.
+@np.errstate(all="ignore")
+def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array) -> Array:
+    """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load; or of rows, with loads (m, 1).
 
     The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it grows and is convex in tau:
     Newton's method descends on the root once it is to the right of it, which it is after one step;
     in few steps, as it is nearly straight. The shift is counted from the highest, so that loads of
     any size come out to all digits.
     """
-    first = int(indentation.argmax())
-    highest = float(indentation[first])
-    indentation = indentation - highest
-    most = float(hertz.indentation(load, coefficients[first]))  # alone it would carry it all
-    shift, softness = min(most, max(highest, 1e-9 * most)), 1.0 / coefficients
+    highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
+    indentation, softness = indentation - highest, 1.0 / coefficients
+    most = hertz.indentation(load, largest(coefficients))  # one that carries it all
+    shift = np.minimum(most, np.maximum(highest, 1e-9 * most))
     for steps in range(200):
         ratio = np.maximum(indentation + shift, 0.0) * softness
         root = np.sqrt(ratio)
-        total = float(ratio @ root)
+        total = summed(ratio * root)
         # (total^(2/3) - load^(2/3)) over its slope, without cancellation
-        excess = -math.expm1(2 / 3 * math.log1p((load - total) / total)) * total
-        step = excess / float(root @ softness)
-        if steps > 0 and not step > 4 * ROUNDOFF * shift:
+        excess = -np.expm1(2 / 3 * np.log1p((load - total) / total)) * total
+        step = excess / summed(root * softness)
+        if steps > 0:
+            step = np.where(step > 4 * ROUNDOFF * shift, step, 0.0)
+        shift = shift - step
+        if (np.abs(step) < STRAIGHT * shift).all():
             break
-        shift -= step
-        if abs(step) < STRAIGHT * shift:
-            break
-    return indentation + shift
+    return np.asarray(indentation + shift)
 
 
+@np.errstate(all="ignore")
 def approach_bound(
-    weights: Array, displacement: Array, coefficients: Array, offsets: Array, load: float
-) -> float:
+    weights: Array,
+    displacement: Array,
+    coefficients: Array,
+    offsets: Array,
+    load: float | Array,
+) -> Any:
     """Upper bound on D0 at every solution of total `load` (derived in docs/theory/certificate.md).
 
     With q = weights / sum(weights), alpha_i = q_i k_i and c = A q, for every lambda >= max c:
 
         D0 <= lambda L + (4/27) sum alpha_i^3 / (lambda - c_i)^2 - d'q.
 
+    A number, or (m, 1) of rows with loads (m, 1).
+
     displacement : (n,) no less than A times weights;  offsets : (n,) no more than d
     """
-    total = float(weights.sum())
+    total = summed(weights)
     q, c = weights / total, displacement / total
     cubes = (q * coefficients) ** 3
-    c_active, cubes = c[cubes > 0], cubes[cubes > 0]  # others count for nothing
+    highest, wanted = largest(c), 27.0 * load / 8.0
+    if q.ndim == 1:
+        active, cubes = c[cubes > 0], cubes[cubes > 0]  # others count for nothing
+    else:
+        active = np.where(cubes > 0, c, -np.inf)
     # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L: Newton's method for
     # S^(-1/3), which is concave and nearly straight, from the left.
-    highest, wanted = float(c_active.max()), 27.0 * load / 8.0
-    height = float((c_active + np.cbrt(cubes / wanted)).max()) * (1 + SAFETY)
+    least = largest(active)
+    height = largest(active + np.cbrt(cubes / wanted)) * (1 + SAFETY)
     for _ in range(100):
-        nearer = 1.0 / (height - c_active)
+        nearer = 1.0 / (height - active)
         parts = cubes * (nearer * nearer * nearer)
-        excess, slope = float(parts.sum()), float(parts @ nearer)
-        if not slope > 0:
-            break  # nothing is left of the sum in float64: the height is high enough
-        step = (math.cbrt(excess / wanted) - 1.0) * excess / slope
-        height += max(step, 0.0)
-        if step <= 1e-3 * (height - highest):
+        excess, slope = summed(parts), summed(parts * nearer)
+        step = (np.cbrt(excess / wanted) - 1.0) * excess / slope
+        height = height + np.fmax(step, 0.0)  # where nothing is left in float64, it is high enough
+        if not (step > 1e-3 * (height - least)).any():
             break  # any height gives a bound; this one is close to the best
-    height = max(height, float(c.max()))
-    terms = (
-        height * load,
-        (4.0 / 27.0) * float((cubes / (height - c_active) ** 2).sum()),
-        -float(offsets @ q),
-    )
-    size = terms[0] + terms[1] + float(np.abs(offsets) @ q)
-    return sum(terms) + (SAFETY + len(q) * ROUNDOFF) * size
+    height = np.maximum(height, highest)
+    rest = (4.0 / 27.0) * summed(cubes / (height - active) ** 2)
+    size = height * load + rest + summed(np.abs(offsets) * q)
+    return height * load + rest - summed(offsets * q) + (SAFETY + q.shape[-1] * ROUNDOFF) * size
 
 
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
@@ -122,7 +127,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     bound = approach_bound(weights, displacement, coefficients, least, load)
     if not np.isfinite(bound):
         raise InputError("load", found=load, expected="a load this scene's units can hold")
-    return bound
+    return float(bound)
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:

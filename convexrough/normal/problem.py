@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices, among_zeros, evenly, taken
+from convexrough.arrays import Array, Indices, among_zeros, evenly, largest, taken
+from convexrough.convex.newton_step import correct
 from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.shells import fitted_shells, shells
 from convexrough.normal.load_control import (
@@ -53,6 +54,10 @@ NEARBY = 1e-13
 
 #: To 66 digits.
 INVERSE_PI = Fraction("0.318309886183790671537767526745028724068919291480912897495334688118")
+
+
+#: A correction by conjugate gradients reduces the residual by this; a factor leaves rounding.
+REDUCTION = 1e-7
 
 
 class Data(NamedTuple):
@@ -160,6 +165,20 @@ class NormalProblem:
         most = np.maximum(product, 0.0) + off.of(product)
         errors = off.of(product) + (off.relative + 2 * ROUNDOFF) * most
         return Ball.around(product, errors * (1 + SAFETY))
+
+    def correct(self, slopes: Array, defect: Array, todo: Any = True) -> Array:
+        """(n,) a correction of the unknowns of the normal map, by one Newton step.
+
+        slopes : (n,) c = dP/dn, 0 where open;  defect : (n,) of the normal map
+        """
+        return correct(
+            self.influence,
+            self.shells,
+            np.sqrt(slopes),
+            defect,
+            balanced=self.load is not None,
+            tolerance=REDUCTION,
+        )
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
         """A P of other loads nearby: sharp where that is cheap, else from the change alone."""
@@ -324,12 +343,11 @@ class NormalProblem:
         The smallest eigenvalue of the Hessian, relative to its diagonal, is at least 1 - theta:
         (3) of docs/theory/convexity.md.
         """
-        return self.convexity_at(self.stiffness(loads))
+        return float(self.convexity_at(self.stiffness(loads)))
 
-    def convexity_at(self, stiffness: Array) -> float:
-        """`convexity_number` up to loads of which the stiffness is known."""
-        ratio = self.shells / stiffness
-        return float(ratio.max(initial=0.0)) * (1 + SAFETY)
+    def convexity_at(self, stiffness: Array) -> Any:
+        """`convexity_number` up to loads of which the stiffness is known; (m, 1) of rows."""
+        return largest(self.shells / stiffness) * (1 + SAFETY)
 
     def twofold_offsets(self) -> Pair:
         """`offsets` from the scene's numbers, to twice as many digits: z - r^2 / (2 R), by axes."""
@@ -357,7 +375,7 @@ class NormalProblem:
         assert self.load is not None
         displacement = displacement + self.influence.rounding(weights).of(displacement)
         least = self.offsets - self.offset_errors
-        return approach_bound(weights, displacement, self.coefficients, least, self.load)
+        return float(approach_bound(weights, displacement, self.coefficients, least, self.load))
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """Values of the candidates, set among zeros for all other asperities of the scene."""

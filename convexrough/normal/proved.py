@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from convexrough.convex.theorem import distance
 from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.normal.boxes import Box, box_of_touching, crowded, tried
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import Trial
+from convexrough.normal.refine import Problem, Trial
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
@@ -130,82 +130,123 @@ def proved(
 
 def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
     """The solution in this box, or (n,) bounds on load errors that are too large for the box."""
-    loads = state.loads.high
-    missing = float(state.missing.size)
-    missing_effect, own = _of_missing(problem, state, missing)
-    residual = np.where(box.fixed_open, 0.0, state.excess + missing_effect)
-    if missing:
-        residual[own[0]] += own[1]
+    at_first = errors_in(problem, box, state)
+    if not stays_in(box, state, at_first):
+        return at_first
+    known = solution_in(problem, box, state, at_first)
+    return Proved(problem, state, box, *known)
 
-    def errors_on(stiffness: Array, margin: float) -> tuple[float, Array]:
-        within = distance(residual, stiffness, margin)
-        errors = within / np.sqrt(stiffness) * (1 + SAFETY)
-        if missing:
-            errors[own[0]] += missing
-        return within, errors
 
-    _, errors = errors_on(box.stiffness, 1.0 - box.convexity_number)
-    if (loads + errors >= box.faces).any() or not np.isfinite(errors).all():
-        return errors
-    near = np.minimum(box.loads, (loads + errors) * (1 + SAFETY))
+def stays_in(box: Box, state: Trial, errors: Array) -> Any:
+    """True if loads with errors of at most these (n,) stay inside the box."""
+    inside = (state.loads.high + errors < box.faces) & np.isfinite(errors)
+    return inside.all(axis=-1)
+
+
+def errors_in(problem: Problem, box: Box, state: Trial) -> Array:
+    """(n,) bounds on the errors of the trial loads, valid if the box holds the solution."""
+    missing = _Missing.of(problem, state)
+    residual = missing.added_to(state.excess, box.fixed_open)
+    within = distance(residual, box.stiffness, 1.0 - box.convexity_number)
+    return missing.errors(within, box.stiffness)
+
+
+def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Known:
+    """The solution, by the theorem on the small box given by bounds on the errors of loads."""
+    missing = _Missing.of(problem, state)
+    residual = missing.added_to(state.excess, box.fixed_open)
+    near = np.minimum(box.loads, (state.loads.high + at_first) * (1 + SAFETY))
     h = problem.stiffness(near)
-    margin = 1.0 - min(box.convexity_number, box.problem.convexity_at(h))
-    within, errors = errors_on(h, margin)
+    margin = 1.0 - np.minimum(box.convexity_number, box.problem.convexity_at(h))
+    within = distance(residual, h, margin)
+    errors = missing.errors(within, h)
     # Bound A (P - P*) by Cauchy's inequality.
-    softest = float(h.min(initial=np.inf))
-    moved = (within / np.sqrt(softest) * problem.row_norm + missing_effect) * (1 + SAFETY)
+    softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
+    moved = (within / np.sqrt(softest) * problem.row_norm + missing.effect) * (1 + SAFETY)
     shift = _approach_error(problem, state, errors, moved)
     approach = Ball.around(state.approach.mid, shift)
     known = state.indentation
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
     found = Ball.around(state.loads, np.where(indentation.negative, 0.0, errors))
-    found = _sharpened(problem, found, indentation)
-    return Proved(problem, state, box, within, h, found, indentation, approach)
+    return Known(within, h, _sharpened(problem, found, indentation), indentation, approach)
 
 
-def _sharpened(problem: NormalProblem, loads: Ball, indentation: Ball) -> Ball:
+class Known(NamedTuple):
+    """Fields of `Proved`."""
+
+    distance: Any
+    stiffness: Array
+    loads: Ball
+    indentation: Ball
+    approach: Ball
+
+
+class _Missing(NamedTuple):
+    """The part of the total load that the trial loads lack; it is added to the largest load.
+
+    size   : bound on this part
+    effect : bound on its contribution to every gap
+    place  : index of the largest load
+    own    : bound on its further contribution to the gap there
+    """
+
+    size: Any
+    effect: Any
+    place: Indices
+    own: Array
+
+    @classmethod
+    def of(cls, problem: Problem, state: Trial) -> _Missing:
+        loads, missing = state.loads.high, state.missing.size
+        if not missing.any():
+            return cls(missing, 0.0 * missing, NONE, np.zeros(0))
+        place = np.argmax(loads, axis=-1, keepdims=True)
+        most, local = (np.take_along_axis(each, place, -1) for each in (loads, state.local))
+        steepest = 4.0 / 3.0 * local / most * (1 + SAFETY)
+        own = np.where(missing < most / 2.0, missing * steepest, np.inf)
+        return cls(missing, missing * problem.largest_entry, place, own)
+
+    def added_to(self, excess: Array, fixed_open: NDArray[np.bool_]) -> Array:
+        """(n,) bounds on the residuals that enter the theorem."""
+        residual = np.where(fixed_open, 0.0, excess + self.effect)
+        return self._with(residual, self.own)
+
+    def errors(self, within: Any, stiffness: Array) -> Array:
+        """(n,) bounds on the errors of the loads."""
+        return self._with(within / np.sqrt(stiffness) * (1 + SAFETY), self.size)
+
+    def _with(self, values: Array, more: Any) -> Array:
+        if len(self.place):
+            there = np.take_along_axis(values, self.place, -1) + more
+            np.put_along_axis(values, self.place, there, -1)
+        return values
+
+
+def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
     """Loads, with poorly known ones also computed as (n / k)^(3/2) of their indentations n."""
-    which = np.flatnonzero(loads.radius > POOR * loads.mid.high)
-    if len(which) == 0:
+    which = np.nonzero(loads.radius > POOR * loads.mid.high)
+    if len(which[0]) == 0:
         return loads
     k = problem.exact.coefficients
-    ratio = indentation[which] / (k if len(k) == 1 else k[which])
+    if k.radius.size > 1:
+        high, low, radius = (np.broadcast_to(it, loads.shape)[which] for it in (*k.mid, k.radius))
+        k = Ball(Pair(high, low), radius)
+    ratio = indentation[which] / k
     by_law = ratio.positive_part() * ratio.sqrt()
     better = by_law.radius < loads.radius[which]
     parts = np.array((*loads.mid, loads.radius))
-    parts[:, which[better]] = np.array((*by_law.mid, by_law.radius))[:, better]
+    places: Any = (slice(None), *(each[better] for each in which))
+    parts[places] = np.array((*by_law.mid, by_law.radius))[:, better]
     return Ball(Pair(parts[0], parts[1]), parts[2])
 
 
-def _of_missing(
-    problem: NormalProblem, state: Trial, missing: float
-) -> tuple[float, tuple[int, float]]:
-    """Residuals due to a missing part of the total load, which is added to the largest load.
-
-    The first is that of every asperity; then follow the index of the largest load and its own.
-    """
-    if missing == 0.0 or len(state.loads.high) == 0:
-        return 0.0, (0, 0.0)
-    j = int(np.argmax(state.loads.high))
-    largest = float(state.loads.high[j])
-    if not missing < largest / 2.0:
-        return np.inf, (j, np.inf)
-    steepest = 4.0 / 3.0 * float(state.local[j]) / largest * (1 + SAFETY)
-    return missing * problem.largest_entry, (j, missing * steepest)
-
-
-def _approach_error(problem: NormalProblem, state: Trial, errors: Array, moved: float) -> float:
-    """Bound on |D0 - D0*| from D0* = k P*^(2/3) + (A P*) - d at asperities proved to touch.
-
-    k is the local coefficient and d the offset of an asperity; `moved` bounds A (P - P*).
-    """
+def _approach_error(problem: Problem, state: Trial, errors: Array, moved: Any) -> Any:
+    """|D0 - D0*|, as D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch."""
     if problem.load is None:
-        return float(state.approach.radius)
+        return state.approach.radius
     least = state.loads.high - errors
-    sure = least > 0
-    if not sure.any():
-        return np.inf
-    # k P^(2/3) is concave: between least and P its slope is at most that at least.
-    slope = problem.stiffness(least[sure], np.flatnonzero(sure))
-    each = state.gap.size[sure] + slope * errors[sure] * (1 + SAFETY)
-    return float(each.min() + moved) * (1 + SAFETY) + float(state.approach.radius)
+    # k P^(2/3) is concave: from least to P it rises by at most its slope at the former
+    slope = problem.stiffness(np.where(least > 0, least, 1.0))
+    each = np.where(least > 0, state.gap.size + slope * errors * (1 + SAFETY), np.inf)
+    closest = each.min(axis=-1, initial=np.inf, keepdims=each.ndim > 1)
+    return (closest + moved) * (1 + SAFETY) + state.approach.radius

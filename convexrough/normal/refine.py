@@ -1,5 +1,8 @@
 """The contact law on balls, and Newton's corrections that bring any loads to thirty digits.
 
+All of it is for a problem, with arrays (n,), or for m problems in rows, with arrays (m, n): what is
+one number of a problem is then (m, 1).
+
 With loads P known as pairs, the residual  k P^(2/3) + A P - d - D0  is a ball: its radius counts
 all that the data, the product and the arithmetic lose. A correction is one Newton step on the
 normal map (docs/theory/newton.md) in float64 from a residual in pairs.
@@ -8,17 +11,18 @@ normal map (docs/theory/newton.md) in float64 from a residual in pairs.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array
-from convexrough.convex.newton_step import correct
+from convexrough.arrays import Array, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.numbers.balls import TINY, Ball
+from convexrough.normal.stack import Stack
+from convexrough.numbers.balls import TINY, Ball, of_rows
 from convexrough.numbers.kernels import residual
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.sphere import hertz
@@ -32,8 +36,9 @@ FEW = 700
 #: Loads whose sum is wrong by less than this are not scaled: only the largest changes. Heuristic.
 FITS = 1e-6
 
-#: A correction by conjugate gradients reduces the residual by this; a factor leaves rounding.
-REDUCTION = 1e-7
+
+#: One problem, or several in rows.
+Problem: TypeAlias = NormalProblem | Stack
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +52,7 @@ class Trial:
     missing : what the loads miss the prescribed total by; 0 where none is prescribed
     """
 
-    problem: NormalProblem
+    problem: Problem
     loads: Pair
     product: Ball
     local: Array
@@ -78,11 +83,25 @@ class Trial:
     def indentation(self) -> Ball:
         """(n,) D0 + d - A P: indentations of these loads, minus gaps where negative."""
         problem = self.problem
-        depths = problem.exact.offsets + self.approach if problem.load else problem.exact_depths
-        return depths - self.product
+        if problem.load is None:
+            return problem.exact_depths - self.product
+        return problem.exact.offsets + self.approach - self.product
+
+    def improved(self, other: Trial, where: NDArray[np.bool_]) -> Trial:
+        """The other one, in the rows where that is better."""
+        if where.all():
+            return other
+        select = partial(np.where, where[:, None])
+        both = zip(other.numbers, self.numbers, strict=True)
+        return Trial(self.problem, *(of_rows(select, yes, no) for yes, no in both))
+
+    @property
+    def numbers(self) -> tuple[Pair | Ball | Array, ...]:
+        """All but the problem."""
+        return self.loads, self.product, self.local, self.gap, self.approach, self.missing
 
 
-def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> Trial:
+def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
     """The contact law evaluated at loads of which A P, and what they miss a total by, is known."""
     data, exact = problem.exact, Ball.exact(loads)
     local = hertz.indentation(loads.high, problem.coefficients)
@@ -91,9 +110,9 @@ def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> 
         return Trial(problem, loads, product, local, gap, problem.depth, missing)
     above = residual(data.coefficients, exact, product, data.offsets)  # D0 where touching
     weights = np.cbrt(loads.high)
-    total = weights.sum()
-    shift = float(weights @ above.value / total)
-    rest = float(weights @ ((above.value - shift) + above.mid.low) / total)
+    total = summed(weights)
+    shift = summed(weights * above.value) / total
+    rest = summed(weights * ((above.value - shift) + above.mid.low)) / total
     approach = Ball.exact(Pair(*(np.asarray(part) for part in two_sum(shift, rest))))
     return Trial(problem, loads, product, local, above - approach, approach, missing)
 
@@ -103,55 +122,50 @@ def refines(problem: NormalProblem) -> bool:
     return not problem.influence.stored or len(problem) <= FEW
 
 
-def refined(problem: NormalProblem, start: Trial) -> Trial:
+def refined(problem: Problem, start: Trial) -> Trial:
     """The trial whose residual further corrections do not halve."""
-    best, size = start, _size(start)
+    best, size = start, defect_of(start)
+    todo = size > rounding_of(start)
     for _ in range(CORRECTIONS):
-        if size <= float(np.linalg.norm(best.gap.radius)):
+        if not todo.any():
             break
         try:
-            following = corrected(problem, best)
+            following = corrected(problem, best, todo)
         except SolverError:  # the energy is not known to be convex there
             break
-        left = _size(following)
-        if left < size:
-            best = following
-        if not left < 0.5 * size:
+        left = defect_of(following)
+        better = todo & (left < size)
+        if not better.any():
             break
-        size = left
+        todo = better & (left < 0.5 * size)
+        best, size = best.improved(following, better), np.where(better, left, size)
+        todo &= size > rounding_of(best)
     return best
 
 
-def refined_loads(problem: NormalProblem, loads: Array) -> Trial:
+def refined_loads(problem: Problem, loads: Array) -> Trial:
     """`refined` from loads (n,) of any solver, not negative."""
     pair, missing = completed(problem, Pair.exact(loads))
     return refined(problem, trial(problem, pair, missing, problem.product(pair)))
 
 
-def corrected(problem: NormalProblem, state: Trial) -> Trial:
-    """One Newton step on the normal map."""
+def corrected(problem: Problem, state: Trial, todo: NDArray[np.bool_]) -> Trial:
+    """One Newton step on the normal map, in the rows that are still to do."""
     loads, inside = state.loads, state.inside
     gap = state.gap.value
-    local, change = state.local, np.zeros(len(gap))
-    slopes = np.divide(1.5 * loads.high, local, out=np.zeros(len(gap)), where=inside)
+    local, change = state.local, np.zeros(gap.shape)
+    slopes = np.divide(1.5 * loads.high, local, out=np.zeros(gap.shape), where=inside)
     defect = np.where(inside, gap, np.minimum(gap, 0.0))
-    size = float(np.abs(defect).max())
-    step = size * correct(
-        problem.influence,
-        problem.shells,
-        np.sqrt(slopes),
-        defect / size,
-        balanced=problem.load is not None,
-        tolerance=REDUCTION,
-    )
+    size = largest(np.abs(defect))
+    step = size * problem.correct(slopes, defect / np.where(size > 0, size, 1.0), todo)
     # P ((1 + step / n)^(3/2) - 1) of those that touch, and all of those that begin to
-    ratio = np.divide(step, local, out=np.zeros(len(gap)), where=inside)
+    ratio = np.divide(step, local, out=np.zeros(gap.shape), where=inside)
     change[inside] = loads.high[inside] * np.expm1(1.5 * np.log1p(np.maximum(ratio[inside], -0.5)))
     left = inside & (ratio <= -0.5)
     new = np.where(inside, 0.0, np.minimum(-gap, 0.0)) + np.where(left, local, 0.0) + step
     entering = (left | ~inside) & (new > 0)
     change[left] = -loads.high[left]
-    share = new[entering] / problem.coefficients[entering]
+    share = new[entering] / np.broadcast_to(problem.coefficients, gap.shape)[entering]
     change[entering] += share * np.sqrt(share)
     following = loads + Pair.exact(change)
     gone = left & ~entering
@@ -162,29 +176,42 @@ def corrected(problem: NormalProblem, state: Trial) -> Trial:
     return trial(problem, following, missing, product)
 
 
-def completed(problem: NormalProblem, loads: Pair) -> tuple[Pair, Ball]:
+def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
     """Loads in proportion to these that add up to the prescribed total, and what they still miss.
 
     The largest makes up for what the others leave, to its rounding.
     """
     if problem.load is None:
-        return loads, Ball.exact(0.0)
+        return loads, Ball.exact(np.zeros_like(summed(loads.high)))
     if not loads.high.any():
         return loads, problem.total
     total = problem.total.mid
-    if abs(float(loads.high.sum()) - problem.load) > FITS * problem.load:
-        power = -np.frexp(loads.high.max())[1]  # of two: no factor overflows
+    if (np.abs(summed(loads.high) - problem.load) > FITS * problem.load).any():
+        power = -np.frexp(largest(loads.high))[1]  # of two: no factor overflows
         loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
-        loads = loads * (total / loads.total())
-    j = int(np.argmax(loads.high))
-    with_total = Pair(*(np.append(-x, y) for x, y in zip(loads, total, strict=True)))
-    missing = with_total.total()
+        loads = loads * (total / sums(loads))
+    missing = total - sums(loads)
+    which = np.argmax(loads.high, axis=-1, keepdims=True)
+    most = Pair(*(np.take_along_axis(part, which, -1) for part in loads)) + missing
     high, low = loads.high.copy(), loads.low.copy()
-    high[j], low[j] = loads.at(j) + missing
-    rounding = 8 * PAIR_ROUNDOFF * problem.load + (len(high) + 2) * TINY
-    return Pair(high, low), Ball.around(0.0, problem.total.radius + rounding)
+    np.put_along_axis(high, which, most.high, -1)
+    np.put_along_axis(low, which, most.low, -1)
+    rounding = 8 * PAIR_ROUNDOFF * problem.load + (high.shape[-1] + 2) * TINY
+    return Pair(high, low), Ball.around(np.zeros_like(rounding), problem.total.radius + rounding)
 
 
-def _size(state: Trial) -> float:
+def sums(values: Pair) -> Pair:
+    """Along the last axis: numbers, or (m, 1) of rows."""
+    total = values.total()
+    return total if np.ndim(values.high) == 1 else Pair(*(part[:, None] for part in total))
+
+
+def defect_of(state: Trial) -> Any:
+    """The 2-norm of how far the contact law is from holding: a number, or (m,) of rows."""
     defect = np.where(state.inside, state.gap.value, np.minimum(state.gap.value, 0.0))
-    return float(np.linalg.norm(defect))
+    return np.linalg.norm(defect, axis=-1)
+
+
+def rounding_of(state: Trial) -> Any:
+    """The 2-norm of what the residual loses: a number, or (m,) of rows."""
+    return np.linalg.norm(state.gap.radius, axis=-1)

@@ -8,7 +8,7 @@ Where nothing is known (an overflow, a divisor that may be 0) the radius is infi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, TypeAlias
@@ -207,6 +207,23 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
     """Of two balls, one for each place."""
     high, low = (np.where(condition, a, b) for a, b in zip(yes.mid, no.mid, strict=True))
     return Ball(Pair(high, low), np.where(condition, yes.radius, no.radius))
+
+
+def of_rows(function: Callable[..., Any], *values: Any) -> Any:
+    """function(array, ...) of each array that such values are made of."""
+    first = values[0]
+    if isinstance(first, np.ndarray):
+        return function(*values)
+    if isinstance(first, Ball):
+        pairs, radii = [each.mid for each in values], [each.radius for each in values]
+        return Ball(of_rows(function, *pairs), function(*radii))
+    return type(first)(*(of_rows(function, *parts) for parts in zip(*values, strict=True)))
+
+
+def joined(balls: Sequence[Ball]) -> Ball:
+    """The rows of all of them."""
+    joint: Ball = of_rows(lambda *each: np.concatenate(each), *balls)
+    return joint
 
 
 def as_ball(value: Ball | Exact) -> Ball:

@@ -17,6 +17,7 @@ from convexrough.record import Record
 from convexrough.scene import base
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.lattice import Lattice
+from convexrough.scene.layout import MANY
 from convexrough.scene.material import Material
 from convexrough.scene.neighbours import refuse_coincident
 
@@ -56,7 +57,7 @@ class Scene(Record):
             raise InputError(
                 "geometry", found=repr(self.geometry), expected='"summit" or "closest"'
             )
-        if self.geometry == "closest" and not self._scaled:
+        if self.geometry == "closest" and (len(self) <= MANY or self.lattice is None):
             refuse_coincident(self.contact_points)
 
     def __len__(self) -> int:
@@ -124,19 +125,13 @@ class Scene(Record):
                 tails[:, axis] = (exactly - Pair.exact(self.contact_points[:, axis])).high
         return frozen(tails)
 
-    @property
-    def _scaled(self) -> bool:
-        """Contact points are summits, scaled along each axis."""
-        radii = self.asperities.tip_radii
-        return bool((radii == radii[0]).all())
-
     @cached_property
     def lattice(self) -> Lattice | None:
         """The lattice of the contact points, if it is that of the summits, scaled; or None."""
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice
-        if not isinstance(self.sphere_radius, float) or not self._scaled:
+        if (radii != radii[0]).any() or not isinstance(self.sphere_radius, float):
             return None
         radius = Fraction(self.sphere_radius)
         return lattice.shrunk(radius / (radius + Fraction(float(radii[0]))))
