@@ -31,7 +31,7 @@ EXACT_BITS = 4096  # precision of `errors`: float64 minus reference, with no err
 ZERO: Balls = arb(0)
 ONE: Balls = arb(1)
 
-_exact = np.vectorize(arb, otypes=[object])
+exact = np.vectorize(arb, otypes=[object])
 _mid = np.vectorize(arb.mid, otypes=[object])
 _cube_root = np.vectorize(lambda ball: ball.root(3), otypes=[object])
 
@@ -88,9 +88,9 @@ def solve(
         radii = sphere_radius if isinstance(sphere_radius, tuple) else (sphere_radius,) * 2
         bends = np.array([ZERO if inf == R else 1 / arb(float(R)) for R in radii])
         modulus = arb(float(contact_modulus))
-        control, tips = arb(approach if load is None else load), _exact(tip_radii)
-        points, descents = _contact_points(_exact(positions), tips, bends, geometry)
-        shape = _exact(heights) - descents  # d_i = D_i - D0
+        control, tips = arb(approach if load is None else load), exact(tip_radii)
+        points, descents = _contact_points(exact(positions), tips, bends, geometry)
+        shape = exact(heights) - descents  # d_i = D_i - D0
         influence = _influence(points, modulus)
         law = _cube_root(9 / (16 * modulus * modulus) * (bends.sum() / 2 + 1 / tips))  # k_i
 
@@ -103,7 +103,7 @@ def solve(
         problem = NormalMap(
             influence[np.ix_(able, able)], law[able], shape[able], control, by_load, unit
         )
-        first = problem.begin(None if start is None else _exact(start)[able])
+        first = problem.begin(None if start is None else exact(start)[able])
         point = newton(problem, first, tolerance=unit / arb(10) ** (digits + 20))
         state = prove(problem, point, radius=unit / arb(10) ** (digits + 10))
 
@@ -211,6 +211,16 @@ def prove(problem: Map, x: Balls, *, radius: arb) -> Balls:
     return inside
 
 
+def inverse_sum(points: Balls, loads: Balls, row: int) -> arb:
+    """sum_j P_j / r_ij over the others of points (n, 2)."""
+    total = ZERO
+    for j, load in enumerate(loads):
+        if j != row and load != 0:
+            x, y = points[row] - points[j]
+            total += load / (x * x + y * y).sqrt()
+    return total
+
+
 def gaps(scene: Any, loads: Sequence[arb], approach: arb, rows: Iterable[int]) -> list[arb]:
     """k_i P_i^(2/3) + (A P)_i - D_i of some asperities of a scene, whatever the loads are."""
     return [local + sunk - shape - approach for _, local, sunk, shape in _terms(scene, loads, rows)]
@@ -228,17 +238,12 @@ def _terms(
 ) -> Iterator[tuple[arb, arb, arb, arb]]:
     """P_i, k_i P_i^(2/3), (A P)_i and d_i of some asperities."""
     modulus, bend = arb(float(scene.material.contact_modulus)), 1 / arb(float(scene.sphere_radius))
-    tips, heights = _exact(scene.asperities.tip_radii), _exact(scene.asperities.heights)
-    positions, bends = _exact(scene.asperities.positions), np.array([bend, bend])
+    tips, heights = exact(scene.asperities.tip_radii), exact(scene.asperities.heights)
+    positions, bends = exact(scene.asperities.positions), np.array([bend, bend])
     points, descents = _contact_points(positions, tips, bends, scene.geometry)
-    touching = [j for j, load in enumerate(loads) if load > 0]
     for i in rows:
         law = (9 * (bend + 1 / tips[i]) / (16 * modulus**2)).root(3)
-        sunk = ZERO
-        for j in touching:
-            if j != i:
-                x, y = points[i] - points[j]
-                sunk += loads[j] / (arb.pi() * modulus * (x * x + y * y).sqrt())
+        sunk = inverse_sum(points, loads, i) / (arb.pi() * modulus)
         local = law * loads[i].root(3) ** 2 if loads[i] > 0 else ZERO
         yield loads[i], local, sunk, heights[i] - descents[i]
 
@@ -303,4 +308,4 @@ def _solve(matrix: Balls, right: Balls, algorithm: Literal["approx"] | None = No
 
 def _pairs(values: ArrayLike, reference: Sequence[arb] | arb) -> Iterator[tuple[arb, arb]]:
     balls = [reference] if isinstance(reference, arb) else reference
-    return zip(np.atleast_1d(_exact(values)), balls, strict=True)
+    return zip(np.atleast_1d(exact(values)), balls, strict=True)

@@ -22,9 +22,9 @@ from multiprecision import (
     Balls,
     NotProved,
     _contact_points,
-    _exact,
     _influence,
     _mid,
+    exact,
     newton,
     prove,
 )
@@ -123,9 +123,9 @@ def _problem(
     touching = [i for i, load in enumerate(loads) if load > 0]
     P = np.array([loads[i] for i in touching])
     E, nu = arb(scene.material.contact_modulus), arb(scene.material.poisson_ratio)
-    tips, radius = _exact(scene.asperities.tip_radii[touching]), arb(scene.sphere_radius)
+    tips, radius = exact(scene.asperities.tip_radii[touching]), arb(scene.sphere_radius)
     points, _ = _contact_points(
-        _exact(scene.asperities.positions[touching]),
+        exact(scene.asperities.positions[touching]),
         tips,
         np.array([1 / radius, 1 / radius]),
         scene.geometry,
@@ -138,9 +138,9 @@ def _problem(
     travel = friction * (2 - nu) / (2 * (1 - nu))
     kernel = _kernel(points, _influence(points, E), nu / (2 - nu))
     total = np.array([arb(float(each)) for each in force]) / friction
-    q = _exact(np.asarray(start)[touching].reshape(-1)) / friction
+    q = exact(np.asarray(start)[touching].reshape(-1)) / friction
     X = (
-        _exact(displacement) / travel
+        exact(displacement) / travel
         if np.isfinite(displacement).all()
         else _near_the_limit(P, kernel, total)
     )

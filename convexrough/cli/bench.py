@@ -19,8 +19,8 @@ def bench(
 ) -> int:
     """Measure time and error of every solver at many sizes.
 
-    Results go to the folder bench-results unless --out names another. With --page, the results also
-    replace the text between the markers of that page, and the figures beside it.
+    Results go to the folder bench-results unless --out names another. With --page, the
+    command also replaces the text between the markers of FILE, and the figures in its folder.
     """
     from convexrough.bench import page as pages
     from convexrough.bench import suite

@@ -29,8 +29,8 @@ def compare(scene: Path, solvers: tuple[str, ...], log: Path | None, as_json: bo
     SCS and QOCO also solve the cone program, where they are installed. With --solver, only the
     named solvers are compared with Newton's method.
 
-    Exit status 3 also where a solver refuses the scene, or where two certified results contradict
-    each other: that would be a mistake in the mathematics.
+    The exit status is also 3 where a solver refuses the scene, or where two certified results
+    contradict each other, which would be a mistake in the mathematics.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named

@@ -29,8 +29,8 @@ def export(
 
     The formats cbf, json (Clarabel) and npz contain the cone program, which is equivalent to the
     contact law, and its dual, which bounds the energy; mps and npz (qpsolvers) contain the
-    quadratic program of bristles. index.json states how to convert a solution to loads, and the
-    minimum.
+    quadratic program of bristles (springs that together follow Hertz's law). index.json gives the
+    minimum, and how to convert a solution to loads.
 
     Programs go to the folder SCENE-programs unless --out names another.
     """

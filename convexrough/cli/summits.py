@@ -1,4 +1,4 @@
-"""`summits`: find the summits of a measured surface, and choose the pruning."""
+"""`summits`: find the summits of a measured surface, and recommend a pruning threshold."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def press_options(command: Command) -> Command:
 @press_options
 @map_options
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
-              help="Width in pixels of the fit of a paraboloid.")  # fmt: skip
+              help="Width in pixels of the square to which a tip is fitted.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
               help="Smallest prominence of a hill, as a fraction of Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
@@ -83,14 +83,15 @@ def summits(
     as_json: bool,
     **options: Any,
 ) -> int:
-    """Find the summits of a measured surface, and choose the pruning.
+    """Find the summits of a measured surface, and recommend a pruning threshold.
 
     SURFACE is .npy, .npz, .mat, a text file with a matrix or columns x, y, height, or an
     instrument's file. With --scene, or --radius and --approach or --load, the command presses a
-    sphere on the middle of the map and reports contacts, certificate, crowding and model error for
-    several prunings. With --whole it also presses every pixel at the same approach, for comparison.
+    sphere on the middle of the map, reports contacts, certificate, crowding and model error for
+    several values of --prune, and recommends one. With --whole it also presses every pixel at the
+    same approach, for comparison.
 
-    Exit status: 3 where the contact at the chosen pruning is not certified.
+    The exit status is 3 where the contact at the given --prune is not certified.
     """
     from convexrough.surface import report
 

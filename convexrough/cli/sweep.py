@@ -51,7 +51,7 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
     type=click.IntRange(1),
     help="Number of processes; default: all cores.",
 )
-@click.option("--summary", metavar="DIR", type=PATH, help="Print quantiles of a folder.")
+@click.option("--summary", metavar="DIR", type=PATH, help="Print quantiles of the results in DIR.")
 @out_option
 def sweep(
     sweep: Path | None,
@@ -66,8 +66,8 @@ def sweep(
 ) -> int:
     """Compute every scene of a sweep file.
 
-    Results go to the folder SWEEP-sweep unless --out names another. With --summary, print quantiles
-    of the results in a folder; with --out also write them, and figures.
+    Results go to the folder SWEEP-sweep unless --out names another. --summary DIR prints
+    quantiles of the results in DIR instead; with --out it also writes them, and figures.
 
     Exit status: 0 all rows certified; 2 wrong input; 3 some undecided; 4 some scenes failed, or a
     worker died; 130 interrupted. Completed parts are kept, and --resume continues.

@@ -114,14 +114,15 @@ def verify(
 ) -> int:
     """Check contact loads from another code.
 
-    LOADS is a table with a column load, and columns x and y or an index unless its rows are in the
-    order of the scene: text (CSV, TSV, ...), .xlsx, .mat, .npy, .npz or Parquet. It claims that
-    exactly the asperities with a load touch. A column pressure of nodes or pixels is summed at
+    LOADS is a table with a column load: text (CSV, TSV, ...), .xlsx, .mat, .npy, .npz or Parquet.
+    Columns x and y, or an index, name the asperity of each row; without them the rows are in the
+    order of the scene. The table claims that exactly the asperities with a load touch. If there is
+    a column pressure, rows are nodes or pixels, and their forces are summed at the nearest
     asperities.
 
-    Exit status: 0 only if the claimed set is proved right, every load is close enough and a
-    prescribed total agrees, and the same for shear forces; 2 wrong input; 3 otherwise; 4 no shear
-    state was found to compare with.
+    Exit status: 0 only if the claimed set is proved right, every load and shear force is close
+    enough, and prescribed totals agree; 2 wrong input; 3 otherwise; 4 no shear state was found to
+    compare with.
     """
     from convexrough.run.results import results_folder
     from convexrough.run.scene_file import read_scene

@@ -82,7 +82,8 @@ def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[ConePiece]:
     """Those of an asperity with this curve, once its indentation has become `own` > 0."""
     load = float(hertz.load(own, k))
     base = min(float(curve.load), own)
-    inner = curve.go(*_below(curve, base))[0] if base < float(curve.load) else curve
+    old, heights = ([float(each) for each in of] for of in (curve.levels, curve.heights))
+    inner = curve if base >= old[-1] else curve.go(base, float(np.interp(base, old, heights)))[0]
     s = np.array([float(each) for each in inner.levels])
     N, xi = hertz.load(s, k) / load, np.array([float(each) for each in inner.heights]) / own
     slopes = [float(each) for each in inner.slopes]
@@ -111,10 +112,3 @@ def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[ConePiece]:
             force = piece.forces()[1 if sign > 0 else 0]
             energy = piece.cost(force) + piece.energy
     return found
-
-
-def _below(curve: MemoryCurve, level: float) -> tuple[float, float]:
-    """The point of a curve at a level."""
-    s = [float(each) for each in curve.levels]
-    heights = [float(each) for each in curve.heights]
-    return level, float(np.interp(level, s, heights))

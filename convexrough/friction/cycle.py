@@ -545,12 +545,15 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
     heights[len(way) + 1], heights[-1] = bottom, top
     LOGGER.info(f"{len(way) - 1} levels of a loop")
     walk = Walk(levels, MemoryCurve.pressed(P), [(P, height) for height in heights], steps=1)
-    stepped, loaded = cycle.order == "fails" and levels.proved, contact.loads[chosen] > 0
-    found = walk.states(chosen) if stepped else states_of(levels, walk.curves, chosen)
+    if cycle.order == "fails" and levels.proved:
+        found, some = walk.states(), chosen
+    else:
+        found, some = states_of(levels, walk.curves, chosen), np.arange(len(chosen))
+    loaded = contact.loads[chosen] > 0
     mine = (found.forces, found.asperity_displacements)
     return Loop(
         chosen,
         frozen(forces),
         frozen(np.array(found.displacements[2:])),
-        *(frozen(np.where(loaded, each[2:], 0.0)) for each in mine),
+        *(frozen(np.where(loaded, each[2:, some], 0.0)) for each in mine),
     )

@@ -138,22 +138,16 @@ def rim_gap(x: Array) -> Array:
 
 def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
     """The columns of fretting.csv: a row for each touching asperity in each cycle."""
-    names = ("slip_amplitude", "gross_slip_amplitude", "mean_traction", "largest_traction")
-    cases = [(each, np.flatnonzero(each.contact.loads)) for each in worn]
-
-    def column(values: Any) -> NDArray[Any]:
-        return np.concatenate([np.asarray(values(each, here)) for each, here in cases])
-
-    return {
-        "maximum": column(lambda each, here: np.full(len(here), each.maximum)),
-        "minimum": column(lambda each, here: np.full(len(here), each.minimum)),
-        "asperity": column(lambda each, here: here),
-        "x": column(lambda each, here: each.contact.scene.asperities.positions[here, 0]),
-        "y": column(lambda each, here: each.contact.scene.asperities.positions[here, 1]),
-        "status": column(lambda each, here: each.status[here]),
-        "loss": column(lambda each, here: each.losses[here]),
-        **{name: column(lambda each, here, n=name: getattr(each, n + "s")[here]) for name in names},
-    }
+    names = ("status", "losses", "slip_amplitudes", "gross_slip_amplitudes", "mean_tractions",
+             "largest_tractions")  # fmt: skip
+    rows = list[dict[str, NDArray[Any]]]()
+    for each in worn:
+        here = np.flatnonzero(each.contact.loads)
+        x, y = each.contact.scene.asperities.positions[here].T
+        ends = {name: np.full(len(here), getattr(each, name)) for name in ("maximum", "minimum")}
+        values = {name: column[here] for name, column in each.columns(*names).items()}
+        rows.append({**ends, "asperity": here, "x": x, "y": y, **values})
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
 def _over(part: Array, whole: Array) -> Array:

@@ -109,7 +109,8 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
             high = min(high, here)
         else:
             low = max(low, here)
-        step = Fraction(value / _rate(levels, here, place))
+        rate = float(levels.at(here).rates[place]) / levels.units.force  # dn_i/dL
+        step = Fraction(value / rate)
         following = here - step
         if abs(step) <= Fraction(SETTLED) * levels.load or value == 0:
             return min(max(following, low), high)
@@ -117,12 +118,6 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
             following = (low + high) / 2
         here = _short(following)
     return here
-
-
-def _rate(levels: FrictionLevels, load: Fraction, place: int) -> float:
-    """dn_i/dL, per unit of force."""
-    level = levels.at(load)
-    return float(level.rates[place]) / levels.units.force
 
 
 def _short(load: Fraction) -> Fraction:

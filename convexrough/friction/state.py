@@ -42,11 +42,6 @@ class States(NamedTuple):
     drifts: Array
     drift_errors: Array
 
-    def restricted(self, which: Indices | None) -> States:
-        """Of some asperities."""
-        some = slice(None) if which is None else which
-        return States(*(part if part.ndim == 1 else part[:, some] for part in self))
-
     def unproved(self) -> States:
         """The same, with nothing known of the errors."""
         names = [name for name in self._fields if name.endswith("errors")]

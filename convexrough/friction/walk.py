@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.general_step import SteppedPath, Stepper, followed
 from convexrough.friction.levels import FrictionLevels, rounded
@@ -74,12 +74,12 @@ class Walk:
             return None
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)
 
-    def states(self, which: Indices | None = None) -> States:
-        """After each point, of some asperities or of all."""
-        if self.general is None:
-            found = states_of(self.levels, self.curves, which)
-            return found.unproved() if self.order == "fails" else found
-        return self.general.states.restricted(which)
+    def states(self) -> States:
+        """After each point."""
+        if self.general is not None:
+            return self.general.states
+        found = states_of(self.levels, self.curves)
+        return found.unproved() if self.order == "fails" else found
 
     def status(self) -> NDArray[np.str_]:
         """(m, N)"""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +14,10 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
 from convexrough.errors import InputError, ProofError
+from convexrough.friction.cycle import Cycle
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import indices, root
-from convexrough.friction.order import Order
+from convexrough.friction.path import LoadPath
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import Gradient, Holding, Number, control_held, levels
 from convexrough.gradients.pulled import ZERO, Moves, Part, product
@@ -30,15 +31,6 @@ from convexrough.numbers.balls import Ball
 NEWTON = 3
 
 
-class FrictionResult(Protocol):
-    """What friction makes of a contact."""
-
-    @property
-    def contact(self) -> Contact: ...
-    @property
-    def order(self) -> Order: ...
-
-
 @dataclass(frozen=True)
 class Frictional:
     """A contact with friction, and its levels by their names."""
@@ -47,7 +39,7 @@ class Frictional:
     known: FrictionLevels
 
     @classmethod
-    def of(cls, result: FrictionResult) -> Frictional:
+    def of(cls, result: ShearState | Cycle | LoadPath) -> Frictional:
         """Of a result that is a sum of levels; InputError for one of general steps."""
         if result.order == "fails":
             expected = "indentations that do not fall with the load: no sum of levels else"

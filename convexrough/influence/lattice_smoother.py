@@ -10,8 +10,8 @@ with the median for d and A by Fourier transforms, cut to those that touch: on l
 (1 + d A)^-1, on short ones 1, which the matrix is taken to be there; symmetric, and positive
 definite as  w G^2 w  is not above 1. All of it on blocks of m x m sites, m at least 2, small beside
 the Gaussian, with A the mean over pairs of blocks.
-(docs/theory/newton.md, "Many".) The constants are heuristics: conjugate gradients take more steps
-where they are wrong, and end at the same answer.
+(docs/theory/newton.md, "Many asperities".) The constants are heuristics: where they are wrong,
+conjugate gradients take more steps to the same answer.
 """
 
 from __future__ import annotations

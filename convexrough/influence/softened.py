@@ -4,8 +4,8 @@ Beyond the reach a it is 1 / r^q itself. Within, the series of 1 / r^q in t = 1 
 after t^p: a polynomial in r^2 with p continuous derivatives across the reach. (For q = 1 it is the
 potential of a charge spread over a ball of radius a as (1 - (r/a)^2)^(p-1), so that Newton's
 theorem holds.) All terms of the series are positive, so nothing cancels. Derived in
-docs/theory/operators-mesh.md, "A mesh and near pairs": "The smooth part", "How steep it
-is", "Interpolation".
+docs/theory/operators-mesh.md, "A mesh and near pairs": "The smooth part",
+"Derivatives of L", "Interpolation".
 """
 
 from __future__ import annotations

@@ -37,10 +37,9 @@ class Shares(NamedTuple):
 def scalar_shares(contact: Contact) -> Shares:
     """With the scalar kernel: how a normal solution changes with its load."""
     known = Loaded.of(contact)
+    shares = known.elastic
     if known.scope == "none":
-        return _unproved(known.elastic, known)
-    place = np.searchsorted(known.levels.candidates, known.touching)
-    shares = known.levels.top.tangent.loads[place]
+        return _unproved(shares.value, known)
     return Shares(shares.value, shares.error, known.loads, known.errors)
 
 

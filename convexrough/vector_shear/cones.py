@@ -168,7 +168,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         shares = problem.shift.shares
         if shares.max() > FIVE_CONES_LIMIT:
             raise _too_dense(problem)
-        elastic = np.hypot(*total) * problem.elastic / problem.loads
+        elastic = np.hypot(*total) * problem.elastic.value / problem.loads
         small = np.clip(elastic, 0.01 * elastic.max(), 1.0)
         energy = float((problem.loads * problem.thresholds * small**2).max())
         lift = FOUR if shares.max() <= FOUR_CONES_LIMIT else FIVE

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
-from convexrough.convex.newton_step import correct
 from convexrough.friction.levels import FrictionLevels
 from convexrough.influence import Influence, couple
 from convexrough.influence.shells import shells
@@ -127,12 +126,11 @@ class Loaded:
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
         """(n,) u and eta of the scalar law under T [force]."""
         if height < ELASTIC * self.levels.load:
-            shares = self.elastic * float(height / Fraction(self.units.force))
+            shares = self.elastic.value * float(height / Fraction(self.units.force))
             return shares, shares / self.stiffest
         top, low = self.levels.top, self.levels.at(self.levels.load - height)
-        place = np.searchsorted(self.levels.candidates, self.touching)
         u, eta = top.loads - low.loads, top.indentation - low.indentation
-        return u.value[place], eta.value[place]
+        return u.value[self.places], eta.value[self.places]
 
     def increments(self, deflections: Array) -> Array:
         """u(eta), saturated at P."""
@@ -157,20 +155,15 @@ class Loaded:
         c: Array = 1.5 * self.loads / self.thresholds
         return c
 
+    @property
+    def places(self) -> Indices:
+        """(n,) their places among the candidates of levels."""
+        return np.searchsorted(self.levels.candidates, self.touching)
+
     @cached_property
-    def elastic(self) -> Array:
-        """(n,) shares q of a vanishing T, all sticking: (H + A) q is the same everywhere."""
-        c = self.stiffest
-        y = correct(
-            self.influence,
-            self.shells,
-            np.sqrt(c),
-            -np.ones(len(c)),
-            balanced=False,
-            tolerance=1e-12,
-        )
-        shares: Array = c * y
-        return np.asarray(shares / shares.sum())
+    def elastic(self) -> Ball:
+        """(n,) shares of a vanishing T, all sticking: the loads of a small rise of the total."""
+        return self.levels.top.tangent.loads[self.places]
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
         """(n, ...) values, among zeros for all other asperities of the scene."""

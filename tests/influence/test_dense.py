@@ -8,6 +8,7 @@ import pytest
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from multiprecision import exact, inverse_sum
 from numpy.testing import assert_allclose
 from scenes import paper, rough, scattered
 
@@ -28,16 +29,8 @@ def shell_radii(points: np.ndarray) -> np.ndarray:
 def two_product(points: np.ndarray, scale: float, loads: np.ndarray) -> list[arb]:
     """A P in 60 digits, of points taken as exact."""
     ctx.dps = 60
-    x = [[arb(float(c)) for c in point] for point in points]
-    rows = []
-    for i, (xi, yi) in enumerate(x):
-        total = arb(0)
-        for j, (xj, yj) in enumerate(x):
-            if i != j:
-                apart = ((xi - xj) * (xi - xj) + (yi - yj) * (yi - yj)).sqrt()
-                total += arb(scale) / apart * arb(float(loads[j]))
-        rows.append(total)
-    return rows
+    places, forces = exact(points), exact(loads)
+    return [arb(scale) * inverse_sum(places, forces, i) for i in range(len(points))]
 
 
 @settings(max_examples=10, deadline=None)
@@ -60,14 +53,7 @@ def test_rounding_is_a_bound(seed: int, count: int) -> None:
 def sums(points: np.ndarray, loads: Pair, row: int) -> arb:
     """sum_j P_j / r_ij in 120 digits."""
     ctx.dps = 120
-    x, y = (arb(float(c)) for c in points[row])
-    total = arb(0)
-    for j in np.flatnonzero(loads.high):
-        if j != row:
-            u, v = x - arb(float(points[j, 0])), y - arb(float(points[j, 1]))
-            load = arb(float(loads.high[j])) + arb(float(loads.low[j]))
-            total += load / (u * u + v * v).sqrt()
-    return total
+    return inverse_sum(exact(points), exact(loads.high) + exact(loads.low), row)
 
 
 @settings(max_examples=40, deadline=None)
@@ -136,16 +122,11 @@ def test_sums_where_points_are_pairs() -> None:
     ctx.dps = 60
     tips = [arb(float(rho)) for rho in scene.asperities.tip_radii]
     R = arb(float(scene.sphere_radius))
-    x, y = ([arb(float(c)) * R / (R + t) for c, t in zip(column, tips, strict=True)]
-            for column in scene.asperities.positions.T)  # fmt: skip
+    points = exact(scene.asperities.positions) * np.array([[R / (R + t)] for t in tips])
     for row in range(0, len(scene), 7):
-        total = arb(0)
-        for j in range(len(scene)):
-            if j != row:
-                apart = ((x[row] - x[j]) ** 2 + (y[row] - y[j]) ** 2).sqrt()
-                total += arb(float(loads.high[j])) / apart
         middle = arb(float(found.mid.high[row])) + arb(float(found.mid.low[row]))
-        assert abs(middle - total) <= arb(float(found.radius[row]))
+        true = inverse_sum(points, exact(loads.high), row)
+        assert abs(middle - true) <= arb(float(found.radius[row]))
     assert (found.radius < 1e-26 * found.value).all()
 
 

@@ -56,14 +56,9 @@ def ball(x: Fraction) -> arb:
 
 
 def exact(points: Array, loads: Array, row: int) -> arb:
-    """sum_j P_j / r_ij."""
-    x, y = (arb(float(each)) for each in points[row])
-    total = arb(0)
-    for k in np.flatnonzero(loads):
-        if k != row:
-            u, v = x - arb(float(points[k, 0])), y - arb(float(points[k, 1]))
-            total += arb(float(loads[k])) / (u * u + v * v).sqrt()
-    return total
+    return multiprecision.inverse_sum(
+        multiprecision.exact(points), multiprecision.exact(loads), row
+    )
 
 
 def value(found: Ball, row: int) -> arb:

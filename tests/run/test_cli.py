@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from scene_files import HEXAGONAL, scene_text
 
 import convexrough as cr
+from convexrough import plots
 from convexrough.run import results
 from convexrough.run.scene_file import read_scene
 
@@ -279,7 +279,7 @@ def test_nothing_is_solved_while_writing_or_drawing(
         raise AssertionError("solved")
 
     monkeypatch.setattr(results, "write_results", after)
-    monkeypatch.setattr(Figure, "savefig", lambda self, path, **_: Path(path).touch())
+    monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
     ran = command("run", "a.toml")
     assert (ran.status, ran.err) == (0, "")
     assert (tmp_path / "a-results" / "hysteresis.svg").exists()

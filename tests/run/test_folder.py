@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from matplotlib.figure import Figure
 from scene_files import HEXAGONAL, scene_text
+
+from convexrough import plots
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "folder.json"
 
@@ -48,7 +49,7 @@ def test_names_columns_and_keys(
     command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After a deliberate change the folder of the test holds what to pin, as found.json."""
-    monkeypatch.setattr(Figure, "savefig", lambda self, path, **_: Path(path).touch())
+    monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
     (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL + "within = 0.0102", more=EVERYTHING))
     ran = command("run", "a.toml", "--out", "out", "--html")
     assert (ran.status, ran.err) == (0, "")
