@@ -4,7 +4,7 @@ With dJ = alpha'dd + kappa'd log k + sum over parts of left'dA P, d = z - (x^2 b
 with curvatures b = 1/R along each axis, or 1/(R + rho) in the geometry "closest", whose contact
 points are c = r / (1 + rho/R); k^3 = (9/16) (1/R + 1/rho) / E*^2, 1/R the mean of both axes, and
 A_ij = 1 / (pi E* |c_i - c_j|)
-(docs/theory/gradients.md, "To the scene").
+(docs/theory/gradients.md, "Derivatives by the data of a scene").
 """
 
 from __future__ import annotations
