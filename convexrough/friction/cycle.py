@@ -1,10 +1,11 @@
-"""Closed paths, repeated: steady cycles, what they cost, and their loops.
+"""Steady cycles: the friction states, energy losses and loops of closed paths that are repeated.
 
-With m+ and m- the least P + T and P - T along a closed path, T = Q / f, the memory curve passes
-through the point  L* = (m+ + m-) / 2, T* = (m+ - m-) / 2  for ever: below L* nothing slips again,
-and above it the state repeats, whatever was before. At constant load L* = P - (max - min) / 2 f,
-and the loss is 8 c_t f^2 times the error of the trapezoid rule on the curve of approach against
-load, between L* and P (docs/theory/losses.md).
+The load is P, the shear force Q, the coefficient of friction f, and T = Q / f. Let m+ and m- be the
+least P + T and the least P - T along the path. From the second cycle on, the memory curve passes
+through the point with L* = (m+ + m-) / 2 and T* = (m+ - m-) / 2. Below the load L* nothing slips
+again; above it the state repeats and does not depend on what came before. At constant load the loss
+is a multiple of the error of the trapezoid rule on the curve of approach against load, between L*
+and P (docs/theory/losses.md, where c_t is Mindlin's ratio).
 """
 
 from __future__ import annotations
@@ -44,38 +45,41 @@ from convexrough.sphere.smooth import smooth_reference
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: Cells that all fronts of a cycle together are cut into where the load varies, to share its loss
-#: out: about 0.1 %.
+#: Number of cells into which the path of the slip fronts is divided where the load varies. The loss
+#: of each asperity is then accurate to about 0.1 %.
 CELLS = 64
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cycle(Table, Plottable):
-    """A closed path of P and Q, repeated. Arrays are (n,), in the scene's order.
+    """The steady state of a closed path of load and shear force that is repeated.
 
-    contact          : pressed with the highest load of the path
-    loads, forces    : (m,) P and Q at the points of the path [force]
-    loss             : energy lost per cycle, from the second cycle on, both bodies [force length]
-    loss_first       : energy lost from the unloaded start to the end of the first cycle
-    loss_error, loss_first_error : proved bounds on |loss - solution|, infinite without proof
-    status           : "stuck" where a cycle has no slip, "partial" where a disc sticks for ever,
-        "sliding" where it slides as a whole once in each direction per cycle, "intermittent"
-        where contact is lost in the cycle, "open" where it never bears load, or "undecided"
-    slips            : [length] of gross slip, in each direction per cycle; nan where intermittent
-    stick_radii      : [length] of the disc that sticks for ever
-    slip_errors, stick_radius_errors : [length] proved bounds
-    level, force_level : L* and f T* [force]
-    balance_defect   : relative difference to the loss by the trapezoid rule; nan where P varies
-    loss_normalised  : loss / W0, W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) of the highest load
-    smooth_normalised : the same for the smooth sphere, e((max - min) / 2 f P); nan where P varies,
-        and both where nothing is loaded or the base has no smooth reference
-    displacement_amplitude : X_a, half the range of X at the points [length]
-    displacement_error : proved bound on |X_a - solution| [length], infinite without proof
-    order            : "proved" that no indentation falls with the load between L* and P, so that
-        loss and statuses are proved; "proved for one step": no loss is proved; "fails": the
-        results come from general steps
-    presses          : how many normal problems were solved
-    start            : [force] the load of the pressed contact that it starts from; 0 of none
+    Arrays with one value per asperity are (n,), in the order of the scene.
+
+    contact          : the contact, pressed with the highest load of the path
+    loads, forces    : (m,) [force] load P and shear force Q at the points of the path
+    loss             : [force length] energy lost per cycle by both bodies, from the second cycle on
+    loss_first       : [force length] energy lost from the unloaded start to the end of cycle 1
+    loss_error, loss_first_error : proved bounds on |loss - solution|; infinite without a proof
+    status           : "stuck" (no slip in the cycle), "partial" (a disc always sticks), "sliding"
+        (the whole asperity slides once in each direction per cycle), "intermittent" (contact is
+        lost in the cycle), "open" (never loaded) or "undecided"
+    slips            : [length] gross slip in each direction per cycle; nan where intermittent
+    stick_radii      : [length] radius of the disc that always sticks
+    slip_errors, stick_radius_errors : [length] proved bounds on their errors
+    level, force_level : [force] the load L* and the shear force f T* of the head of this module
+    balance_defect   : relative difference from the loss by the trapezoid rule; nan if P varies
+    loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) at the highest load P:
+        Poisson's ratio nu, shear modulus G, contact radius a_H of the smooth sphere
+    smooth_normalised : the same for the smooth sphere; nan if P varies. Both are nan if nothing is
+        loaded or the base has no smooth reference
+    displacement_amplitude : [length] half the range of the displacement at the points
+    displacement_error : [length] proved bound on its error; infinite without a proof
+    order            : "proved": no indentation decreases with the load between L* and P, so loss
+        and statuses are proved; "proved for one step": the loss is not proved; "fails": the
+        results are computed by general steps
+    presses          : number of normal problems that were solved
+    start            : [force] load of the pressed contact at the start; 0 without one
 
     >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
     >>> print(f"{cycle.loss_factor:.4f}", f"{cycle.secant_stiffness:.4g}")
@@ -116,41 +120,41 @@ class Cycle(Table, Plottable):
 
     @property
     def scene(self) -> Scene:
-        """What is pressed."""
+        """The scene of the contact."""
         return self.contact.scene
 
     @property
     def maximum(self) -> float:
-        """The largest Q [force]."""
+        """The largest shear force [force]."""
         return float(self.forces.max())
 
     @property
     def minimum(self) -> float:
-        """The least Q [force]."""
+        """The smallest shear force [force]."""
         return float(self.forces.min())
 
     @property
     def partial_slip_losses(self) -> Array:
-        """(n,) [force length] of each asperity's partial slip per cycle: as `asperity_losses`."""
+        """(n,) [force length] part of `asperity_losses` that is due to partial slip."""
         return self._shares[0]
 
     @property
     def sliding_losses(self) -> Array:
-        """(n,) [force length] of each asperity's gross slip per cycle: as `asperity_losses`."""
+        """(n,) [force length] part of `asperity_losses` that is due to gross slip."""
         return self._shares[1]
 
     @property
     def asperity_losses(self) -> Array:
-        """(n,) [force length] lost at each asperity per cycle; to about 0.1 % where P varies.
+        """(n,) [force length] energy lost at each asperity per cycle; nan where `order` fails.
 
-        There their bounds are some per cent. Takes two normal solutions for each of 64 cells there.
-        nan where order fails.
+        Where the load varies they are accurate to about 0.1 %, with bounds of some per cent, and
+        take two normal solutions for each of 64 cells.
         """
         return frozen(self.partial_slip_losses + self.sliding_losses)
 
     @property
     def asperity_loss_errors(self) -> Array:
-        """(n,) [force length] proved bounds; infinite where order is not proved."""
+        """(n,) [force length] bounds on |`asperity_losses` - solution|; infinite without order."""
         return self._shares[2]
 
     @cached_property
@@ -166,7 +170,7 @@ class Cycle(Table, Plottable):
 
     @cached_property
     def _walk(self) -> _Closed:
-        """The path through the levels of the contact."""
+        """The closed path, with the memory curves along it."""
         levels = self.contact.cached(FrictionLevels)
         pairs = zip(map(Fraction, self.loads.tolist()), self.forces.tolist(), strict=True)
         points = [(P, height_at(P, Q, self.scene)) for P, Q in pairs]
@@ -174,32 +178,32 @@ class Cycle(Table, Plottable):
 
     @property
     def force_amplitude(self) -> float:
-        """Q_a [force], half the range of Q."""
+        """[force] half the range of the shear force."""
         return (self.maximum - self.minimum) / 2.0
 
     @property
     def secant_stiffness(self) -> float:
-        """Q_a / X_a [force / length]; nan where nothing moves."""
+        """[force / length] force amplitude over displacement amplitude; nan where nothing moves."""
         moved = self.displacement_amplitude
         return self.force_amplitude / moved if moved > 0 else np.nan
 
     @property
     def loss_factor(self) -> float:
-        """W / (2 pi U), U = Q_a X_a / 2 (Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34, 954).
+        """loss / (2 pi U), U = force amplitude x displacement amplitude / 2; nan without motion.
 
-        nan where nothing moves.
+        Source: Ungar and Kerwin, J. Acoust. Soc. Am. 34 (1962) 954.
         """
         stored = self.force_amplitude * self.displacement_amplitude / 2.0
         return self.loss / (2.0 * np.pi * stored) if stored > 0 else np.nan
 
     def gradient(self, *, holding: Holding | None = None) -> Gradient:
-        """Derivatives of the loss with respect to the scene.
+        """Derivatives of the loss with respect to the scene, at constant shear forces.
 
-        holding : as in `Contact.gradient`; the forces are held, also where a displacement was
-            prescribed: `Gradient` says how to hold that; the loads, too, where they vary
+        holding : quantity kept constant, as in `Contact.gradient`. Loads that vary along the path
+            are constant, too. `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError in gross sliding where several asperities slide last, or the approach is
-        held: there is no derivative.
+        Raises InputError in gross sliding if several asperities slide last or the approach is kept
+        constant: the loss has no derivative there.
 
         >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
@@ -214,9 +218,10 @@ class Cycle(Table, Plottable):
         points: int = 200,
         asperities: ArrayLike | None = None,
     ) -> Loop:
-        """The loop through about `points` points, as many down as up, denser at the ends.
+        """The loop of force against displacement, with points denser at its ends.
 
-        asperities : indices of those whose own loops to keep, default all
+        points     : approximate number of points; half of them on each branch
+        asperities : indices of the asperities whose own loops are returned; default all
 
         Raises InputError where the load varies.
         """
@@ -225,12 +230,13 @@ class Cycle(Table, Plottable):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Loop(Table):
-    """Points of a closed loop, from the maximum to the minimum and back.
+    """Points of a closed loop, from the largest shear force to the smallest and back.
 
-    asperities : (k,) indices of those whose own loops follow
-    forces : (m,) Q [force];  displacements : (m,) X [length], both bodies
-    asperity_forces : (m, k) Q_i [force]
-    asperity_displacements : (m, k) X_i + slip_i [length]
+    asperities    : (k,) indices of the asperities whose own loops are given
+    forces        : (m,) [force] shear force
+    displacements : (m,) [length] displacement of distant points, both bodies
+    asperity_forces : (m, k) [force] shear force on each of these asperities
+    asperity_displacements : (m, k) [length] own deflection plus slip of each
 
     >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
     >>> len(loop.forces), loop.asperity_forces.shape
@@ -254,7 +260,7 @@ class Loop(Table):
 
     @property
     def area(self) -> float:
-        """[force length] of the polygon through the points: the loss, from inside."""
+        """[force length] area of the polygon through the points: a little less than the loss."""
         return float(np.trapezoid(self.forces, self.displacements))
 
 
@@ -265,12 +271,13 @@ def cycle(
     minimum: float | None = None,
     displacement: float | None = None,
 ) -> Cycle:
-    """The steady cycle between two shear forces [force]; `minimum` defaults to -maximum.
+    """The steady cycle between two shear forces at constant load.
 
-    displacement : amplitude of X [length] of a symmetric cycle, instead of its forces
+    maximum, minimum : [force] largest and smallest shear force; the minimum defaults to -maximum
+    displacement     : [length] amplitude of a symmetric cycle, in place of its forces
 
-    Raises InputError where the scene has no friction, the minimum exceeds the maximum, or either
-    exceeds f P in size, or the displacement that of gross sliding.
+    Raises InputError if the scene has no friction, the minimum exceeds the maximum, a force exceeds
+    the friction limit f P, or the displacement exceeds that of gross sliding.
 
     >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
     >>> print(f"{cycle.loss:.4g}", (cycle.status == "sliding").sum())
@@ -289,7 +296,7 @@ def cycles(
     *,
     displacement: ArrayLike | None = None,
 ) -> list[Cycle]:
-    """`cycle` for many amplitudes at once: (m,) maxima, and minima if not the negatives.
+    """The steady cycles of many amplitudes, in one computation: `cycle` with (m,) arrays.
 
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2, 0.4]))
     >>> print([f"{cycle.loss_normalised:.2g}" for cycle in several])
@@ -327,7 +334,7 @@ def _at_the_load(
     heights: Sequence[Sequence[Fraction]],
     forces: Sequence[tuple[float, float]],
 ) -> list[Cycle]:
-    """Cycles between two T each, at the load of the contact."""
+    """The cycles between two values of T each, at the load of the contact."""
     load = contact.cached(FrictionLevels).load
     paths = [[(load, T) for T in each] for each in heights]
     load_twice = np.full(2, float(load))
@@ -342,12 +349,13 @@ def steady(
     forces: ArrayLike,
     influence: Kind | None = None,
 ) -> Cycle:
-    """The steady state of a closed path of P and Q, |Q| <= f P, straight between its points.
+    """The steady state of a closed path of load and shear force, repeated.
 
-    loads, forces : (m,) P and Q at its points [force]; from the last it goes back to the first
-    influence : as in `load_path`
+    loads, forces : (m,) [force] load P and shear force Q at its points, |Q| <= f P; the path is
+        straight between points and returns from the last to the first
+    influence : compliance operator, as in `load_path`
 
-    Raises what `load_path` raises.
+    Raises the errors of `load_path`.
 
     >>> P = contact.load
     >>> settled = cr.steady(scene, loads=[P, P / 2], forces=[0.3 * P, -0.1 * P])
@@ -361,7 +369,7 @@ def steady(
 
 
 class _Closed(Walk):
-    """A closed path of m points, followed twice: the second time it is what it is for ever."""
+    """A closed path of m points that is followed twice: the second cycle is the steady one."""
 
     @classmethod
     def around(cls, levels: FrictionLevels, start: MemoryCurve, points: list[Point]) -> _Closed:
@@ -369,22 +377,22 @@ class _Closed(Walk):
 
     @property
     def once(self) -> int:
-        """m"""
+        """m, the number of points."""
         return len(self.points) // 2
 
     @property
     def steady(self) -> list[MemoryCurve]:
-        """The curves of the second time."""
+        """The memory curves of the second cycle."""
         return self.curves[self.once + 1 :]
 
     @cached_property
     def first(self) -> list[Piece]:
-        """What the front runs through on the way and the first time."""
+        """The layers that the slip front crosses before and in the first cycle."""
         return [piece for cost in self.pieces[: self.once + 1] for piece in cost]
 
     @cached_property
     def later(self) -> list[Piece]:
-        """What it runs through each time after."""
+        """The layers that the slip front crosses in every later cycle."""
         pieces = (piece for cost in self.pieces[self.once + 1 :] for piece in cost)
         return [piece for piece in pieces if piece.slope * piece.sign != 1]
 
@@ -396,12 +404,12 @@ class _Closed(Walk):
 
     @property
     def least(self) -> Fraction:
-        """The least load."""
+        """The smallest load of the path."""
         return min(load for load, _ in self.points)
 
     @cached_property
     def needed(self) -> set[Fraction]:
-        """Without those of the way there."""
+        """The loads of the levels that the steady cycle needs."""
         pieces = self.first, self.later
         return levels_needed(self.steady, pieces) | {self.stuck[0], self.least}
 
@@ -409,7 +417,7 @@ class _Closed(Walk):
 def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
 ) -> list[Cycle]:
-    """Of closed paths with these points, P and Q each, from one state on."""
+    """The steady cycles of closed paths, given by points, loads and forces, from one state."""
     levels = contact.cached(FrictionLevels)
     closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
     levels.prepare(load for each in closed for load in each.needed)
@@ -427,7 +435,7 @@ def _cycles(
 def _cycle(
     contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
 ) -> Cycle:
-    """One of them. spent : the first time, and later;  moved : X of its curves."""
+    """One cycle. spent : losses of the first and of later cycles;  moved : displacements."""
     levels, order = closed.levels, closed.order
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
@@ -501,9 +509,9 @@ def loops(
     points: int = 200,
     asperities: ArrayLike | None = None,
 ) -> list[Loop]:
-    """The loops of several cycles of one contact at constant load, which share their levels.
+    """The loops of several cycles of one contact at constant load.
 
-    points : of the loop of the widest range, about; narrower ones have fewer
+    points : approximate number of points of the widest loop; narrower ones have fewer
     asperities : as in `Cycle.loop`
 
     >>> several = cr.cycles(contact, contact.load * np.array([0.1, 0.2]))
@@ -524,7 +532,7 @@ def loops(
 
 
 def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
-    """Through the points where Q has gone by twice as much as `way` says, down and up again."""
+    """The loop through the points at which Q has changed by twice `way`, down and up again."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))

@@ -1,4 +1,4 @@
-"""`shear`: the friction state of a pressed contact under a first shear force or displacement."""
+"""`shear`: the friction state of a pressed contact under monotonic shear."""
 
 from __future__ import annotations
 
@@ -29,24 +29,27 @@ if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: A force that is short of f P by less than this part of it implies that an asperity slides.
+#: An asperity whose given force is less than the friction limit f P by less than this part of it is
+#: taken to slide.
 NEAR_SLIDING = 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearCertificate(Table):
-    """What is proved of a friction state. Arrays are (n,), in the scene's order.
+    """What is proved of a friction state under a shear force Q, at the load P and friction f.
 
-    scope  : that of the contact it starts from, or "none" where nothing is proved
-    order  : "proved": no indentation falls as the load rises from P - Q/f to P, so that statuses
+    Arrays are (n,), in the order of the scene's asperities.
+
+    scope  : scope of the certificate of the pressed contact; "none" where nothing is proved
+    order  : "proved": no indentation decreases as the load increases from P - Q/f to P, so statuses
         and bounds hold for the true state; "proved for one step": they hold for the result of one
         general step (docs/theory/without-order.md); "fails": nothing is proved
     status : "sliding" (proved to slide as a whole), "partial" (proved to keep a stick disc),
         "open" (proved to carry no load) or "undecided"
-    force_errors : [force];  slip_errors, stick_radius_errors : [length] bounds on the distance to
-        the solution
-    force_error, displacement_error : [force], [length] bounds on the errors of Q and X; 0 for the
-        prescribed one
+    force_errors : [force] bounds on |force - solution|
+    slip_errors, stick_radius_errors : [length] bounds on the errors of slips and stick radii
+    force_error, displacement_error : [force], [length] bounds on the errors of the shear force and
+        the displacement; 0 for the prescribed one
 
     >>> judged = cr.shear(contact, force=0.25 * contact.load).certificate
     >>> judged.scope, judged.holds, (judged.status == "sliding").sum().item()
@@ -69,7 +72,7 @@ class ShearCertificate(Table):
 
     @property
     def holds(self) -> bool:
-        """Every asperity is proved to slide, to stick in part, or to be open."""
+        """True if every asperity is proved to slide, to keep a stick disc, or to be open."""
         return self.scope != "none" and not bool((self.status == "undecided").any())
 
 
@@ -77,11 +80,13 @@ class ShearCertificate(Table):
 class ShearState(Table, Plottable):
     """A friction state. Arrays are (n,), in the order of the scene's asperities.
 
-    force         : Q [force];  displacement : X of the deep points, both bodies [length]
-    forces        : Q_i [force], sum Q
-    displacements : X_i + slip_i [length]: own deflection and slip, without the others' influence
+    force         : [force] shear force Q on the contact
+    displacement  : [length] relative tangential displacement of distant points of the two bodies
+    forces        : [force] shear forces on the asperities; their sum is Q
+    displacements : [length] own deflection plus slip, without the deflection caused by others
     slips         : [length] gross slip, 0 where not sliding
-    stick_radii   : c_i [length], 0 where sliding: the contact radii at the load P - Q / f
+    stick_radii   : [length] radii of the stick discs, 0 where sliding: the contact radii at the
+        load P - Q / f
 
     >>> state = cr.shear(contact, displacement=9.88e-6)
     >>> print(f"{state.force / contact.load:.3f}", (state.status == "sliding").sum())
@@ -109,7 +114,7 @@ class ShearState(Table, Plottable):
 
     @property
     def order(self) -> Order:
-        """On what statuses and bounds rest: `certificate.order`."""
+        """`certificate.order`: how far the order of indentations is proved."""
         return self.certificate.order
 
     def gradient(
@@ -122,12 +127,13 @@ class ShearState(Table, Plottable):
     ) -> Gradient:
         """Derivatives of a weighted sum of results with respect to the scene.
 
-        displacement : weight on X;  forces, slips : (n,) weights on those of the asperities
-        holding : as in `Contact.gradient`; the shear force is held, also where a
-            displacement was prescribed: `Gradient` says how to hold that
+        displacement  : weight of the displacement
+        forces, slips : (n,) weights of the forces and slips of the asperities
+        holding : quantity kept constant, as in `Contact.gradient`. The shear force is constant,
+            too; `Gradient` says how to keep a prescribed displacement constant
 
-        Raises InputError in gross sliding where several asperities slide last, or the approach is
-        held: there is no derivative.
+        Raises InputError in gross sliding if several asperities slide last or the approach is kept
+        constant: there is no derivative.
 
         >>> gradient = cr.shear(contact, force=0.25 * contact.load).gradient(displacement=1.0)
         >>> print(f"{gradient.value:.4g}", f"{gradient.force:.4g}")
@@ -139,9 +145,9 @@ class ShearState(Table, Plottable):
         return state_gradient(self, holding, **weights)
 
     def change(self, direction: Direction) -> ShearChange:
-        """How forces, slips and the displacement change, to first order, when the scene does.
+        """First-order changes of forces, slips and displacement when the scene changes.
 
-        direction : of what, by how much
+        direction : the change of the scene
 
         Raises InputError in gross sliding.
         """
@@ -156,13 +162,16 @@ def shear(
     force: float | None = None,
     displacement: float | None = None,
 ) -> ShearState:
-    """Shear a pressed contact, first loading, at constant normal load.
+    """The friction state of a pressed contact after monotonic shear at constant load P.
 
-    force [force] Q or displacement [length] X of the deep points : exactly one. A force within 16
-        roundoffs of f P is read as f P: gross sliding
+    Prescribe one of the two:
 
-    Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding) or X its
-    displacement there, and SolverError where a normal problem is not solved.
+    force        : [force] shear force Q. A force within 16 roundoffs of the friction limit f P
+        counts as f P: gross sliding
+    displacement : [length] relative tangential displacement of distant points
+
+    Raises InputError if the scene has no friction, |Q| exceeds f P, or the displacement exceeds
+    that of gross sliding; SolverError if a normal problem is not solved.
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> print((state.status == "sliding").sum(), f"{state.displacement:.3g}")
@@ -184,7 +193,7 @@ def shear(
 
 
 def one_force(what: str, value: ArrayLike | None, limit: float) -> float:
-    """A shear force that friction can bear."""
+    """The shear force as a number, checked against the friction limit."""
     given = checks.bearable(what, np.asarray(value), limit)
     if given.ndim:
         raise InputError(what, found=f"shape {given.shape}", expected="one number")
@@ -198,7 +207,7 @@ def _state(
     force: float | None,
     displacement: float | None,
 ) -> ShearState:
-    """The state at T, by levels; or, where order is seen to fail, by general steps."""
+    """The state at T = Q / f, from normal solutions; by general steps where order fails."""
     start, loaded = MemoryCurve.pressed(levels.load), contact.loads > 0
     walk = Walk(levels, start, [(levels.load, height)])
     if walk.general is not None and displacement is not None:
@@ -245,7 +254,7 @@ def _state(
 
 
 def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
-    """T at which general steps give X."""
+    """The T = Q / f at which general steps give this displacement."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
     start = MemoryCurve.pressed(levels.load)
@@ -260,17 +269,18 @@ def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
 
 
 def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> ShearCertificate:
-    """The certificate of shear forces of first loading from any source.
+    """The certificate of given shear forces after monotonic shear.
 
     forces : (n,) [force] along the shear force, in the order of the scene's asperities
-    force  : [force] their prescribed sum Q
+    force  : [force] their prescribed sum
 
-    `force_errors` are bounds on the distance to the solution. An asperity has the status of the
-    solution where its force is close enough to imply it: nearer to f P, or to what the solution
-    leaves of it, than a hundredth of f P, or than all that is left. The rest of the certificate is
-    that of the solution.
+    `force_errors` bound the distance of the given forces to the solution. An asperity keeps the
+    status of the solution where its force is close enough: where it slides, within a hundredth of
+    its friction limit; where it sticks, within what the solution leaves to that limit. Everything
+    else in the certificate is that of the solution.
 
-    Raises InputError if the scene has no friction, |Q| exceeds f P, or forces are not numbers.
+    Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
+    forces are not numbers.
 
     >>> force = 0.25 * contact.load
     >>> state = cr.shear(contact, force=force)
@@ -283,7 +293,7 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
 
 
 def against(state: ShearState, given: Array) -> ShearCertificate:
-    """The certificate of forces near a state."""
+    """The certificate of given forces (n,) [force], compared with a proved state."""
     contact = state.contact
     apart = np.abs(given - state.forces)
     errors = (apart + state.certificate.force_errors) * (1 + SAFETY)

@@ -1,9 +1,9 @@
-"""The compliance operator of points on a lattice: a convolution, by Fourier transforms.
+"""The compliance operator of points on a lattice: a convolution, computed by Fourier transforms.
 
-Free space: the smallest box of sites that holds the asperities is padded with zeros to twice its
-size, so that no asperity feels a periodic image of another. Heights and radii of the asperities do
-not matter. The rounding of the transforms is bounded in docs/theory/operators-lattice.md,
-"Rounding".
+The operator maps loads P_j to displacements sum_j A_ij P_j with A_ij = scale / r_ij. The smallest
+box of sites that holds the asperities is padded with zeros to twice its size, so that there are no
+periodic images. Heights and radii of the asperities do not matter. The rounding errors of the
+transforms are bounded in docs/theory/operators-lattice.md, "Rounding".
 """
 
 from __future__ import annotations
@@ -36,30 +36,33 @@ from convexrough.scene.neighbours import crowding, separations
 
 Made = TypeVar("Made")
 
-#: Roundoffs of one computed 1 / |i b1 + j b2| on a reduced basis, times a scale.
+#: Relative error, in roundoffs, of a computed scale / |i b1 + j b2| on a reduced basis b1, b2.
 ENTRY_ROUNDOFFS = 24
 
-#: Numbers looked at together: what a cache holds.
+#: Numbers that are processed together, chosen to fit into a processor's cache.
 CHUNK = 2**14
 
-#: A box that holds fewer asperities than this part of its sites is looked through by a k-d tree:
-#: a heuristic, which decides speed and how sharp shells are.
+#: Fill ratio of a box below which neighbours are found by a k-d tree. A heuristic: it affects speed
+#: and the tightness of the shells.
 FILLED = 0.2
 
-#: Of more asperities than this, spectra that few products need are made again for each.
+#: Number of asperities above which rarely needed spectra are not cached.
 MOST_KEPT = 2**21
 
-#: The symbol of any lattice goes as low as that of a row, -2 log 2. Decides speed only.
+#: Magnitude, rounded down, of the minimum -2 log 2 of the symbol of a row of points. The minimum of
+#: any lattice is at least as low. It affects speed only.
 LEAST_NEGATIVE = 1.386
 
 
 @dataclass(frozen=True, eq=False)
 class LatticeCoupling:
-    """From loads on some sites of a box to displacements on others.
+    """The operator from loads on some sites of a box to displacements at other sites.
 
-    sources : (n,) places in the box, row by row;  targets : (m,)
+    box     : the box of sites
+    sources, targets : (n,), (m,) indices of the sites in the box, row by row
+    scale   : A_ij r_ij
     spacing : [length] the shortest distance of two sites
-    site_error : [spacing] bound on how far the difference of two points is from that of their sites
+    site_error : [spacing] bound on |(x_i - x_j) - (s_i - s_j)| for points x and their sites s
     """
 
     box: SiteBox
@@ -76,8 +79,8 @@ class LatticeCoupling:
         return product
 
     def rounding(self, loads: Array) -> Rounding:
-        # Points off their sites change 1/r by site_error / r^2 at most; the sum of that over a row
-        # bounds the effect on the 2-norm and on the largest.
+        # Points that deviate from their sites change 1/r by at most site_error / r^2. The sum of
+        # that over a row bounds the effect on the 2-norm and on the largest component.
         kernel, off = self._kernel, self._displaced
         size, largest = float(np.linalg.norm(loads)), float(np.abs(loads).max(initial=0.0))
         norm = self.box.bound(kernel, ROUNDOFF) * size + off * size
@@ -86,7 +89,7 @@ class LatticeCoupling:
         return Rounding(relative, self._unit * norm, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """In single precision, with a bound on its rounding added."""
+        """Computed in single precision; a bound on the rounding error is added."""
         kernel = self.box.kernel(power, np.float32)
         largest = float(strengths.max(initial=0.0)) or 1.0
         shares = (strengths / largest).astype(np.float32)
@@ -97,17 +100,17 @@ class LatticeCoupling:
 
     @property
     def _unit(self) -> float:
-        """A_ij of nearest neighbours."""
+        """The entry A_ij of nearest neighbours."""
         return self.scale / self.spacing
 
     @property
     def _least(self) -> float:
-        """[spacing] the least that the shortest distance of two points can be."""
+        """[spacing] lower bound on the shortest distance of two points."""
         return 1.0 - min(self.site_error, 0.5)
 
     @property
     def _displaced(self) -> float:
-        """[1 / spacing] norm of what points off their sites change 1/r by, by its row sums."""
+        """[1 / spacing] bound on the norm of the change of 1/r by deviations from the sites."""
         return self.site_error / self._least * self._kernel.norm**2
 
     @cached_property
@@ -125,14 +128,14 @@ class LatticeCoupling:
         return self.box.convolve(self._laid_out(values), spectrum).ravel()[self._padded[1]]
 
     def _laid_out(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Among zeros, in the box as wide as the transforms."""
+        """The values at the sources, zeros elsewhere, in rows as long as the transforms."""
         field = np.zeros((self.box.shape[0], self.box.padded[1]), dtype=values.dtype)
         field.ravel()[self._padded[0]] = values
         return field
 
     @cached_property
     def _padded(self) -> tuple[Indices, Indices]:
-        """`sources` and `targets` where each row of the box is as long as the transforms."""
+        """`sources` and `targets` as indices into rows as long as the transforms."""
         (_, columns), (_, width) = self.box.shape, self.box.padded
         sources = self.sources + self.sources // columns * (width - columns)
         if self.targets is self.sources:
@@ -142,10 +145,12 @@ class LatticeCoupling:
 
 @dataclass(frozen=True, eq=False)
 class LatticeInfluence(LatticeCoupling):
-    """The coupling among asperities on a lattice.
+    """The compliance operator of asperities on a lattice.
 
-    array  : (N, 2) [length] points, off by `point_error` at most;  members : (n,) which of them
-    layout : where they are exactly, but for a factor by which `lattice` is smaller than its own
+    array       : (N, 2) [length] points, with errors of at most `point_error`
+    members     : (n,) indices into `array` of these asperities
+    layout      : the exact points, up to the factor by which `lattice` is smaller than its lattice
+    lattice     : the lattice of the points
     """
 
     array: Array
@@ -160,7 +165,7 @@ class LatticeInfluence(LatticeCoupling):
 
     @classmethod
     def assemble(cls, points: Array, lattice: Lattice, scale: float) -> LatticeInfluence:
-        """Raises ValueError where the points are not on the lattice."""
+        """The operator of points (n, 2) [length] on the lattice. Raises ValueError if not on it."""
         places = lattice.sites(points)
         if places is None:
             raise ValueError("points off the lattice")
@@ -177,7 +182,7 @@ class LatticeInfluence(LatticeCoupling):
         scale: float,
         point_error: float = 0.0,
     ) -> LatticeInfluence:
-        """Where the places are known."""
+        """The operator of some members of a layout whose sites are known."""
         assert layout.sites is not None
         box, index = _boxed(lattice, layout.sites[members])
         spacing = lattice.spacing
@@ -201,7 +206,7 @@ class LatticeInfluence(LatticeCoupling):
 
     @property
     def points(self) -> Array:
-        """(n, 2) [length]"""
+        """(n, 2) [length] the points of these asperities."""
         return self.array[self.members]
 
     @property
@@ -217,7 +222,7 @@ class LatticeInfluence(LatticeCoupling):
 
     @property
     def places(self) -> Sites:
-        """(n, 2) i and j of each."""
+        """(n, 2) site (i, j) of each asperity."""
         assert self.layout.sites is not None
         return self.layout.sites[self.members]
 
@@ -235,7 +240,7 @@ class LatticeInfluence(LatticeCoupling):
 
     @property
     def _filled(self) -> bool:
-        """Whether a neighbouring site is mostly taken."""
+        """True if the fill ratio of the box is above `FILLED`."""
         return len(self) > FILLED * self.box.shape[0] * self.box.shape[1]
 
     def slopes(self, loads: Array) -> Array:
@@ -244,7 +249,7 @@ class LatticeInfluence(LatticeCoupling):
 
     @property
     def _pulls(self) -> list[Kernel]:
-        """d / |d|^3 in both directions, in units of the spacing."""
+        """Kernels d_x / |d|^3 and d_y / |d|^3 of the distance vector d, in units of the spacing."""
         return self._cached("pulls", lambda: pulls(self.box, cubed))
 
     def separations(self) -> Array:
@@ -254,7 +259,7 @@ class LatticeInfluence(LatticeCoupling):
         return even(nearest, len(self))
 
     def crowding(self, radii: Array) -> float:
-        """Pairs in the order of their distance, until none further apart can be more crowded."""
+        """The largest over pairs of sites; nearer pairs come first, and most are skipped."""
         if not self._filled:
             return crowding(self.points, radii)
         field = np.full(self.box.shape, -np.inf)
@@ -267,28 +272,29 @@ class LatticeInfluence(LatticeCoupling):
         return worst
 
     def _pairs(self) -> Iterator[tuple[float, int, int]]:
-        """`neighbours`, and no more than the distance of points that far apart."""
+        """Pairs of sites as in `neighbours`, with a lower bound on the distance of their points."""
         for on_sites, i, j in neighbours(self.box):
             yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
 
     def semidefinite_with(self, radius: float) -> bool:
-        """By the minimum of the lattice's symbol, and the distances of points from their sites."""
+        """True if the minimum of the symbol, less the effect of deviations, proves it."""
         if radius * LEAST_NEGATIVE > self.spacing:
             return False
         least = self.lattice.cached(_least_symbol) - self._displaced
         return -least * radius * (1.0 + SAFETY) <= self.spacing
 
     def sums(self, loads: Pair, slices: int = SLICES) -> Ball:
-        """By docs/theory/operators-lattice.md, "Slices".
+        """(n,) sum_j P_j / r_ij [force / length], with many more digits than `apply`.
 
-        slices : of loads and of the kernel, of 10 to 18 bits each
+        slices : number of slices of loads and kernel, of 10 to 18 bits each: the method of
+            docs/theory/operators-lattice.md, "Slices"
         """
         off_sites = self._off_sites(np.asarray(loads.high))
         sliced = self._cached(slices, lambda: self._slice(slices))
         return sliced.sums(loads, self._padded[0], *off_sites)
 
     def _cached(self, name: object, make: Callable[[], Made]) -> Made:
-        """Spectra for other products, too, unless they are so large that memory matters more."""
+        """The object of this name, cached for later products unless it is too large."""
         found: Made = self._spectra[name] if name in self._spectra else make()
         if len(self) <= MOST_KEPT:
             self._spectra[name] = found
@@ -306,12 +312,15 @@ class LatticeInfluence(LatticeCoupling):
         return Sliced.of(self.box, distances, norm, unit, count)
 
     def _off_sites(self, loads: Array) -> tuple[Array, float]:
-        """Change of sum_j P_j / r_ij by points off their sites, and a bound on its error.
+        """Change of sum_j P_j / r_ij by deviations from the sites, and a bound on its error.
 
-        With eps_i the distance of a point from its site, and eta >= |eps_i - eps_j| for all i, j,
+        With the deviation eps_i of a point from its site, eta >= |eps_i - eps_j| for all i and j,
+        and the distance vector d of two sites (docs/theory/operators-lattice.md, "Points off their
+        sites"),
 
-            1 / |d + eps_i - eps_j|  =  1 / |d| - (eps_i - eps_j) d / |d|^3,  but for
-            eta^2 / (|d| - eta)^3:  docs/theory/operators-lattice.md, "Points off their sites".
+            1 / |d + eps_i - eps_j| = 1 / |d| - (eps_i - eps_j) . d / |d|^3
+
+        with an error of at most eta^2 / (|d| - eta)^3.
         """
         x, y, unknown = self.layout.cached(off_sites)
         shrunk = float(self.lattice.shrink)
@@ -334,7 +343,7 @@ class LatticeInfluence(LatticeCoupling):
         change = fields[2].ravel()[targets]
         change -= x * fields[0].ravel()[targets]
         change -= y * fields[1].ravel()[targets]
-        # By |P| at most, |r| times 1 / r^2 and for the second order 1 / r^3, as in `rounding`.
+        # The kernel norm bounds the row sums of 1 / r^2, as in `rounding`, and those of 1 / r^3.
         whole = self._kernel.norm**2 / self._least**2
         norm = math.hypot(*(kernel.norm for kernel in pulls))
         error = 2.0 * each_loss(self.box, 2) * norm * most * float(np.linalg.norm(shares))
@@ -349,7 +358,7 @@ class LatticeInfluence(LatticeCoupling):
 
 
 def _largest_sum(field: Array, i: int, j: int) -> float:
-    """Of all pairs of sites that are i rows and j columns apart, some rows at a time; or 0."""
+    """The largest sum of the values of two sites i rows and j columns apart; at least 0."""
     here, there = field[i:], field[: len(field) - i]
     if j >= 0:
         here, there = here[:, j:], there[:, : there.shape[1] - j]
@@ -366,9 +375,10 @@ def _largest_sum(field: Array, i: int, j: int) -> float:
 
 
 def off_sites(layout: Layout) -> tuple[Array, Array, float]:
-    """(N,) and (N,) [length] x and y distances of points from sites, up to a shift; their error.
+    """(N,), (N,) [length] x and y deviations of points from their sites, and their error bound.
 
-    x - o - i b1 - j b2: sums and products are exact, but for what is left of them.
+    A deviation is x - o - i b1 - j b2 with the origin o and the basis b1, b2 of the lattice. It is
+    computed in double-double arithmetic and rounded at the end.
     """
     assert layout.lattice is not None
     assert layout.sites is not None
@@ -396,7 +406,7 @@ def _least_symbol(lattice: Lattice) -> float:
 
 
 def _boxed(lattice: Lattice, places: Sites) -> tuple[SiteBox, Indices]:
-    """The smallest box, and where in it each place is."""
+    """The smallest box that holds these sites, and the (n,) index of each site in it."""
     basis = lattice.basis / lattice.spacing
     if len(places) == 0:
         return SiteBox((1, 1), basis), np.zeros(0, dtype=np.intp)
@@ -407,7 +417,7 @@ def _boxed(lattice: Lattice, places: Sites) -> tuple[SiteBox, Indices]:
 
 
 def _extent(places: Sites, middle: Array, basis: Array) -> float:
-    """No two places are further apart: twice the largest distance from the middle, and a little."""
+    """Upper bound on the distance of two sites: twice the largest distance from the middle."""
     (g11, g12), (_, g22) = basis @ basis.T
     largest = 0.0
     for start in range(0, len(places), CHUNK):

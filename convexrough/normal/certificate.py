@@ -1,8 +1,8 @@
 """The certificate: what is proved about given loads, in the units of the scene.
 
-Every bound holds for the exact solution of the scene whose data are the given float64 numbers. The
-way there: the contact law on balls (`refine`), a box and the theorem (`proved`), and here how far
-the given loads are from the solution that was proved.
+Every bound holds for the exact solution of the scene whose data are the given float64 numbers.
+`refine` evaluates the contact law in ball arithmetic, `proved` applies the theorem on a box of
+loads, and this module bounds the distance from the given loads to the proved solution.
 """
 
 from __future__ import annotations
@@ -36,33 +36,36 @@ STATUSES = np.array(["undecided", "contact", "open"])
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(Table):
-    """What is proved about given loads. Arrays are (n,), in the caller's order.
+    """What is proved about given loads. Arrays are (n,), in the order of the given loads.
 
-    scope : "global": the scene has exactly one solution, and the bounds are on the distance to it;
-        "local": it has exactly one solution with contact radii near these (`meaning` describes the
-        others that are possible), and the bounds are on the distance to that one;
-        "none": nothing is proved, every bound is infinite and every asperity undecided
-    convexity_number : where below 1, the energy is strictly convex on the box used: the smallest
-        eigenvalue of its Hessian, scaled by its local part, is at least 1 - convexity_number
+    The solution is the one that `scope` names.
+
+    scope : "global": the scene has exactly one solution; "local": it has exactly one solution with
+        contact radii near these (`meaning` describes the others that are possible); "none":
+        nothing is proved, every bound is infinite and every asperity is undecided
+    convexity_number : below 1 the energy is strictly convex on the box of loads that was used: the
+        smallest eigenvalue of its Hessian, scaled by its local part, is at least
+        1 - convexity_number
     status : "contact" (its load is proved positive), "open" (its gap is proved positive) or
         "undecided"
     load_errors : [force] bounds on |load - solution|
-    gaps : [length] gaps these loads leave: max(0, (A P)_i - D_i)
+    gaps : [length] gaps that remain under these loads; 0 where an asperity touches
     gap_errors : [length] bounds on |gap - solution|
-    approach : [length] prescribed, or the one that fits the loads best
+    approach : [length] the prescribed approach, or the one that fits the loads best
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
-    duality_gap : [force length] bound on the excess energy of these loads over the minimum, from
-        a dual point or the slope of the convex energy; 0 up to rounding at a solution,
-        infinite where nothing is proved. Under load control it is that of the scaled loads
+    duality_gap : [force length] upper bound on the excess energy of these loads over the minimum:
+        0 up to rounding at a solution, infinite where nothing is proved. If the total load is
+        prescribed, it is the gap of the loads scaled to that total
 
     fixed_open : number of asperities fixed open for the proof, and then proved to be open; 0 unless
         contacts are crowded. The solution is then the only one near it with these open
-    other_solutions_crowding : any other solution has a larger crowding, the largest
-        (a_i + a_j) / r_ij over all asperities that could touch, open ones with a = 0; infinite
-        where there is no other, 0 where nothing is known
-    other_solutions_cover : in any other solution a disc covers the summit of its nearest neighbour
+    other_solutions_crowding : every other solution has a larger crowding than this; infinite where
+        there is no other solution, 0 where nothing is known. The crowding is the largest sum of
+        two contact radii over the distance of their asperities
+    other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
+        its nearest neighbour
     in_the_way : (m,) asperities that prevent a proof; empty where there is one
-    obstacle : the reason, as a sentence
+    obstacle : why they prevent it, as a sentence
 
     >>> judged = contact.certificate
     >>> judged.scope, judged.holds, judged.load_error < 1e-12 * contact.load
@@ -137,12 +140,12 @@ def certify(
     load: float | None = None,
     influence: Kind | None = None,
 ) -> Certificate:
-    """The certificate of loads from any source.
+    """The certificate of given loads.
 
     loads : (n,) [force], not negative, in the order of the scene's asperities
-    approach [length] or load [force] : the prescribed quantity, exactly one. Loads are scaled to a
-        prescribed total; the bounds include that.
-    influence : compliance operator: "dense", "lattice", "scattered"; None for the cheapest
+    approach, load : [length], [force] the prescribed quantity, exactly one of the two. Loads are
+        scaled to a prescribed total, and the bounds include the effect of that
+    influence : compliance operator "dense", "lattice" or "scattered"; None for the cheapest
 
     Raises InputError for loads of the wrong length, negative or not finite.
 
@@ -157,7 +160,7 @@ def certify(
 
 
 def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
-    """`certify` for an assembled problem; loads (n,) [force] of the whole scene."""
+    """The certificate of loads (n,) [force] of the whole scene, for an assembled problem."""
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
         expected = "a load on some asperity that could touch, as the total is prescribed"
@@ -177,7 +180,7 @@ def certificate_of(
 ) -> Certificate:
     """The certificate of loads (n,) [force] of the whole scene, from a solution proved near them.
 
-    start : these loads among the candidates, scaled to a prescribed total
+    start : the loads of the asperities that can touch, scaled to a prescribed total
     """
     length, force = problem.units.length, problem.units.force
     screened = _screened(problem, start)
@@ -232,7 +235,10 @@ def certificate_of(
 
 
 def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Array) -> float:
-    """Phi(P) - Phi(P*) <= e'|P - P*|, where the energy is convex between the two."""
+    """Bound on the excess energy: Phi(P) - Phi(P*) <= e'|P - P*| where Phi is convex between.
+
+    P are the loads, P* the solution, and e the residuals of the contact law at P.
+    """
     most = np.maximum(found.box.loads, start.loads.high * (1 + SAFETY))
     if (
         not found.box.problem.convexity_at(problem.stiffness(most)) < 1
@@ -245,11 +251,11 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
 
 
 class _Screened(NamedTuple):
-    """The asperities that cannot touch."""
+    """The asperities that cannot touch, and their negative gaps."""
 
     which: Indices  # in the scene
-    coupling: Coupling | None  # from the candidates; None if there are no others
-    indentation: Array  # D - A P
+    coupling: Coupling | None  # from the asperities that can touch; None if there are no others
+    indentation: Array  # prescribed approach less displacement
     rounding: Array  # bound on its error
 
 
@@ -271,9 +277,10 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on what loads on asperities that cannot touch add to the energy, in own units.
+    """Bound on the energy due to given loads on asperities that cannot touch, in own units.
 
-    Of loads s besides P:  sum (3/5) k s^(5/3) + (A P - D)'s + s'A s / 2,  where A P - D >= 0.
+    Loads s on these add  sum (3/5) k s^(5/3) + g's + s'A s / 2,  with their gaps g >= 0, the local
+    coefficients k and the compliance operator A.
     """
     screened = loads.copy()
     screened[problem.candidates] = 0.0

@@ -1,8 +1,10 @@
-"""The solution near trial loads, proved by the theorem of `convex.theorem` on a box.
+"""The proof that a solution exists near trial loads, and bounds on its distance.
 
-The way from a residual to a bound on each load, in order: a box on which the energy is convex
-(`boxes`), the theorem on it, the theorem again on the small box that then holds the solution, and
-from there the approach, the indentations and, through these, the loads once more.
+The steps: choose a box of loads on which the energy is convex (`boxes`); apply the theorem of
+`convex.theorem` on it; apply the theorem again on the smaller box that the result proves to hold
+the solution; bound the approach and the indentations; and bound the loads again through the
+indentations. Symbols are those of docs/theory/certificate.md: loads P, approach D0, compliance
+operator A, local Hessian H; a star marks the solution.
 """
 
 from __future__ import annotations
@@ -26,11 +28,11 @@ from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 
-#: Boxes of touching asperities that are tried: larger ones where the solution may lie outside, and
-#: with asperities added that are not proved open. Heuristics, as is the room that a box leaves.
+#: Number of boxes of touching asperities that are tried, and the factor by which a box exceeds the
+#: last error bounds. Each is larger than the last, or has more asperities. Heuristics.
 ATTEMPTS, ROOM = 6, 2.0
 
-#: Loads known to fewer digits than this are also bounded through their indentations.
+#: Relative error above which loads are also bounded through their indentations.
 POOR = 2.0**-60
 
 NONE = np.zeros(0, dtype=np.intp)
@@ -41,7 +43,7 @@ NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
 
 class Obstacle(NamedTuple):
-    """The reason why nothing is proved, and the candidates that cause it."""
+    """The reason why nothing is proved, and the indices of the candidates that cause it."""
 
     reason: str
     which: Indices
@@ -49,13 +51,15 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Proved:
-    """The solution, as balls over the candidates, in own units.
+    """A proved solution, as balls over the n candidates (asperities that may touch), in own units.
 
-    trial    : the loads that it was proved from
-    box      : in which there is exactly one solution
-    distance : bound on || P - P* ||_H of the trial loads;  stiffness : (n,) the diagonal of H
-    loads, indentation : (n,) P and D0 + d - A P, an indentation, or minus a gap
-    approach : D0
+    trial     : the loads P from which it was proved
+    box       : a box of loads that holds exactly one solution
+    distance  : bound on || P - P* ||_H
+    stiffness : (n,) diagonal of H
+    loads     : (n,) the loads of the solution
+    indentation : (n,) its indentations; negative values are gaps
+    approach  : its approach
     """
 
     problem: NormalProblem
@@ -69,23 +73,23 @@ class Proved:
 
     @cached_property
     def touching(self) -> NDArray[np.bool_]:
-        """(n,) proved to carry a load."""
+        """(n,) True where an asperity is proved to carry a load."""
         return self.indentation.positive | self.loads.positive
 
     @cached_property
     def open(self) -> NDArray[np.bool_]:
-        """(n,) proved to have a gap."""
+        """(n,) True where an asperity is proved to have a gap."""
         return self.indentation.negative
 
     @property
     def total(self) -> Ball:
-        """The sum of the loads; Cauchy's inequality bounds its error better than the terms do."""
+        """The sum of the loads, with an error bound by Cauchy's inequality."""
         trial = Ball.exact(self.trial.loads).sum()
         spread = self.distance * math.sqrt(float((1.0 / self.stiffness).sum())) * (1 + SAFETY)
         return Ball.around(trial.mid, trial.radius + spread + float(self.trial.missing.size))
 
     def moves(self, coupling: Coupling) -> Array:
-        """(m,) bounds on how far A (P - P*) is from 0 at other points."""
+        """(m,) bounds on |A (P - P*)| at the targets of a coupling."""
         missing = self.trial.missing.size * self.problem.largest_entry
         reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.stiffness)
         return np.asarray((self.distance * reach + missing) * (1 + SAFETY))
@@ -94,10 +98,10 @@ class Proved:
 def proved(
     problem: NormalProblem, state: Trial, boxes: Iterator[Box] | None = None
 ) -> Proved | Obstacle:
-    """The solution in the first box that is proved to hold it.
+    """The solution in the first box that is proved to hold it, or the obstacle to a proof.
 
-    boxes : to try first, of all candidates; default `boxes.tried`. Where none holds the solution,
-        those of the touching candidates alone are tried, all others being open.
+    boxes : boxes of all candidates to try first; default `boxes.tried`. If none of them is proved
+        to hold the solution, boxes with only the touching candidates are tried, others fixed open
     """
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
@@ -125,7 +129,7 @@ def proved(
 
 
 def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
-    """The solution, or a bound on the error of the loads where it may leave the box."""
+    """The solution in this box, or (n,) bounds on load errors that are too large for the box."""
     at_first = errors_in(problem, box, state)
     if not stays_in(box, state, at_first):
         return at_first
@@ -134,13 +138,13 @@ def _in_box(problem: NormalProblem, box: Box, state: Trial) -> Proved | Array:
 
 
 def stays_in(box: Box, state: Trial, errors: Array) -> Any:
-    """Whether the solution is in the box, where loads are known to within errors."""
+    """True if loads with errors of at most these (n,) stay inside the box."""
     inside = (state.loads.high + errors < box.faces) & np.isfinite(errors)
     return inside.all(axis=-1)
 
 
 def errors_in(problem: Problem, box: Box, state: Trial) -> Array:
-    """(n,) bounds on the errors of trial loads, if the box holds the solution."""
+    """(n,) bounds on the errors of the trial loads, valid if the box holds the solution."""
     missing = _Missing.of(problem, state)
     residual = missing.added_to(state.excess, box.fixed_open)
     within = distance(residual, box.stiffness, 1.0 - box.convexity_number)
@@ -148,7 +152,7 @@ def errors_in(problem: Problem, box: Box, state: Trial) -> Array:
 
 
 def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Known:
-    """The solution, from trial loads whose errors are known: by the theorem on a small box."""
+    """The solution, by the theorem on the small box given by bounds on the errors of loads."""
     missing = _Missing.of(problem, state)
     residual = missing.added_to(state.excess, box.fixed_open)
     near = np.minimum(box.loads, (state.loads.high + at_first) * (1 + SAFETY))
@@ -156,7 +160,7 @@ def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Kn
     margin = 1.0 - np.minimum(box.convexity_number, box.problem.convexity_at(h))
     within = distance(residual, h, margin)
     errors = missing.errors(within, h)
-    # A (P - P*) by Cauchy's inequality
+    # Bound A (P - P*) by Cauchy's inequality.
     softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
     moved = (within / np.sqrt(softest) * problem.row_norm + missing.effect) * (1 + SAFETY)
     shift = _approach_error(problem, state, errors, moved)
@@ -178,9 +182,12 @@ class Known(NamedTuple):
 
 
 class _Missing(NamedTuple):
-    """A missing part of the total, put on the largest load.
+    """The part of the total load that the trial loads lack; it is added to the largest load.
 
-    effect : bound on what it adds to each gap;  own : to the gap where it is put;  size : of it
+    size   : bound on this part
+    effect : bound on its contribution to every gap
+    place  : index of the largest load
+    own    : bound on its further contribution to the gap there
     """
 
     size: Any
@@ -200,12 +207,12 @@ class _Missing(NamedTuple):
         return cls(missing, missing * problem.largest_entry, place, own)
 
     def added_to(self, excess: Array, fixed_open: NDArray[np.bool_]) -> Array:
-        """The residual of the theorem."""
+        """(n,) bounds on the residuals that enter the theorem."""
         residual = np.where(fixed_open, 0.0, excess + self.effect)
         return self._with(residual, self.own)
 
     def errors(self, within: Any, stiffness: Array) -> Array:
-        """(n,) of the loads."""
+        """(n,) bounds on the errors of the loads."""
         return self._with(within / np.sqrt(stiffness) * (1 + SAFETY), self.size)
 
     def _with(self, values: Array, more: Any) -> Array:
@@ -216,7 +223,7 @@ class _Missing(NamedTuple):
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
-    """Loads that are poorly known also as (n / k)^(3/2) of their indentations n."""
+    """Loads, with poorly known ones also computed as (n / k)^(3/2) of their indentations n."""
     which = np.nonzero(loads.radius > POOR * loads.mid.high)
     if len(which[0]) == 0:
         return loads

@@ -1,7 +1,7 @@
-"""A contact as a program in standard form, for anybody's solver: in memory and as files.
+"""Contact problems as convex programs in standard form, for other solvers.
 
-`cr.program(scene, approach=...)` makes one, its `save` writes it for other libraries, and
-`convexrough export SCENE` writes all that a scene has.
+`cr.program(scene, approach=...)` returns one, its method `save` writes it to a file, and
+`convexrough export SCENE` writes all programs of a scene.
 """
 
 from convexrough.programs.program import FORMS, Program, program

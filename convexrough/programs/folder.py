@@ -1,4 +1,4 @@
-"""All programs of a scene as files in one folder, with an index."""
+"""Write all programs of a scene to one folder, with an index."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton
 from convexrough.version import __version__
 
-#: Endings of the files, and what reads them.
+#: File endings, with the contents and the programs that read them.
 FORMATS = {
     "cbf": "cones and their dual in the Conic Benchmark Format: MOSEK, PICOS, SCIP-SDP, ...",
     "json": "the same for clarabel.load_from_file",
@@ -34,10 +34,14 @@ def write_programs(
     formats: Collection[str] = tuple(FORMATS),
     bristles: int = 64,
 ) -> tuple[list[Path], dict[str, Any]]:
-    """Write name.form.ending for each form and format, and last index.json; return both.
+    """Write NAME.FORM.ENDING for each form and format, then index.json; return paths and index.
 
-    A program is left out, with the reason in the index, where it is not the contact law. Raises
-    InputError with all reasons where nothing is left, and FileError.
+    approach, load : [length], [force] the prescribed quantity, exactly one of the two
+    formats        : some of `FORMATS`
+    bristles       : number of bristles per asperity
+
+    A program that would not be equivalent to the contact law is left out; the index says why.
+    Raises InputError, with all reasons, if no program remains, and FileError.
     """
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     own = Newton().solve(problem).loads

@@ -1,7 +1,7 @@
-"""Programs as files of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF, and MPS.
+"""File formats of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF and MPS.
 
-CBF is written here: of the Python packages that write it, MOSEK and COPT are commercial, and that
-of PICOS (2.6) fails on every problem. What is written is read back by each library in the tests.
+CBF has its own writer here: among the Python packages that write it, MOSEK and COPT are commercial,
+and PICOS (2.6) fails on every problem. The tests read each format back with its library.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 
 def qpsolvers_npz(program: QuadraticProgram) -> bytes:
-    """What qpsolvers.Problem.load reads: min x'Px/2 + q'x, G x <= h, A x = b; dense, compressed.
+    """The file for qpsolvers.Problem.load: min x'Px/2 + q'x with G x <= h and A x = b, dense.
 
-    Rows with two equal sides are the equations; the others have a lower side alone.
+    Rows whose two bounds are equal become equations; all other rows have a lower bound only.
     """
     width, height = len(program.linear), len(program.lower)
     checks.fits_in_memory("asperities", 1, 24.0 * width * (width + height))
@@ -48,7 +48,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
 
 
 def clarabel_json(program: ConeProgram) -> bytes:
-    """What clarabel.load_from_file reads; its Python package (0.11) has nothing that writes it."""
+    """The file for clarabel.load_from_file; Clarabel's package (0.11) has no writer."""
     data = {
         "P": _columns(program.quadratic),
         "q": program.linear.tolist(),
@@ -74,9 +74,10 @@ def _columns(matrix: csc_matrix) -> dict[str, Any]:
 
 
 def cone_npz(program: ConeProgram) -> bytes:
-    """The parts of a cone program, each sparse matrix by columns as scipy's `csc_array` takes it.
+    """The file with the arrays of a cone program.
 
-    P_data, P_indices, P_indptr (upper triangle); likewise A; q, b; and `equalities`.
+    P_data, P_indices and P_indptr are the arguments of scipy's `csc_array` for the upper triangle
+    of P; A_data, A_indices and A_indptr those for A. q, b and `equalities` are as in the program.
     """
     parts: dict[str, Any] = {}
     for name, matrix in (("P", program.quadratic), ("A", program.constraints)):
@@ -90,10 +91,10 @@ def cone_npz(program: ConeProgram) -> bytes:
 
 
 def mps(program: QuadraticProgram) -> bytes:
-    """Free MPS with the section QUADOBJ, as HiGHS, Gurobi, CPLEX and others read it.
+    """The file in free MPS with a section QUADOBJ, which HiGHS, Gurobi and CPLEX read.
 
-    Rows with two equal sides are equations; the others have a lower side alone. No variable has
-    bounds of its own.
+    Rows whose two bounds are equal become equations; all other rows have a lower bound only.
+    Variables are free.
     """
     equal = program.lower == program.upper
     quadratic, constraints = program.quadratic.tocoo(), program.constraints.tocsc()
@@ -115,13 +116,13 @@ def mps(program: QuadraticProgram) -> bytes:
 
 
 def cbf(program: ConeProgram) -> bytes:
-    """The program in the Conic Benchmark Format, version 1, with a linear objective.
+    """The file in the Conic Benchmark Format, version 1, whose objective is linear.
 
-    x'Px/2 is a variable t of its own, the last one, with P = F'F and
+    A last variable t replaces x'Px/2. With P = F'F,
 
         t >= |Fx|^2 / 2    as    t + 1/2 >= |(t - 1/2, Fx)|,
 
-    so the objective is q'x + t. Constraints are cones that hold an affine function of (x, t).
+    and the objective is q'x + t. Constraints are affine functions of (x, t) in cones.
     """
     width = len(program.linear)
     factor = _factor(program.quadratic)
@@ -153,7 +154,7 @@ def cbf(program: ConeProgram) -> bytes:
 
 
 def _factor(quadratic: csc_matrix) -> Array:
-    """F with F'F = P, by eigenvalues: P may have some that are 0 but for rounding."""
+    """F with F'F = P, from eigenvalues, as some of them may be 0 up to rounding."""
     upper = quadratic.toarray()
     used = np.flatnonzero(upper.diagonal())
     small = upper[np.ix_(used, used)]
@@ -168,6 +169,6 @@ def _entries(matrix: Any) -> Iterator[tuple[int, int, float]]:
 
 
 def _counted(entries: list[tuple[Any, ...]]) -> list[str]:
-    """How many are not 0, and those, a line each; repr of each number reads back the same."""
+    """The number of entries that are not 0, then one line for each of them, without rounding."""
     lines = [" ".join(map(repr, entry)) for entry in entries if entry[-1] != 0]
     return [str(len(lines)), *lines]

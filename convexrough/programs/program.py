@@ -1,4 +1,4 @@
-"""From a scene to its programs: the cones, their dual, and the rows of bristles."""
+"""The convex programs of a scene: a cone program, its dual, and a quadratic program."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from convexrough.solvers.programs import ConeProgram, QuadraticProgram
 Form: TypeAlias = Literal["cones", "dual", "bristles"]
 FORMS: tuple[Form, ...] = get_args(Form)
 
-#: What writes each form, by the ending of its files.
+#: The writers of each form, by file ending.
 _OF_CONES: dict[str, Callable[[Any], bytes]] = {"cbf": cbf, "json": clarabel_json, "npz": cone_npz}
 WRITERS: dict[Form, dict[str, Callable[[Any], bytes]]] = {
     "cones": _OF_CONES,
@@ -39,18 +39,19 @@ WRITERS: dict[Form, dict[str, Callable[[Any], bytes]]] = {
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Program(Record):
-    """A contact as a program in standard form, in the contact's own units.
+    """A convex program in standard form for a contact problem.
 
     form        : "cones", "dual" or "bristles"
-    what        : the same in words
-    data        : P, q, A and the rest: a ConeProgram or a QuadraticProgram
-    asperities  : (m,) indices of the asperities in the program; it gives the others no load
-    force_unit  : [force] of the loads
-    energy_unit : [force length] of the objective
-    objective   : its least value, in energy_unit; of the dual the greatest bound, times -1
-    constant    : what is added to the objective for the energy, in energy_unit: nothing under
-        approach control, and the work of the level that the program counts from under load control
-    off         : about how far an exact solution is from the contact's loads, over the largest
+    what        : description of the form
+    data        : the arrays of the program, a ConeProgram or a QuadraticProgram
+    asperities  : (m,) indices of the asperities in the program; all others carry no load
+    count       : number of asperities of the scene
+    force_unit  : [force] unit of the loads in the program
+    energy_unit : [force length] unit of the objective
+    objective   : minimum of the objective in energy_unit; of the dual, minus its maximum
+    constant    : constant to add to the objective for the energy, in energy_unit; 0 if the approach
+        is prescribed
+    off         : estimated error of the loads of an exact solution, relative to the largest load
 
     >>> program = cr.program(scene, "bristles", approach=5e-5, bristles=16)
     >>> program.what, len(program.asperities)
@@ -69,10 +70,10 @@ class Program(Record):
     off: float
 
     def loads(self, values: ArrayLike) -> Array:
-        """(n,) [force] of all asperities of the scene, from a solver's numbers.
+        """(n,) [force] loads of all asperities of the scene, from a solver's solution.
 
-        values : its x; of the dual the multipliers of the equations, in their order. Their sign is
-            that of the solver's convention, and is not looked at.
+        values : the solution x; of the dual, the multipliers of its equations, in their order and
+            with either sign convention
         """
         m = len(self.asperities)
         given = np.asarray(values, dtype=np.float64).ravel()
@@ -84,15 +85,17 @@ class Program(Record):
         return loads
 
     def energy(self, objective: float) -> float:
-        """[force length] of a solver's objective: of the dual, a lower bound on the energy."""
+        """[force length] energy for an objective value; for the dual a lower bound on it."""
         sign = -1.0 if self.form == "dual" else 1.0
         return self.energy_unit * (sign * objective + self.constant)
 
     def save(self, path: Path | str) -> None:
-        """Write a file for other libraries; its ending says which.
+        """Write the program to a file in the format of its ending.
 
-        cones, dual : .cbf, .json (of Clarabel), .npz (sparse matrices by columns)
-        bristles    : .mps, .npz (of qpsolvers; dense)
+        cones, dual : .cbf, .json (Clarabel) or .npz (sparse matrices)
+        bristles    : .mps or .npz (qpsolvers, dense)
+
+        Raises InputError for other endings, and FileError.
         """
         path, valid = Path(path), WRITERS[self.form]
         if (ending := path.suffix.removeprefix(".")) not in valid:
@@ -103,7 +106,7 @@ class Program(Record):
             temporary.write_bytes(content)
 
     def about(self) -> dict[str, Any]:
-        """What to know of it beside its numbers, for an index of files."""
+        """Sizes, units and values of the program without its arrays, for an index of files."""
         data = self.data
         return {
             "form": self.what,
@@ -127,18 +130,19 @@ def program(
     load: float | None = None,
     bristles: int = 64,
 ) -> Program:
-    """A scene as a program in standard form, with the data that convert its solution to loads.
+    """The contact problem of a scene as a convex program in standard form.
 
-    form     : "cones" (the contact law itself), "dual" (a bound on its energy) or "bristles" (a
-        quadratic program, off by about 0.4 / bristles^2 of the largest load)
-    approach [length] or load [force] : what is prescribed, exactly one
+    form     : "cones" (equivalent to the contact law), "dual" (its dual) or "bristles" (a quadratic
+        program, with an error of about 0.4 / bristles^2 of the largest load)
+    approach, load : [length], [force] the prescribed quantity, exactly one of the two
+    bristles : number of bristles per asperity, for the form "bristles"
 
     >>> program = cr.program(scene, approach=5e-5)
     >>> program.data.cones
     220
 
-    Raises TooDenseError where the solution lies outside the boxes in which the program is exact,
-    and SolverError where there is none to compare with.
+    Raises TooDenseError if the solution lies outside the boxes in which the program is exact, and
+    SolverError if Newton's method finds no solution to compare with.
     """
     checks.instance("scene", scene, Scene)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
@@ -146,7 +150,7 @@ def program(
 
 
 def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Program:
-    """The program of a problem whose loads are known, (n,) in its own units."""
+    """The program of a problem, given the loads (n,) of its solution in own units."""
     if form not in FORMS:
         expected = f"a form of program; {checks.nearest(str(form), FORMS)}"
         raise InputError("form", found=repr(form), expected=expected)
@@ -187,7 +191,7 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
 
 
 def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
-    """Four cones an asperity where the solution is in their boxes, else five."""
+    """Boxes for four cones per asperity if the solution lies in them, else for five."""
     for five in (False, True):
         boxes = ConeBoxes.choose(problem, five=five)
         if not (beyond := boxes.cut & (own[boxes.members] >= boxes.loads)).any():
@@ -197,7 +201,7 @@ def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
 
 
 def _objective(program: ConeProgram, boxes: ConeBoxes, own: Array) -> float:
-    """The least objective: that of the powers of the solution's contact radii."""
+    """The minimum of the objective, evaluated at the solution of the contact problem."""
     p = own[boxes.members]
     t = np.cbrt(p / boxes.loads)
     powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]
@@ -208,17 +212,17 @@ def _objective(program: ConeProgram, boxes: ConeBoxes, own: Array) -> float:
 
 
 def _bristle_error(rows: BristleProgram, own: Array) -> float:
-    """Estimated error of the exact solution of the program, over the largest load.
+    """Estimated error of the loads of the bristle program, relative to the largest load.
 
-    A row of m bristles has an error of at most 0.375 B / m^2, with B the load of its box; the
-    response of the others is at most one over the smallest eigenvalue of the scaled Hessian.
+    With m bristles and the box 0 <= load <= B, the load of one asperity has an error of at most
+    0.375 B / m^2. Coupling magnifies it by at most one over the smallest scaled eigenvalue.
     """
     row = 0.375 * float(rows.box.max() / own.max()) / rows.m**2
     return row / float(scaled_eigenvalues(rows.problem, own)[0])
 
 
 def scaled_eigenvalues(problem: NormalProblem, own: Array) -> Array:
-    """Of the energy's Hessian over the touching ones, scaled to a diagonal of 1; least first."""
+    """Ascending eigenvalues of the touching asperities' Hessian, scaled to a diagonal of 1."""
     touching = np.flatnonzero(own)
     root = np.sqrt(1.0 / problem.stiffness(own[touching], touching))
     scaled = problem.influence.matrix[np.ix_(touching, touching)] * root * root[:, None]

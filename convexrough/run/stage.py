@@ -1,7 +1,9 @@
-"""A stage is a table of the scene file. It computes a result; all output is derived from that.
+"""Base classes of stages and of their results.
 
-A new stage is a subclass of `Stage` and one of `Result` in a file of `run/stages`, and a line in
-`STAGES` there (docs/architecture.md has one of 40 lines).
+A stage is a table of the scene file, with its checks. It computes a result from a pressed contact;
+printed lines, tables, figures and the summary are derived from that result. A new stage needs a
+subclass of `Stage` and one of `Result` in a file of `run/stages`, and a line in `STAGES` there;
+docs/architecture.md shows one of 40 lines.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ Summary = dict[str, Any]
 #: Statuses of asperities; as keys, the number of asperities with that status.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
-#: Physical dimension of each number, by name; all others have none.
+#: Names of the numbers that have a physical dimension, by dimension; others are dimensionless.
 KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
@@ -44,16 +46,17 @@ KINDS = {
 }  # fmt: skip
 KIND = {name: kind for kind, names in KINDS.items() for name in names}
 
-#: Rows of long tables that are printed: the last ones.
+#: Number of rows that are printed of a table of steps: the last ones.
 MOST_PRINTED = 20
 
 
 class Stage(FileTable):
-    """A table of the scene file that asks for a result from a pressed contact, with its checks.
+    """A table of the scene file that requests a result from a pressed contact, with its checks.
 
-    name    : of the table;  frictional : it needs [friction]
-    numbers : keys of its summary that are numbers, which a sweep can measure
-    labels  : keys that tell rows apart, where there are several
+    name       : name of the table
+    frictional : True if it needs the table [friction]
+    numbers    : numbers of its summary, by name, that a sweep can measure
+    labels     : keys of a row that identify it, where there are several rows
     """
 
     name: ClassVar[str]
@@ -62,41 +65,49 @@ class Stage(FileTable):
     labels: ClassVar[tuple[str, ...]] = ()
 
     def compute(self, contact: Contact) -> Result:
-        """Compute the result. Raises InputError, SolverError."""
+        """The result of this stage for a pressed contact. Raises InputError and SolverError."""
         raise NotImplementedError
 
     def fits(self, count: int) -> None:
-        """Check that the stage exists for so many asperities. Raises InputError if not."""
+        """Check the stage against the number of asperities. Raises InputError."""
 
 
 def limit(contact: Contact) -> float:
-    """f P [force]."""
+    """[force] the friction limit: coefficient of friction times load."""
     return checks.friction(contact.scene.friction) * contact.load
 
 
 def number(found: Any, name: str) -> Any:
-    """How many asperities have this status, or what a result, or its certificate, calls so."""
+    """The number of asperities with the status `name`, or the attribute of this name.
+
+    The attribute is that of the result or else of its certificate.
+    """
     if name in STATUSES:
         return (found.status == name).sum(axis=-1)
     return getattr(found if hasattr(found, name) else found.certificate, name)
 
 
 def numbers_of(found: Any, names: Sequence[str]) -> Summary:
-    """Numbers of a result by their names."""
+    """The numbers of a result with these names, as Python numbers and lists."""
     return {name: plain(number(found, name)) for name in names}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(Table, Plottable):
-    """What a stage found: the summary, tables, figures and printed lines are all read off `rows`.
+    """The result of a stage. Summary, tables and printed lines are derived from its `rows`.
 
-    found : results of the package, one for each row, or one with arrays along steps
+    stage   : the stage that was computed
+    contact : the pressed contact
+    found   : results of the package: one for each row, or a single one with arrays along steps
+
+    Subclasses set `printed` (headings of the printed columns, by key), `title` (of the printed
+    table), `digits` (of printed numbers) and `steps` (True if only the last rows are printed).
     """
 
-    printed: ClassVar[Mapping[str, str]] = {}  # keys of rows, and their headings
+    printed: ClassVar[Mapping[str, str]] = {}
     title: ClassVar[str] = ""
     digits: ClassVar[int] = 7
-    steps: ClassVar[bool] = False  # rows follow each other: the last ones are printed
+    steps: ClassVar[bool] = False
 
     stage: Stage
     contact: Contact
@@ -104,11 +115,11 @@ class Result(Table, Plottable):
 
     @property
     def name(self) -> str:
-        """Name of the table in the scene file, of the key in the summary, and of the CSV file."""
+        """Name of the table in the scene file, the key in the summary and the CSV file."""
         return self.stage.name
 
     def rows(self) -> list[Summary]:
-        """Numbers and words, a row for each of `found`."""
+        """Rows of numbers and texts by key; by default one row for each of `found`."""
         return [numbers_of(each, self.stage.numbers) for each in self.found]
 
     @cached_property
@@ -117,29 +128,29 @@ class Result(Table, Plottable):
         return self.rows()
 
     def summary(self) -> Any:
-        """What summary.json says: a list of rows, or one."""
+        """The entry of summary.json: a list of rows, or one mapping."""
         return self.known
 
     def doubts(self) -> Iterator[str]:
-        """What keeps this from being certified, a line for each reason."""
+        """The reasons why this result is not certified, one line each."""
         if unsure := sum(row.get("undecided", 0) for row in self.known):
             yield f"not certified: {unsure} statuses in {self.name} undecided"
 
     @property
     def certified(self) -> bool:
-        """All of it is proved."""
+        """True if everything in this result is proved."""
         return not any(self.doubts())
 
     def tables(self) -> dict[str, Columns]:
-        """Tables of numbers by the stems of their files."""
+        """Tables of columns, by the file name without its ending."""
         return {self.name: columns_of(self.known)}
 
     def figures(self, **units: Any) -> Mapping[str, Figure]:
-        """Figures by the stems of their files; units are used for labels only."""
+        """Figures, by the file name without its ending; units are used for labels only."""
         return {}
 
     def prepare(self, *, figures: bool) -> None:
-        """Compute what only tables need, and figures, so that nothing is solved in writing them."""
+        """Compute what tables and figures need, so that writing them solves nothing."""
         _ = self.known
 
     def lines(self, units: UnitNames) -> list[str]:
@@ -153,16 +164,16 @@ class Result(Table, Plottable):
         return [*said, *aligned([list(printed.values()), *rows], digits=self.digits)]
 
     def headings(self) -> Mapping[str, str]:
-        """Of the printed columns, by their keys in the rows."""
+        """The headings of the printed columns, by key."""
         return self.printed
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
-        """The main picture of the last of `found`: axes in, axes out."""
+        """Draw the main figure of the last of `found`; return the axes."""
         axes = self.found[-1].plot(axes, **options)
         return axes
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The first of `tables`."""
+        """The first table as a pandas DataFrame."""
         from convexrough.frames import dataframe
 
         columns = next(iter(self.tables().values()))
@@ -170,7 +181,7 @@ class Result(Table, Plottable):
 
 
 class Steps(Result):
-    """Steps that follow each other: one result with arrays along them."""
+    """The result of a stage with consecutive steps: one result with arrays along the steps."""
 
     steps = True
 
@@ -178,7 +189,7 @@ class Steps(Result):
         return rows_of(self.columns_of_steps())
 
     def columns_of_steps(self) -> Columns:
-        """By the names of the stage's numbers."""
+        """One array along the steps for each number of the stage, by name."""
         (found,) = self.found
         arrays = {singular(name): name for along in found._along.values() for name in along}
         return {
@@ -188,7 +199,7 @@ class Steps(Result):
 
     @cached_property
     def fine(self) -> Any:
-        """The same with points between its own, for figures."""
+        """The same path with intermediate points, for figures."""
         from convexrough.plots.between import between  # matplotlib: only when it draws
 
         return between(self.found[0])
@@ -204,19 +215,19 @@ class Steps(Result):
         return path_figures(self.found[0], fine=self.fine, **units)
 
     def summary(self) -> Summary:
-        """A list for each number."""
+        """A list along the steps for each number."""
         return {key: [row[key] for row in self.known] for key in self.known[0]}
 
 
 class Single(Result):
-    """One result of which numbers are told."""
+    """The result of a stage with a single row."""
 
     def summary(self) -> Summary:
         return self.known[0]
 
 
 def plain(value: Any) -> Any:
-    """A number of numpy as one of Python, an array as a list."""
+    """The value with NumPy numbers as Python numbers and arrays as lists."""
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
@@ -225,14 +236,14 @@ def columns_of(rows: Sequence[Summary]) -> Columns:
 
 
 def repeated(labels: Columns, tables: Sequence[Columns]) -> Columns:
-    """Tables one below the other, each with its labels in every row."""
+    """One table: the given tables one below the other, with labels in every row."""
     count = len(next(iter(tables[0].values())))
     left = {name: np.repeat(values, count) for name, values in labels.items()}
     return left | {name: np.concatenate([each[name] for each in tables]) for name in tables[0]}
 
 
 def unit_of(name: str, units: UnitNames) -> str:
-    """What a number of this name is in; "" where that is not named, or it is plain."""
+    """The unit of a number of this name; "" if it has none or the scene names no units."""
     length, force = units.length, units.force
     both = length and force
     return {
@@ -244,6 +255,6 @@ def unit_of(name: str, units: UnitNames) -> str:
 
 
 def titled(title: str, printed: Mapping[str, str], units: UnitNames) -> str:
-    """A heading, with the units of quantities where the scene names them."""
+    """The title, with the units of the printed quantities that the scene names."""
     named = [f"{it} {unit}" for key, it in printed.items() if (unit := unit_of(key, units))]
     return f"{title}  ({', '.join(named)})" if named else title

@@ -1,10 +1,12 @@
-"""The contact law as one second-order cone program, straight to Clarabel.
+"""The contact law as one second-order cone program, solved with Clarabel.
 
     minimise    sum e_i [(3/5 - S_i/3) y5_i + (S_i/3) z_i] + (1/2) p'M p - D'p
-    subject to  p = B y3,  four or five cones per asperity,  and sum p = load if prescribed,
+    subject to  p = B y3,  four or five cones per asperity,  and sum p = load if prescribed.
 
-with boxes 0 <= p <= B, e = k B^(5/3), and M = A + diag(shells), positive semidefinite. Its only
-solution is the contact state (docs/theory/exact-cones.md).
+The unknowns are the loads p and, for each asperity, the lifted variables y1 to y5 and z. The loads
+lie in boxes 0 <= p <= B with convexity numbers S_i. D is the prescribed approach of each asperity,
+e = k B^(5/3) with the local coefficients k, and M = A + diag(shells), positive semidefinite, with
+the compliance operator A. The only solution is the contact state (docs/theory/exact-cones.md).
 """
 
 from __future__ import annotations
@@ -26,20 +28,20 @@ from convexrough.solvers.programs import (
     run_clarabel,
 )
 
-#: From this many asperities on Clarabel's supernodal factorisation is the faster one.
+#: Number of asperities from which Clarabel's supernodal factorisation is faster.
 SUPERNODAL = 300
 
-#: Words of Clarabel after which there is a point to judge. At tight tolerances it often stops a
-#: little short of them, at a point that is right: the contact law decides, not the status.
+#: Statuses of Clarabel with which its point is checked. At tight tolerances it often stops a little
+#: before it reaches them, at a correct point: the contact law decides, not the status.
 STOPPED = ("Solved", "AlmostSolved")
 
 
 @dataclass(frozen=True)
 class Conic(ConeSolver):
-    """Settings for solving the cone program with Clarabel, an interior-point method.
+    """A solver of the cone program with Clarabel, an interior-point method.
 
-    tolerance      : Clarabel's, of the duality gap and of feasibility, in the problem's units
-    max_iterations : Clarabel's
+    tolerance      : tolerance of the duality gap and of feasibility, in the problem's units
+    max_iterations : largest number of iterations
     """
 
     max_iterations: int = 200
@@ -49,7 +51,7 @@ class Conic(ConeSolver):
         return "conic"
 
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
-        """Clarabel's answer to the program in these boxes, not yet checked."""
+        """The loads and the approach that Clarabel returns for these boxes, not yet checked."""
         lifted = LiftedProgram.assemble(problem, boxes)
         raw = run_clarabel(
             lifted.apply(),
@@ -73,7 +75,8 @@ class Conic(ConeSolver):
 class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
     """The contact law in boxes (docs/theory/exact-cones.md, "The lifted program").
 
-    The variables are p and then the lift, y2 to z (y1 to z), each a block of n.
+    The variables are the loads p, then y2 to y5 and z (with five cones y1 to y5 and z), each in a
+    block of n.
     """
 
     problem: NormalProblem
@@ -86,7 +89,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
         return cls(problem, boxes)
 
     def apply(self) -> ConeProgram:
-        """The total load first, if prescribed, then p = B y3, then the cones."""
+        """The program: rows for the total load, if prescribed, then p = B y3, then the cones."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, boxes = self.problem, self.boxes
@@ -119,7 +122,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
         return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
 
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """The program counts the approach from `approach_bound`: V'(L) = -multiplier."""
+        """The loads and the approach: `approach_bound` less the multiplier of the total load."""
         approach = self.problem.approach
         if approach is None:
             approach = self.problem.approach_bound - float(raw.multipliers[0])

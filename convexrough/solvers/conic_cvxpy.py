@@ -1,7 +1,7 @@
-"""The contact law as one second-order cone program, written for reading, in CVXPY.
+"""The contact law as one second-order cone program, written in CVXPY to be read.
 
-The same program as `conic.py` sends to Clarabel, in the names of docs/theory/exact-cones.md. CVXPY
-checks it: it is convex by its rules (DCP), and stays compiled while the approach changes (DPP).
+It is the program of `conic.py`, with the names of docs/theory/exact-cones.md. It is convex by
+CVXPY's rules (DCP), and CVXPY compiles it once for all approaches (DPP).
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from convexrough.solvers.solution import Solution
 
 
 class _Options(NamedTuple):
-    """What a solver calls the tolerance and the most steps, and how many it is given."""
+    """Names of a solver's options for tolerances and iterations, and the default of the latter."""
 
     tolerances: tuple[str, ...]
     limit: str
     steps: int
 
 
-#: Of a solver that is not here its own tolerance and limit hold. Clarabel, ECOS and QOCO are
-#: interior-point methods, which end in some twenty steps; SCS is of first order and takes
-#: thousands. All tolerances are of feasibility, of either side, and of the duality gap.
+#: Solvers that are not listed keep their own tolerance and limit. Clarabel, ECOS and QOCO are
+#: interior-point methods and take about twenty iterations; SCS is a first-order method and takes
+#: thousands. Tolerances are those of primal and dual feasibility and of the duality gap.
 OPTIONS = {
     "CLARABEL": _Options(("tol_gap_abs", "tol_gap_rel", "tol_feas"), "max_iter", 200),
     "ECOS": _Options(("abstol", "reltol", "feastol"), "max_iters", 200),
@@ -40,7 +40,7 @@ OPTIONS = {
 }
 
 
-#: What `pip` knows those by that have second-order cones.
+#: Package names, for `pip`, of CVXPY's solvers with second-order cones.
 PACKAGES = {
     "CLARABEL": "clarabel",
     "ECOS": "ecos",
@@ -56,13 +56,13 @@ PACKAGES = {
 
 @dataclass(frozen=True)
 class ConicCVXPY(ConeSolver):
-    """Settings of the cone program in CVXPY, with any of its solvers for second-order cones.
+    """A solver of the cone program through CVXPY, with any of its second-order cone solvers.
 
-    tolerance      : absolute and relative, of feasibility and of the duality gap, in the problem's
-        units; a solver not named in `OPTIONS` keeps its own
-    max_iterations : of the solver; None for 200 of an interior-point method, 20,000 of SCS
-    solver         : its name in CVXPY, in any case: `cvxpy.installed_solvers()`
-    verbose        : print what CVXPY and the solver say, with a table of iterations
+    tolerance      : absolute and relative tolerance of feasibility and of the duality gap, in the
+        problem's units; a solver not named in `OPTIONS` keeps its own
+    max_iterations : largest number of iterations; None for 200 (SCS: 20,000)
+    solver         : a name from `cvxpy.installed_solvers()`, in upper or lower case
+    verbose        : True to print the output of CVXPY and of the solver
     """
 
     max_iterations: int | None = None
@@ -81,11 +81,11 @@ class ConicCVXPY(ConeSolver):
         return "conic in CVXPY" if default else f"conic in CVXPY ({self.solver})"
 
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
-        """What the solver makes of the program in these boxes, not yet judged."""
+        """The loads and the approach that the solver returns for these boxes, not yet checked."""
         return LiftedModel.assemble(self, problem, boxes).answer()
 
     def model(self, problem: NormalProblem, *, five: bool = False) -> LiftedModel:
-        """The program itself, with four cones or five: to read, to change, to solve again."""
+        """The program in CVXPY, with four or five cones, to be read, changed or solved again."""
         return LiftedModel.assemble(self, problem, ConeBoxes.choose(problem, five=five))
 
     def run(self, program: Any) -> Any:
@@ -110,9 +110,9 @@ class ConicCVXPY(ConeSolver):
 
 
 def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
-    """Why CVXPY cannot run the program with a solver of this name, and what to do; None if it can.
+    """The reason why CVXPY cannot use this solver, and an advice; None if it can.
 
-    Packages are named only where the solver's name is right.
+    The advice names a package only if the solver's name is correct.
     """
     from cvxpy.reductions.solvers import defines  # which solver knows which cones
 
@@ -136,13 +136,14 @@ def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
-    """A compiled program: CVXPY objects, in the problem's own units.
+    """A compiled cone program as CVXPY objects, in the problem's own units.
 
-    program  : cvxpy.Problem
-    D0       : cvxpy.Parameter; the approach, or its upper bound under load control
-    p        : cvxpy.Variable, loads of `boxes.members`
-    link     : p == B y3; its multiplier is D - M p, minus the gap where p = 0
-    total    : sum p == load, or None; its multiplier is D0 less the approach
+    settings : the solver;  normal : the contact problem;  boxes : bounds on its loads
+    program  : the cvxpy.Problem
+    D0       : cvxpy.Parameter: the approach, or its upper bound if the load is prescribed
+    p        : cvxpy.Variable: the loads of `boxes.members`
+    link     : the constraint p == B y3, whose multiplier is minus the gap where p = 0
+    total    : the constraint sum p == load, or None; its multiplier is D0 less the approach
     """
 
     settings: ConicCVXPY
@@ -162,7 +163,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
 
     @classmethod
     def assemble(cls, settings: ConicCVXPY, normal: NormalProblem, boxes: ConeBoxes) -> LiftedModel:
-        """Equation 1 of docs/theory/exact-cones.md; with five cones, 1 and 2."""
+        """Program (1) of docs/theory/exact-cones.md, with five cones (1) and (2)."""
         cp = load_library("cvxpy", settings.name)
         i, n = boxes.members, len(boxes.members)
         checks.fits_in_memory("asperities of the cone program in CVXPY", n, 400, power=2)
@@ -190,13 +191,13 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
         return self.program
 
     def invert(self, raw: Any) -> ProgramAnswer:
-        """CVXPY leaves its answer in its own variables."""
+        """The loads and the approach, read from the variables of the program."""
         return ProgramAnswer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
 
     def solve(self, approach: float | None = None) -> Solution:
-        """Solve, at another approach if given (own units; no larger than the boxes are made for).
+        """The solution of the program, compiled only once.
 
-        Compiled once: from the second time on CVXPY only changes numbers.
+        approach : a new approach in own units, at most `normal.approach_bound`; default unchanged
         """
         normal = self.normal
         if approach is not None:
@@ -208,27 +209,27 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
         return judged(self.settings, normal, self.boxes, self.answer())
 
     def answer(self) -> ProgramAnswer:
-        """Run the solver on the program as it stands."""
+        """The loads and the approach that the solver returns for the current program."""
         return self.through(self.settings.run)
 
     @property
     def variables(self) -> dict[str, Any]:
-        """p, y2 (y1 with five cones), ..., y5 and z by name."""
+        """The variables p, y1 (with five cones) or y2 to y5, and z, by name."""
         return {variable.name(): variable for variable in self.program.variables()}
 
     @property
     def loads(self) -> Array:
-        """(m,) of the last solution, as the solver left them."""
+        """(m,) loads of the last solution in own units, not checked."""
         return np.array(self.p.value)
 
     @property
     def approach(self) -> float:
-        """The prescribed one, or the multiplier of the total load."""
+        """The prescribed approach, or the one from the multiplier of the total load."""
         return float(self.D0.value - (0.0 if self.total is None else self.total.dual_value))
 
     @property
     def gaps(self) -> Array:
-        """(m,) of the last solution, from the multiplier of the link."""
+        """(m,) gaps of the last solution, from the multipliers of `link`."""
         gaps: Array = np.maximum(-self.link.dual_value, 0.0)
         return gaps
 
@@ -237,7 +238,7 @@ _LIFT = ("y1", "y2", "y3", "y4", "y5", "z")
 
 
 def _cones(cp: Any, y1: Any, y2: Any, y3: Any, y4: Any, y5: Any, z: Any, *, five: bool) -> Any:
-    """The cones of equations 1 and 2, x y >= w^2 with x, y >= 0."""
+    """The cones of equations (1) and (2), each of the form x y >= w^2 with x, y >= 0."""
 
     def rotated(x: Any, y: Any, w: Any) -> Any:
         return cp.SOC(x + y, cp.vstack([x - y, 2 * w]), axis=0)

@@ -15,9 +15,9 @@ equations as unknowns.
 # ---------------------------------
 #
 # As contact is handled in many a finite-element code: in each pass take one Newton step for the
-# loads of those who are thought to touch, drop those whose load has become negative, add those that
-# penetrate. An asperity that is added starts with the load it would carry alone. Stop when a pass
-# changes nothing.
+# loads of the asperities that are thought to touch, drop those whose load has become negative, add
+# those that penetrate. An asperity that is added starts with the load it would carry alone. Stop
+# when a pass changes nothing.
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -133,8 +133,8 @@ plt.show()
 #
 # Three. Mindlin's law of one asperity, the coupling and the slip must give every asperity the same
 # displacement. Slip must occur only where friction is used up. And ``shear``, which solves for the
-# increments themselves and never takes a difference of two loads, must agree, with a proof of who
-# slides.
+# increments themselves and never takes a difference of two loads, must agree, with a proof of
+# which asperities slide.
 
 balance = needed(forces) + slips
 print(f"spread of the displacements: {np.ptp(balance) / displacement:.1e}")
