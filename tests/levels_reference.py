@@ -322,7 +322,7 @@ class Bristles:
         s = (np.arange(count) + 0.5) / count
         self.limits = 1 - s * s
         self.bent = np.zeros((len(self.P), count))
-        self.deflection, self.displacement, self.lost = np.zeros(len(self.P)), 0.0, 0.0
+        self.deflection, self.delta, self.lost = np.zeros(len(self.P)), 0.0, 0.0
 
     @property
     def forces(self) -> Array:
@@ -330,7 +330,7 @@ class Bristles:
 
     @property
     def displacement(self) -> float:
-        return self.ratio * self.f * self.displacement
+        return self.ratio * self.f * self.delta
 
     def to(self, forces: Array) -> "Bristles":
         """Follow the force Q through these values."""
@@ -340,23 +340,21 @@ class Bristles:
 
     def _step(self, T: float) -> None:
         """eta + A u(eta) = Delta, sum u = T, by Newton on the clamped bristles."""
-        eta, displacement, n = self.deflection, self.displacement, len(self.P)
+        eta, delta, n = self.deflection, self.delta, len(self.P)
         for _ in range(60):
             tried = self.bent + ((eta - self.deflection) / self.C)[:, None]
             bent = np.clip(tried, -self.limits, self.limits)
             u, c = 1.5 * self.P * bent.mean(axis=1), 1.5 * self.P / self.C * (tried == bent).mean(1)
             matrix = np.block([[np.eye(n) + self.A * c, -np.ones((n, 1))], [c, np.zeros((1, 1))]])
-            change = np.linalg.solve(
-                matrix, np.append(eta + self.A @ u - displacement, u.sum() - T)
-            )
-            eta, displacement = eta - change[:n], displacement - change[n]
+            change = np.linalg.solve(matrix, np.append(eta + self.A @ u - delta, u.sum() - T))
+            eta, delta = eta - change[:n], delta - change[n]
             if np.abs(change[:n]).max() <= 1e-13 * self.C.max():
                 break
         else:
             raise ArithmeticError("Newton did not arrive: take smaller steps")
         slid = (np.abs(tried - bent) * self.limits).mean(axis=1)
         self.lost += self.ratio * self.f**2 * 1.5 * float((self.P * self.C) @ slid)
-        self.bent, self.deflection, self.displacement = bent, eta, displacement
+        self.bent, self.deflection, self.delta = bent, eta, delta
 
 
 def cycle_loss(contact: cr.Contact, force: float, steps: int = 50, count: int = 700) -> float:
