@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from convexrough.cli.options import PATH, Command, json_option
+from convexrough.cli.options import PATH, Command, figure_options, json_option
 from convexrough.cli.speech import (
     DONE,
     NOT_CERTIFIED,
@@ -70,6 +70,7 @@ def press_options(command: Command) -> Command:
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,
               help="Table for a scene file; figures go to its folder.")  # fmt: skip
 @click.option("--no-figures", is_flag=True, help="Do not write figures.")
+@figure_options
 @click.option("--force", is_flag=True, help="Overwrite a table of an earlier run.")
 @json_option
 def summits(
@@ -81,6 +82,8 @@ def summits(
     no_figures: bool,
     force: bool,
     as_json: bool,
+    formats: tuple[str, ...],
+    dpi: int,
     **options: Any,
 ) -> int:
     """Find the summits of a measured surface, and recommend a pruning threshold.
@@ -106,7 +109,7 @@ def summits(
             scan, press = _pressing(scan, partial(scan.summits, prune, fit), **how)
             scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
     with progress("writing"):
-        files = _written(out, scanned, figures=not no_figures)
+        files = _written(out, scanned, figures=not no_figures, formats=formats, dpi=dpi)
     lines = [*report.describe_surface(scanned), *written(out.parent, files)]
     echo(report.surface_summary(scanned), lines, as_json)
     for message in report.warnings_about(scanned):
@@ -126,7 +129,7 @@ def _claim(path: Path, force: bool) -> None:
         raise FileError(f"{path}: no folder {path.parent}")
 
 
-def _written(path: Path, scanned: Scanned, *, figures: bool) -> list[Path]:
+def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:
     """The table that a scene file reads, the curve and the figures beside it."""
     from convexrough.run.results import write_figures, write_tables
     from convexrough.surface.report import curve_columns, summit_columns
@@ -142,7 +145,7 @@ def _written(path: Path, scanned: Scanned, *, figures: bool) -> list[Path]:
             scanned.surface, scanned.maxima, scanned.summits, scanned.curve, scanned.contact
         )
         named = {f"{path.stem}-{stem}": figure for stem, figure in pictures.items()}
-        files += write_figures(path.parent, named)
+        files += write_figures(path.parent, named, **saved)
     return files
 
 

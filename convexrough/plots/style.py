@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
@@ -42,8 +43,8 @@ def title(axes: Axes, text: str) -> None:
     axes.set_title(text, fontsize=TICK, loc="left")
 
 
-def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> None:
-    """What the colours mean, to the right; its name above it or along it."""
+def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> Colorbar:
+    """The bar that says what the colours mean, to the right; its name above it or along it."""
     found = axes.figure.colorbar(mapped, ax=axes, aspect=28, pad=0.02)
     found.ax.tick_params(labelsize=TICK)
     found.ax.yaxis.get_offset_text().set_fontsize(TICK)
@@ -51,6 +52,7 @@ def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -
         found.ax.set_title(name, fontsize=TICK)
     else:
         found.set_label(name, fontsize=LABEL)
+    return found
 
 
 def round_ticks(most: int = 6, *, whole: bool = False) -> MaxNLocator:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -13,7 +14,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from convexrough.arrays import Array, Number
 from convexrough.contact import Contact
 from convexrough.plots.asperity_map import Layer, draw_discs, draw_outline
-from convexrough.plots.measure import Scale, quantity
+from convexrough.plots.measure import Scale, literal, measure, quantity
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     DASHED,
@@ -28,7 +29,6 @@ from convexrough.plots.style import (
     bar,
     label,
     legend_outside,
-    literal,
     round_ticks,
     title,
 )
@@ -79,10 +79,17 @@ def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
     whole = (-width / 2, width / 2, -height / 2, height / 2)
     image = axes.imshow(surface.heights, origin="lower", extent=whole, cmap="gray",
                         interpolation="nearest", rasterized=True)  # fmt: skip
-    label(axes, _named("$x$", surface.unit), _named("$y$", surface.unit))
+    _label_places(axes, surface)
     axes.xaxis.set_major_locator(round_ticks())
     axes.yaxis.set_major_locator(round_ticks())
     return image
+
+
+def _label_places(axes: Axes, surface: Surface) -> None:
+    """Names of the axes of a map, with the unit that suits the part of it that is shown."""
+    most = axes.get_xlim()[1]
+    label(axes, _count(axes.xaxis, "$x$", surface.unit, most),
+          _count(axes.yaxis, "$y$", surface.unit, most))  # fmt: skip
 
 
 def draw_summits(axes: Axes, positions: Array) -> None:
@@ -169,8 +176,11 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
         positions = positions[inside]
         width, height = (min(edge, side / 2) for side in surface.size)
         axes.set(xlim=(-width, width), ylim=(-height, height))
+        _label_places(axes, surface)
     draw_summits(axes, positions)
-    bar(axes, image, _named("$z$", surface.unit), above=True)
+    scale = bar(axes, image, "", above=True)
+    highest = float(np.abs(surface.heights).max())
+    scale.ax.set_title(_count(scale.ax.yaxis, "$z$", surface.unit, highest), fontsize=TICK)
     look: dict[str, Any] = dict(marker="o", ls="", ms=5.0, mec="0.4", mew=0.3)
     handles = [Line2D([], [], color=colour, label=label, **look) for colour, label in named]
     legend_outside(figure, handles, "lower center", 2)
@@ -214,17 +224,19 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
         left.plot(z, expected * normal, "--", lw=1.1, color=SMOOTH, label="by spectral moments")
     left.xaxis.set_major_locator(round_ticks(4))
     left.xaxis.get_offset_text().set_fontsize(TICK)
-    label(left, _named("height", surface.unit), "summits")
+    highest = float(np.abs(edges).max())
+    label(left, _count(left.xaxis, "height", surface.unit, highest), "summits")
 
     edges = 10 ** _bins(np.log10(maxima.tip_radii))
     _draw_both(middle, edges, maxima.tip_radii, summits.tip_radii)
     middle.set_xscale("log")
     middle.axvline(1 / moments.mean_curvature, color=SMOOTH, ls="--", lw=1.1)
-    label(middle, _named("tip radius", surface.unit), "")
     span = edges[-1] / edges[0]
     powers = LogLocator(subs=(1.0,) if span > 50 else (1.0, 3.0), numticks=5)
     middle.xaxis.set_major_locator(powers if span > 10 else round_ticks(4))
     middle.xaxis.set_major_formatter("{x:g}")
+    typical = float(np.median(maxima.tip_radii))
+    label(middle, _count(middle.xaxis, "tip radius", surface.unit, typical), "")
     middle.xaxis.set_minor_formatter(NullFormatter())
 
     _draw_both(right, np.linspace(0.0, 1.0, 21), maxima.eccentricities, summits.eccentricities)
@@ -249,5 +261,15 @@ def _bins(values: Array) -> Array:
     return np.linspace(low - 0.02 * room, high + 0.02 * room, count + 1)
 
 
-def _named(name: str, unit: str) -> str:
-    return f"{name}  [{literal(unit)}]" if unit else name
+def _count(axis: Axis, name: str, unit: str, size: float) -> str:
+    """The label of an axis of lengths about so large; its ticks are in SI with a prefix."""
+    if not unit:
+        return name
+    length = measure(size, unit)
+
+    def said(value: float, _: float) -> str:
+        shown = 0.0 if abs(value) < 1e-9 * size else length.of(value)  # 0 with its rounding
+        return f"{shown:.9g}".replace("-", "\N{MINUS SIGN}")
+
+    axis.set_major_formatter(said)
+    return f"{name}  [{literal(length.said)}]"

@@ -75,3 +75,18 @@ def test_one_summit() -> None:
     curve = cr.surface.provability(summits, lambda left: press(left, 1e-3), levels=[0.1])
     for figure in surface_figures(one, summits, summits, curve, press(summits, 1e-3)).values():
         fits(figure)
+
+
+@pytest.mark.sample(1)
+def test_axes_are_in_si_with_prefixes() -> None:
+    """A map in metres has the same axes as one in micrometres."""
+    drawn = []
+    for unit in ("µm", "m"):
+        surface = MAP.to_unit(unit)
+        figures = surface_figures(surface, surface.summits(0.0), surface.summits(0.05))
+        for figure in figures.values():
+            fits(figure)
+        drawn.append([said(figure) - {""} for figure in figures.values()])
+    assert drawn[0] == drawn[1]
+    assert {"$x$  [µm]", "$y$  [µm]", "$z$  [µm]"} <= drawn[1][0]
+    assert {"height  [µm]", "tip radius  [µm]"} <= drawn[1][1]

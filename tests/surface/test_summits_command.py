@@ -241,3 +241,12 @@ def test_the_whole_map_beside_its_asperities(command: Any, surface: cr.surface.S
     assert 0.7 < found["load"]["asperities"] / found["load"]["whole"] < 1.0
     assert found["resolution"] < 0.01
     assert "--whole needs --scene or --radius" in command("summits", "ball.npz", "--whole").err
+
+
+@pytest.mark.usefixtures("surface")
+def test_figures_in_the_formats_asked_for(command: Any) -> None:
+    assert command("summits", "scan.npz", "--formats", "pdf,png", "--dpi", "50").status == 0
+    assert {each.suffix for each in Path().glob("summits-*")} == {".pdf", ".png"}
+    assert Path("summits-map.pdf").read_bytes().startswith(b"%PDF")
+    width = int.from_bytes(Path("summits-map.png").read_bytes()[16:20], "big")
+    assert width < 300  # 4.4 inches
