@@ -48,8 +48,8 @@ class Program(Record):
     count       : number of asperities of the scene
     force_unit  : [force] unit of the loads in the program
     energy_unit : [force length] unit of the objective
-    objective   : minimum of the objective in energy_unit; of the dual, minus its maximum; of bristles
-        as OSQP finds it, nan where it does not
+    objective   : minimum of the objective in energy_unit; of the dual, minus its maximum; of
+        bristles as OSQP finds it, nan where it does not
     constant    : constant to add to the objective for the energy, in energy_unit; 0 if the approach
         is prescribed
     off         : estimated error of the loads of an exact solution, relative to the largest load
