@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 #: A table: a heading, and rows of as many cells.
-TextTable = Sequence[Sequence[Any]]
+PrintedTable = Sequence[Sequence[Any]]
 
 
 def labelled(lines: Iterable[tuple[str, str]], width: int = 18) -> list[str]:
@@ -15,12 +15,12 @@ def labelled(lines: Iterable[tuple[str, str]], width: int = 18) -> list[str]:
     return [f"{name:<{width}}{text}" for name, text in lines]
 
 
-def aligned(table: TextTable, *, left: int = 0, digits: int = 6) -> list[str]:
+def aligned(table: PrintedTable, *, left: int = 0, digits: int = 6) -> list[str]:
     """Lines of a table, numbers to so many digits, the first `left` columns aligned to the left."""
     return ["  ".join(row).rstrip() for row in _padded(table, left, digits)]
 
 
-def markdown(table: TextTable, *, left: int) -> list[str]:
+def markdown(table: PrintedTable, *, left: int) -> list[str]:
     """The same as a table in Markdown."""
     rows = _padded(table, left, digits=6)
     rule = ["-" * max(3, len(cell)) for cell in rows[0]]
@@ -33,7 +33,7 @@ def bound(value: float) -> str:
     return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
 
 
-def _padded(table: TextTable, left: int, digits: int) -> list[list[str]]:
+def _padded(table: PrintedTable, left: int, digits: int) -> list[list[str]]:
     cells = [[_cell(value, digits) for value in row] for row in table]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     return [

@@ -80,7 +80,7 @@ def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> 
     return named
 
 
-class TextTable(NamedTuple):
+class ReadTable(NamedTuple):
     """Columns of a file by what they are read as, and how it was read.
 
     columns : numbers, or text where it was asked for
@@ -130,7 +130,7 @@ def read_table(
     holes: Sequence[str] = (),
     unnamed: Sequence[Sequence[str]] = (),
     how: Reading = AS_IT_IS,
-) -> TextTable:
+) -> ReadTable:
     """Columns of a file with a header; others in it are not looked at.
 
     required, optional, text : what is read, the last as text, and only where it is there
@@ -186,7 +186,7 @@ def read_table(
     if mistakes := [*mistakes, *source.mistakes]:
         raise TableError(str(path), few(mistakes))
     rest = [i for i in range(len(names)) if i not in places.values()]
-    return TextTable(
+    return ReadTable(
         read,
         source.rows,
         source.lines,

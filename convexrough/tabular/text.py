@@ -102,7 +102,7 @@ def _split(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in line.split(separator)] if line else []
 
 
-class Row(NamedTuple):
+class TextRow(NamedTuple):
     """A line of a file: its number there, its text, and its cells; `wrong` if it has none."""
 
     number: int
@@ -115,7 +115,7 @@ class TextTable(NamedTuple):
     """The rows of a file below its header, which is None where it has none."""
 
     header: list[str] | None
-    rows: list[Row]
+    rows: list[TextRow]
     style: Style
 
 
@@ -162,8 +162,8 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
 
 
 def _headed(
-    rows: list[Row], comment: str, style: Style, known: Sequence[str]
-) -> tuple[list[str] | None, list[Row]]:
+    rows: list[TextRow], comment: str, style: Style, known: Sequence[str]
+) -> tuple[list[str] | None, list[TextRow]]:
     """The names of columns, with the units of a line below them, and the rows below."""
 
     def wanted(names: list[str]) -> int:
@@ -259,11 +259,11 @@ def sniff(lines: Sequence[str], styles: Sequence[Style]) -> Style:
     return max(styles, key=score)
 
 
-def _row(number: int, text: str, style: Style) -> Row:
+def _row(number: int, text: str, style: Style) -> TextRow:
     try:
-        return Row(number, text, style.split(text))
+        return TextRow(number, text, style.split(text))
     except csv.Error as error:
-        return Row(number, text, [], str(error))
+        return TextRow(number, text, [], str(error))
 
 
 def _header(text: str, style: Style) -> list[str]:
@@ -285,8 +285,8 @@ def stripped(cells: list[str]) -> list[str]:
 
 
 def _trimmed(
-    header: list[str] | None, rows: list[Row], style: Style
-) -> tuple[list[str] | None, list[Row]]:
+    header: list[str] | None, rows: list[TextRow], style: Style
+) -> tuple[list[str] | None, list[TextRow]]:
     """Without separators at the ends of lines, and with a name for the row names that R writes."""
     if header is None:
         width = max((len(stripped(row.cells)) for row in rows), default=0)

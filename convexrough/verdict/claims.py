@@ -17,7 +17,7 @@ from convexrough.errors import InputError, TableError
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.grid import steps
-from convexrough.tabular.table import Reading, TextTable, few, read_table
+from convexrough.tabular.table import Reading, ReadTable, few, read_table
 from convexrough.tabular.text import bare
 from convexrough.verdict.verdict import NOISE, rounded_up
 
@@ -158,7 +158,7 @@ def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
     return dx * dy
 
 
-def _explained(table: TextTable) -> Iterator[str]:
+def _explained(table: ReadTable) -> Iterator[str]:
     """What each column is taken for."""
     yield f"rows: {len(table.rows):,}{f', {table.style}' if table.style else ''}"
     for name, called in table.called.items():
@@ -180,7 +180,7 @@ def _unused_positions(others: Sequence[str]) -> Iterator[str]:
 class _Placing:
     """Which asperity each row of a table belongs to, how that was found, and what is wrong."""
 
-    def __init__(self, scene: Scene, table: TextTable, manner: Manner) -> None:
+    def __init__(self, scene: Scene, table: ReadTable, manner: Manner) -> None:
         self.scene, self.table, self.manner = scene, table, manner
         self.mistakes: list[str] = []
         self.how = "in the scene's order"

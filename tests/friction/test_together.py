@@ -19,7 +19,7 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.loss import shared
 from convexrough.friction.walk import follow
-from convexrough.normal import stack
+from convexrough.normal import refine, together
 from convexrough.normal.level import Level
 from convexrough.numbers.balls import Ball
 
@@ -85,8 +85,8 @@ def test_what_is_better_alone_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> 
     assert crowded.top.solution is not None
     if crowded.top.solution.box.fixed_open.any():
         assert crowded.prepare(crowded.top.load * Ball.exact(PARTS[-2:])) == [None, None]
-    monkeypatch.setattr(stack, "STEPS", 1)  # too few: not proved, or as good as ever
-    monkeypatch.setattr(stack, "CORRECTIONS", 1)
+    monkeypatch.setattr(together, "STEPS", 1)  # too few: not proved, or as good as ever
+    monkeypatch.setattr(refine, "CORRECTIONS", 1)
     poor = both(cr.press(scene, approach=approach), PARTS)
     assert any(level is None or level.loads.radius.max() > 1e-20 for _, level in poor)
     for alone, level in poor:

@@ -1,4 +1,4 @@
-"""[cycle]: steady cycles between two shear forces, what they cost, and their loops."""
+"""[cycle]: steady cycles between two shear forces, with their losses and loops."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ OWN = ("force_amplitude", "displacement_amplitude", "displacement_error", "secan
 
 
 class Cycle(Stage):
-    """Maxima and minima of steady cycles, as fractions of f P.
+    """The largest and smallest shear forces of steady cycles, as fractions of f P.
 
     minimum_fraction : as many; default: the negatives of the maxima
     loop_points : of each loop, about; default: what is affordable
@@ -58,7 +58,7 @@ class Cycle(Stage):
 
     @property
     def lowest(self) -> list[float]:
-        """The minimum of each cycle."""
+        """The minimum of each cycle, as a fraction of f P."""
         if self.minimum_fraction is not None:
             return self.minimum_fraction
         return [-value for value in self.maximum_fraction]
@@ -74,7 +74,7 @@ class Cycle(Stage):
                 yield f"maximum_fraction[{i}]", f"found {high}, {expected}"
 
     def fits(self, count: int) -> None:
-        """Whether there are the asperities whose loops are asked for. Raises InputError."""
+        """Check that the asperities of `loop_asperities` exist. Raises InputError."""
         asked = self.loop_asperities
         for place, index in enumerate(asked if isinstance(asked, list) else ()):
             if index >= count:
@@ -89,7 +89,7 @@ class Cycle(Stage):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cycled(Result):
-    """The cycles."""
+    """The result of [cycle]: the steady cycles."""
 
     stage: Cycle
     title = "steady cycles"
@@ -119,7 +119,7 @@ class Cycled(Result):
 
     @cached_property
     def loops(self) -> list[Loop]:
-        """Of each cycle, of some asperities."""
+        """The loops of each cycle, with those of some asperities."""
         stage, contact = self.stage, self.contact
         touching = max(1, int((contact.loads > 0).sum()))
         affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
@@ -141,7 +141,7 @@ class Cycled(Result):
         _ = self.loops, self.worn
 
     def tables(self) -> dict[str, Columns]:
-        """With the fretting of each asperity, and loops: macroscopic ("total") and of some."""
+        """The tables of cycles, of fretting by asperity, and of loops, total and by asperity."""
         touching = int(np.count_nonzero(self.contact.loads))
         worn = {  # with fractions in place of forces, as in the other tables
             name: np.repeat([row[name] for row in self.known], touching)
@@ -168,7 +168,7 @@ class Cycled(Result):
 
     @property
     def smooth(self) -> bool:
-        """There is a smooth reference, whose scale is W0."""
+        """True if there is a smooth reference, with the energy scale W0."""
         return not math.isnan(self.known[0]["smooth_normalised"])
 
     def headings(self) -> Mapping[str, str]:

@@ -1,4 +1,4 @@
-"""[gradient]: the derivative of one number by everything in the scene."""
+"""[gradient]: the derivatives of one result with respect to the whole scene."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Gradient(Stage):
 
     @property
     def sheared(self) -> bool:
-        """Whether it is asked of a shear force."""
+        """True if the result depends on a shear force."""
         return self.of in ("loss", "displacement")
 
     def mistakes_within(self) -> Iterator[Mistake]:
@@ -66,7 +66,7 @@ class Gradient(Stage):
             yield "fraction", f"found {self.fraction}, expected none with the {self.of}"
 
     def compute(self, contact: Contact) -> Differentiated:
-        """The gradient, or why there is none."""
+        """The gradient, or the reason why there is none."""
         try:
             return Differentiated(self, contact, (self._gradient(contact),))
         except InputError as error:
@@ -83,7 +83,7 @@ class Gradient(Stage):
         return cycle(contact, maximum=force).gradient(holding=self.holding)
 
     def _in_the_file(self, error: InputError) -> InputError:
-        """About a force: by the key of the file that it comes from."""
+        """The error, with the key of the scene file in place of the name of a force."""
         if error.what not in ("force", "maximum"):
             return error
         found = f"{self.fraction:g}, a force of {error.found}"
@@ -92,13 +92,13 @@ class Gradient(Stage):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Differentiated(Single):
-    """The gradient, or `none_because`."""
+    """The result of [gradient]: the gradient, or in `none_because` why there is none."""
 
     stage: Gradient
     none_because: str = ""
 
     def rows(self) -> list[Summary]:
-        """Numbers of the whole, and which asperity matters most; or why there are none."""
+        """Derivatives by single parameters and the largest by asperity, or why there are none."""
         asked = self.stage
         if not self.found:
             return [{"of": asked.of, "none_because": self.none_because}]
@@ -124,7 +124,7 @@ class Differentiated(Single):
         }]  # fmt: skip
 
     def tables(self) -> dict[str, Columns]:
-        """One row for each asperity."""
+        """A table with one row for each asperity."""
         if not self.found:
             return {}
         (gradient,), by = self.found, self.stage.by

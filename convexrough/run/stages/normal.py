@@ -1,4 +1,4 @@
-"""[normal]: what is pressed, and what is proved of it."""
+"""[normal]: the pressed contact and its certificate."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ INFLUENCES = {
 
 
 class Normal(Stage):
-    """What is prescribed: the approach of the two bodies [length], or the load [force]."""
+    """The prescribed quantity: the approach of the two bodies [length] or the load [force]."""
 
     name = "normal"
     frictional = False
@@ -63,7 +63,7 @@ class Normal(Stage):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pressed(Single):
-    """The pressed contact."""
+    """The result of [normal]: the pressed contact."""
 
     def rows(self) -> list[Summary]:
         contact = self.contact
@@ -92,7 +92,7 @@ class Pressed(Single):
 
 
 def judged_loads(certificate: Certificate, loads: Array) -> Summary:
-    """What is proved of loads (n,) [force], whoever found them."""
+    """The summary of the certificate of loads (n,) [force]."""
     return {
         "asperities": len(loads),
         **{status: int((certificate.status == status).sum()) for status in COUNTS},
@@ -105,7 +105,7 @@ def judged_loads(certificate: Certificate, loads: Array) -> Summary:
 
 
 def doubts_of(normal: Summary) -> Iterator[str]:
-    """What keeps loads from being certified."""
+    """The reasons why loads are not certified."""
     if normal["certificate"]["scope"] == "none":
         yield "not certified: these loads come without any proof"
     elif normal["undecided"]:
@@ -113,7 +113,7 @@ def doubts_of(normal: Summary) -> Iterator[str]:
 
 
 def cautions(normal: Summary, units: UnitNames) -> Iterator[str]:
-    """What a user should know of the model, which no proof is about."""
+    """Warnings about the limits of the model, which the certificate does not cover."""
     named = units.force and units.length
     yield from plausibility.doubts(normal, f"{units.force}/{units.length}²" if named else "")
 
@@ -179,7 +179,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
 
 
 def _neglected(normal: Summary) -> str:
-    """What is left out of two different bodies, with its size."""
+    """The effect of two different materials that the model neglects, with its size."""
     if not (beta := normal["mismatch"]):
         return ""
     return (
@@ -189,7 +189,7 @@ def _neglected(normal: Summary) -> str:
 
 
 def _described_geometry(normal: Summary) -> str:
-    """Its name, and how far the other one is apart, where that is worth a word."""
+    """The geometry, with the difference to the other one where it is large."""
     change, name = normal["closest_change"] or 0.0, str(normal["geometry"])
     if change <= DIFFERENT:
         return name

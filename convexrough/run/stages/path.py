@@ -1,4 +1,4 @@
-"""[path] and [steady]: normal load and shear that vary together, once and for ever."""
+"""[path] and [steady]: paths of normal load and shear force, followed once or repeated."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ INCREASE = "indentations increase with the load: "
 
 
 class Ellipse(FileTable):
-    """A path of load P + A cos t and shear Q + B sin(t + phase), on chords."""
+    """An elliptic path, of load P + A cos t and shear force Q + B sin(t + phase), by chords."""
 
     load: Positive
     load_amplitude: Finite = 0.0
@@ -68,7 +68,7 @@ class _Points(Stage):
             yield "loads, forces", f"found {found}, expected as many of both, at least one"
 
     def points(self, contact: Contact) -> dict[str, Any]:
-        """P and Q [force] at the points."""
+        """Load and shear force [force] at the points of the path."""
         if self.ellipse is not None:
             friction = checks.friction(contact.scene.friction)
             loads, forces = elliptic_path(friction=friction, **self.ellipse.model_dump())
@@ -78,7 +78,7 @@ class _Points(Stage):
 
 
 class Path(_Points):
-    """A path of load and shear, from no load."""
+    """A path of load and shear force that starts without load."""
 
     name = "path"
     numbers = (
@@ -112,7 +112,7 @@ class Pathed(Steps):
         return super().summary() | {"order": path.order, "presses": path.presses}
 
     def tables(self) -> dict[str, Columns]:
-        """The points, and asperities at each of them."""
+        """The tables of the points and of the asperities at each point."""
         (path,) = self.found
         m, n = path.asperity_forces.shape
         x, y = path.scene.asperities.positions.T
@@ -133,7 +133,7 @@ class Pathed(Steps):
 
 
 class Steady(_Points):
-    """A closed path, repeated.
+    """A closed path that is repeated.
 
     phases, factors : of an ellipse: its loss at other phases [rad], and with amplitudes times these
     """
@@ -166,7 +166,7 @@ class Steady(_Points):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Settled(Single):
-    """What a closed path costs, and losses at other phases where they were asked for."""
+    """The result of [steady]: the steady cycle, and losses at other phases if requested."""
 
     printed: ClassVar[Mapping[str, str]] = {
         "level": "stuck level",
@@ -229,6 +229,6 @@ def _by_phase(losses: PhaseLosses) -> Columns:
 
 
 def unproved_order(result: Result, order: str | None) -> Iterator[str]:
-    """That a proof rests on an order which is not proved."""
+    """The reason that a proof needs an order of indentations which is not proved."""
     if order is not None and not order.startswith("proved"):
         yield f"not proved: the order of indentations, on which [{result.name}] rests"

@@ -1,4 +1,4 @@
-"""[shakedown]: the largest factor of a path for which sliding ends."""
+"""[shakedown]: the largest factor of a path up to which sliding ends."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Shakedown(Stage):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Limit(Single):
-    """The limit, its bounds, and what proves them."""
+    """The result of [shakedown]: the limit, its bounds, and the states that prove them."""
 
     stage: Shakedown
     digits = 12
@@ -80,7 +80,7 @@ class Limit(Single):
         return {"kind": found.kind, **self.known[0], "proved": found.proved, "order": found.order}
 
     def tables(self) -> dict[str, Columns]:
-        """The state at rest and the mechanism; with vectors their components, of each vertex."""
+        """The tables of the residual state and the mechanism, by vertex and component."""
         (found,) = self.found
         x, y = found.scene.asperities.positions.T
         columns = {"x": x, "y": y, "factor": found.factors}

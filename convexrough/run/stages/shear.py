@@ -1,4 +1,4 @@
-"""[shear]: first loading by one shear force, at several."""
+"""[shear]: the states after monotonic shear to several forces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from convexrough.run.values import Shares
 
 
 class Shear(Stage):
-    """Shear forces on first loading, as fractions of f P, from 0 to 1."""
+    """Shear forces of monotonic shear, as fractions of f P, from 0 to 1."""
 
     name = "shear"
     numbers = (*("force", "displacement", "displacement_error", "sliding", "partial", "undecided"),)
@@ -31,7 +31,7 @@ class Shear(Stage):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sheared(Result):
-    """A friction state for each fraction."""
+    """The result of [shear]: a friction state for each fraction."""
 
     stage: Shear
     printed: ClassVar[Mapping[str, str]] = {
@@ -52,7 +52,7 @@ class Sheared(Result):
         ]
 
     def tables(self) -> dict[str, Columns]:
-        """A row for each fraction and asperity."""
+        """The tables, with a row for each fraction and asperity."""
         x, y = self.contact.scene.asperities.positions.T
         names = ("forces", "stick_radii", "slips", "displacements", "status")
         each = [{"x": x, "y": y, **state.columns(*names)} for state in self.found]
