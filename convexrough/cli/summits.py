@@ -47,9 +47,17 @@ def press_options(command: Command) -> Command:
     for option in (
         click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, with --load."),
         click.option("--load", metavar="P", type=float, help="Prescribed load."),
-        click.option("--approach", metavar="D", type=float, help="Prescribed approach."),
         click.option(
-            "--radius", metavar="R", type=float, help="Radius of the sphere, without --scene."
+            "--approach",
+            metavar="D",
+            type=float,
+            help="Prescribed approach, in the unit of the map.",
+        ),
+        click.option(
+            "--radius",
+            metavar="R",
+            type=float,
+            help="Radius of the sphere in the unit of the map, without --scene.",
         ),
         click.option("--scene", metavar="SCENE", type=PATH, help="Press as in this scene file."),
     ):
@@ -106,7 +114,7 @@ def summits(
     with progress(f"reading {surface}"):
         scan = _read(surface, **options)
         with blamed_on(surface):
-            scan, press = _pressing(scan, partial(scan.summits, prune, fit), **how)
+            scan, press = _pressing(scan, lambda it: it.summits(prune, fit), **how)
             scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
     with progress("writing"):
         files = _written(out, scanned, figures=not no_figures, formats=formats, dpi=dpi)
@@ -183,7 +191,7 @@ def _read(path: Path, *, pixel: str | None, detrend: str, **options: Any) -> Sur
 
 def _pressing(
     surface: Surface,
-    summits: Callable[[], Asperities],
+    summits: Callable[[Surface], Asperities],
     *,
     scene: Path | None,
     radius: float | None,
@@ -193,14 +201,16 @@ def _pressing(
 ) -> tuple[Surface, Callable[[Asperities], Contact] | None]:
     """The surface in the scene's unit, and how to press on its summits; None for not at all."""
     if scene is not None:
-        from convexrough.run.scene_file import read_scene
+        from convexrough.run.scene_file import read_scene, read_units
 
-        file = read_scene(scene, asperities=summits())
-        if file.units.length and not surface.unit:
-            expected = f"--unit, as the scene is in {file.units.length}"
-            raise InputError("unit", found="none", expected=expected)
-        if file.units.length not in ("", surface.unit):
-            surface = surface.to_unit(file.units.length)
+        unit = read_units(scene).length
+        if unit and not surface.unit:
+            raise InputError("unit", found="none", expected=f"--unit, as the scene is in {unit}")
+        if surface.unit and not unit:
+            expected = f"[units] length in {scene}, as the map is in {surface.unit}"
+            raise InputError("unit", found="none of the scene", expected=expected)
+        surface = surface.to_unit(unit) if unit != surface.unit else surface
+        file = read_scene(scene, asperities=summits(surface))
         return surface, lambda it: replace(file, scene=replace(file.scene, asperities=it)).press()
     if radius is None:
         return surface, None

@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.atomic import replacing
-from convexrough.errors import InputError
+from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.programs.formats import cbf, clarabel_json, cone_npz, mps, qpsolvers_npz
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton, TooDenseError
-from convexrough.solvers.bristles import LARGEST_S, BristleProgram
+from convexrough.solvers.bristles import LARGEST_S, BristleProgram, BristleQP
 from convexrough.solvers.cone_boxes import ConeBoxes
 from convexrough.solvers.conic import LiftedProgram
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
@@ -48,7 +48,8 @@ class Program(Record):
     count       : number of asperities of the scene
     force_unit  : [force] unit of the loads in the program
     energy_unit : [force length] unit of the objective
-    objective   : minimum of the objective in energy_unit; of the dual, minus its maximum
+    objective   : minimum of the objective in energy_unit; of the dual, minus its maximum; of
+        bristles as OSQP finds it, nan where it does not
     constant    : constant to add to the objective for the energy, in energy_unit; 0 if the approach
         is prescribed
     off         : estimated error of the loads of an exact solution, relative to the largest load
@@ -168,12 +169,17 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
         if len(beyond := np.flatnonzero(rows.cut & (own >= rows.box))):
             ratios = problem.shells[beyond] / problem.stiffness(own[beyond], beyond)
             raise TooDenseError(form, problem.candidates[beyond], ratios, LARGEST_S)
+        data = rows.apply()
+        try:
+            objective = _value(data, BristleQP(bristles).run(data).x)
+        except SolverError:  # another solver may solve it
+            objective = np.nan
         return make(
             what=f"quadratic, {bristles} bristles an asperity",
-            data=rows.apply(),
+            data=data,
             asperities=frozen(np.array(problem.candidates)),
             constant=0.0,
-            objective=problem.energy(own, problem.influence.apply(own)),
+            objective=objective,
             off=_bristle_error(rows, own),
         )
     boxes = _boxes(problem, own)
@@ -206,6 +212,11 @@ def _objective(program: ConeProgram, boxes: ConeBoxes, own: Array) -> float:
     t = np.cbrt(p / boxes.loads)
     powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]
     x = np.concatenate((p, *powers[0 if boxes.five else 1 :]))
+    return _value(program, x)
+
+
+def _value(program: ConeProgram | QuadraticProgram, x: Array) -> float:
+    """The objective at x; the quadratic form is stored as its upper triangle."""
     upper = program.quadratic
     square = x @ (upper @ x) - 0.5 * x @ (upper.diagonal() * x)
     return float(square + program.linear @ x)

@@ -121,6 +121,11 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     study, mistakes = validate(parsed(path, text))
     if study is None:
         raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
+    if asperities is not None:
+        from convexrough.surface.summits import Summits  # only for maps
+
+        if isinstance(asperities, Summits):
+            _one_unit(path, asperities.origin.unit, study.units.names.length)
     scene, highest = build_scene(path, study, asperities=asperities)
     layout, sources = study.asperities, [path]
     if layout.pattern == "file" and asperities is None:
@@ -143,6 +148,28 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
         units=study.units.names,
         convert=study.units.convert,
     )
+
+
+def read_units(path: Path) -> UnitNames:
+    """The units that a scene file names. Raises FileError, SceneFileError."""
+    from convexrough.run.study import validate
+
+    study, mistakes = validate(parsed(path, read_text(path, MOST_BYTES)))
+    if study is None:
+        raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
+    return study.units.names
+
+
+def _one_unit(path: Path, own: str, named: str) -> None:
+    """Summits of a map are in the unit of the scene that they are pressed in."""
+    if own != named:
+        found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
+        expected = f'{named}, as in {path}: surface.to_unit("{named}")'
+        if not own:
+            expected = f'a map with its unit, as {path} is in {named}: unit="..." of the map'
+        if not named:
+            expected = f"a unit of length in {path} ([units] length), or none of the map"
+        raise InputError("asperities", found=found, expected=expected)
 
 
 def digest(path: Path) -> str:

@@ -106,14 +106,15 @@ class BristleQP:
     ) -> Solution:
         """Loads of the candidates (own units). OSQP starts where it likes: `start` is not used."""
         program = BristleProgram.assemble(problem, self.bristles, self.name)
-        loads, approach, iterations = program.through(self._run)
+        loads, approach, iterations = program.through(self.run)
         if self.newton_step:
             last = newton_step(problem, loads)
             loads, approach = last.loads, last.approach
             iterations += last.iterations
         return Solution.of(problem, loads, approach, iterations, refine=self.newton_step)
 
-    def _run(self, program: QuadraticProgram) -> RawAnswer:
+    def run(self, program: QuadraticProgram) -> RawAnswer:
+        """OSQP's answer to the program."""
         return run_osqp(program, self.name, self.tolerance, self.max_iterations, self.verbose)
 
 

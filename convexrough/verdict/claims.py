@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -168,6 +169,14 @@ def _explained(table: ReadTable) -> Iterator[str]:
         yield f"not looked at: {', '.join(table.others)}"
 
 
+def _unused_positions(others: Sequence[str]) -> Iterator[str]:
+    """Columns that look like positions, under names that are not theirs."""
+    found = {it[0].lower(): it for it in others if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
+    if len(found) == 2:
+        x, y = found["x"], found["y"]
+        yield f"columns {x}, {y}: found no x and y, expected --column x={x} --column y={y}"
+
+
 class _Placing:
     """Which asperity each row of a table belongs to, how that was found, and what is wrong."""
 
@@ -185,6 +194,7 @@ class _Placing:
         by = "positions"
         if self.points is None:
             by = ""
+            self.mistakes += _unused_positions(self.table.others)
             for name, index in self.table.indices.items():
                 if (numbered := self._numbered(name, index)) is not None:
                     found, by = numbered, f"column {name or 'without a name'}"
@@ -220,6 +230,8 @@ class _Placing:
         count, least, most = len(self.scene), int(index.min()), int(index.max())
         values, times = np.unique(index, return_counts=True)
         sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.manner.missing_open)
+        # Numbers of nodes in order are of no use, and do no harm; in another order they say it.
+        sure |= bool(name) and times.max() == 1 and bool((np.diff(index) < 0).any())
         wrong = ""
         if times.max() > 1:
             wrong = f"{values[times.argmax()]} twice, expected each asperity once"

@@ -112,7 +112,10 @@ def test_files_are_solved_by_others(form: Any, ending: str, control: str, tmp_pa
     loads = made.loads(z if form == "dual" else x)
     near = 1e-4 + made.off
     assert np.abs(loads - CONTACT.loads).max() < near * CONTACT.loads.max()
-    assert made.energy(made.objective) == pytest.approx(energy(control), rel=1e-12)
+    if form == "bristles":  # another energy than that of the contact: its own
+        assert objective == pytest.approx(made.objective, rel=1e-6)
+    else:
+        assert made.energy(made.objective) == pytest.approx(energy(control), rel=1e-12)
     assert made.energy(objective) == pytest.approx(energy(control), rel=1e-6 + made.off)
 
 

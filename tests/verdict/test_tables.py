@@ -238,6 +238,11 @@ def test_loads_at_a_slightly_different_place(
         ("1,2\n1,2\n1,2\n", "columns: found no header and 2 columns, expected a column 'load'"),
         ("1,2,3\n4,5,6\n7,8,9\n", "row 1: found position [1.0, 2.0], "),
         ("x,y,load\n0,0,1\n1000,0,1\n500,2500,1\n", "found them 10^3 times as far out"),
+        (
+            "node,load\n103,1\n101,1\n102,1\n",
+            "column node: found 103, expected at most 3, the",
+        ),
+        ("x_mm,y_mm,load\n0,0,1\n1,0,1\n2,0,1\n", "expected --column x=x_mm --column y=y_mm"),
         (b"PK\x03\x04...", "not text: an archive or an Excel workbook; name it .xlsx"),
         (b"MATLAB 5.0 MAT-file", "not text: a MAT-file; name it .mat"),
         (b"load\n1\x00\n", "row 2: not text"),
@@ -245,6 +250,11 @@ def test_loads_at_a_slightly_different_place(
 )
 def test_wrong_loads(tmp_path: Path, content: str | bytes, expected: str) -> None:
     assert any(expected in line for line in refused(tmp_path, content))
+
+
+def test_numbers_of_nodes_in_order_do_no_harm(tmp_path: Path) -> None:
+    claimed = read_loads(written(tmp_path, "node,load\n101,1.5\n104,0\n107,2.5e-5\n"), small())
+    assert claimed.values.tolist() == LOADS
 
 
 def test_all_mistakes_at_once_with_their_lines(tmp_path: Path) -> None:
