@@ -15,6 +15,7 @@ from scipy.io import savemat
 
 import convexrough as cr
 from convexrough.errors import TableError
+from convexrough.tabular.columns import bound
 from convexrough.verdict.claims import Manner, read_loads
 
 COUNT = 12
@@ -496,6 +497,25 @@ def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
     again = command("verify", "scene.toml", name, "--junit", "found.xml")
     assert again.status == 2
     assert "found.xml: is there already" in again.err
+
+
+def test_bounds_are_said_in_plain_numbers() -> None:
+    said = [bound(each) for each in (2e-6, 0.0123, 95.0, 100.0)]
+    assert said == ["2.1e-06", "0.013", "100", "100"]
+
+
+def test_refused_input_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
+    from xml.etree import ElementTree
+
+    name = text()(tmp_path, {"load": case.loads[1:]})
+    outcome = command("verify", "scene.toml", name, "--junit", "found.xml")
+    assert outcome.status == 2
+    (suite,) = ElementTree.parse(tmp_path / "found.xml").getroot().iter("testsuite")
+    assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "0", "1")
+    said = suite[0][0].text
+    assert said is not None
+    assert f"rows: found {len(case.loads) - 1}" in said
+    assert said in outcome.err
 
 
 def test_what_is_proved_is_said(tmp_path: Path, command: Any, case: Case) -> None:
