@@ -49,12 +49,12 @@ class InputError(ConvexroughError, ValueError):
 def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
     """InputErrors of the body with this place (a file, a table) in front.
 
-    unless_known : those that name a place already stay as they are
+    unless_known : those that name a place already stay as they are, as all mistakes of a file do
     """
     try:
         yield
     except InputError as error:
-        if unless_known and error.where:
+        if isinstance(error, MistakesError) or (unless_known and error.where):
             raise
         raise error.within(str(where)) from error
 

@@ -140,7 +140,8 @@ def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
 
 def singular(name: str) -> str:
     """What one value of an array is called: load of loads, radius of radii, loss of losses."""
-    for ending, one in (("radii", "radius"), ("losses", "loss"), ("approaches", "approach")):
+    for ending, one in (("radii", "radius"), ("losses", "loss"), ("approaches", "approach"),
+                        ("ities", "ity")):  # fmt: skip
         if name.endswith(ending):
             return name.removesuffix(ending) + one
     return name if name.endswith(("ss", "us")) or name in COUNTS else name.removesuffix("s")

@@ -7,6 +7,9 @@ wrong number) raise InputError, as everywhere.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -20,6 +23,9 @@ from convexrough.normal.claims import Claim
 from convexrough.scene.scene import Scene
 from convexrough.verdict import Verdict, verify
 from convexrough.verdict.report import describe_claim, reason
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 def assert_certified(
@@ -42,7 +48,7 @@ def assert_certified(
     Raises AssertionError with the asperities concerned.
     """
     __tracebackhide__ = True
-    verdict = verify(scene, loads, approach=approach, load=load, within=within, floor=floor)
+    verdict = _asked(verify, scene, loads, approach=approach, load=load, within=within, floor=floor)
     if len(verdict.undecided) == len(scene):
         _check_proof(verdict.certificate)
     _check(verdict, scene)
@@ -67,7 +73,7 @@ def assert_shear_certified(
     Raises AssertionError with the asperities concerned.
     """
     __tracebackhide__ = True
-    verdict = verify_shear(contact, forces, force=force, within=within, sliding=sliding)
+    verdict = _asked(verify_shear, contact, forces, force=force, within=within, sliding=sliding)
     _check(verdict, contact.scene)
     return verdict.certificate
 
@@ -94,15 +100,12 @@ def assert_agree(
     Raises AssertionError with the asperities concerned.
     """
     __tracebackhide__ = True
-    answers = [
-        _answer(name, given, scene, approach, load)
-        for name, given in (("first", first), ("second", second))
-    ]
-    one, other = answers
+    one = _asked(_answer, "first", first, scene, approach, load)
+    other = _asked(_answer, "second", second, scene, approach, load)
     if len(one.loads) != len(other.loads):
         expected = f"as many asperities as in the first, {len(one.loads)}"
         raise InputError("second", found=len(other.loads), expected=expected)
-    for answer in answers:
+    for answer in (one, other):
         _check_proof(answer.certificate, f" of {answer.name}")
     if found := contradictions(one, other):
         raise AssertionError("\n".join(found))
@@ -120,6 +123,15 @@ def assert_agree(
                 f"{one.name} and {other.name}: {differ}, expected {within:g}: "
                 f"asperities {joined(each)}"
             )
+
+
+def _asked(question: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> T:
+    """The answer of a function; the traceback of an InputError shows no frames of the package."""
+    __tracebackhide__ = True
+    try:
+        return question(*arguments, **options)
+    except InputError as error:
+        raise error.with_traceback(None) from None
 
 
 def _answer(

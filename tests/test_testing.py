@@ -142,3 +142,11 @@ def test_wrong_use(contact: cr.Contact) -> None:
         assert_agree(contact, cr.press(small, approach=approach))
     with pytest.raises(cr.InputError, match=r"loads\[0\]: found -1"):
         assert_certified(paper(), -1.0, approach=PAPER_APPROACH)
+
+
+def test_loads_of_the_other_sign(contact: cr.Contact) -> None:
+    """The error names the sign, and its traceback shows the line of the test alone."""
+    with pytest.raises(cr.InputError, match="expected compression to be positive") as caught:
+        assert_certified(paper(), -contact.loads, approach=PAPER_APPROACH)
+    shown = [each for each in caught.traceback if "__tracebackhide__" not in each.frame.f_locals]
+    assert [Path(each.path).name for each in shown] == [Path(__file__).name]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,7 @@ from convexrough.cli.speech import (
     say_aside,
     written,
 )
-from convexrough.errors import FileError, InputError, blamed_on
+from convexrough.errors import ConvexroughError, FileError, InputError, blamed_on
 
 if TYPE_CHECKING:
     from convexrough.proof import Proof
@@ -138,16 +138,17 @@ def verify(
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not force:
             raise FileError(f"{each}: is there already; --force replaces it")
-    file = read_scene(scene)
-    manner = _manner(units=file.units, convert=file.convert, **how)
-    if explain:
-        read = [read_loads(loads, file.scene, manner)]
-        read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
-        lines = [line for each in read for line in (each.note, *each.explained, "")]
-        lines += report.describe_scene(file.scene, file.units)
-        echo({"read": lines}, lines, as_json)
-        return DONE
     with ExitStack() as stack:
+        stack.enter_context(_reported(junit))
+        file = read_scene(scene)
+        manner = _manner(units=file.units, convert=file.convert, **how)
+        if explain:
+            read = [read_loads(loads, file.scene, manner)]
+            read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
+            lines = [line for each in read for line in (each.note, *each.explained, "")]
+            lines += report.describe_scene(file.scene, file.units)
+            echo({"read": lines}, lines, as_json)
+            return DONE
         new = stack.enter_context(results_folder(out, force=force)) if out is not None else None
         with progress(f"judging the loads of {len(file.scene):,} asperities"):
             with blamed_on(scene):
@@ -176,6 +177,19 @@ def verify(
         place = (out or Path()) / "proof.json"
         click.echo(f"{evidence.proved}\nwritten  {place}", err=as_json)
     return DONE if found.holds and (evidence is not None or not proof) else NOT_CERTIFIED
+
+
+@contextmanager
+def _reported(path: Path | None) -> Iterator[None]:
+    """Errors of the body, which are written as JUnit XML before they go on."""
+    from convexrough.verdict.report import junit
+
+    try:
+        yield
+    except ConvexroughError as error:
+        if path is not None:
+            write_text(path, junit(error))
+        raise
 
 
 def _written(

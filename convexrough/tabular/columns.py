@@ -30,7 +30,7 @@ def markdown(table: PrintedTable, *, left: int) -> list[str]:
 
 def bound(value: float) -> str:
     """Two digits, never below the value."""
-    return f"{1.05 * value:.2g}" if math.isfinite(value) else "unknown"
+    return f"{float(f'{1.05 * value:.2g}'):g}" if math.isfinite(value) else "unknown"
 
 
 def _padded(table: PrintedTable, left: int, digits: int) -> list[list[str]]:

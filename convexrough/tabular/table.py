@@ -145,7 +145,7 @@ def read_table(
         source = _source(path, [*wanted, *INDEX[:-1], *(c.lower() for c in how.columns.values())])
     if unnamed and source.header is None and len(source.rows) == 1 and len(source.columns) > 3:
         source = _upright(source)
-    places, mistakes = _places(source, wanted, how.columns, unnamed)
+    places, mistakes = _places(source, wanted, how, unnamed)
     for name, names in also.items():
         known = [bare(each).lower() for each in source.header or []]
         if name not in places and (there := [each for each in names if each in known]):
@@ -300,25 +300,32 @@ def _upright(source: _Source) -> _Source:
 def _places(
     source: _Source,
     wanted: Sequence[str],
-    columns: Mapping[str, str],
+    how: Reading,
     unnamed: Sequence[Sequence[str]],
 ) -> tuple[dict[str, int], list[str]]:
     """The column of each name that is there, and what is wrong with the names."""
+    columns = how.columns
     names = source.header
     if names is None:
         nameless = [""] * len(source.columns)
         names = next((list(each) for each in unnamed if len(each) == len(nameless)), nameless)
         names = nameless if columns else names
     bared = [bare(name) for name in names]
+    lowered = [each.lower() for each in bared]
     places: dict[str, int] = {}
     mistakes: list[str] = []
     for name in wanted:
         called = columns.get(name, name)
-        for known in (names, bared, [each.lower() for each in bared]):
+        for known in (names, bared, lowered):
             if count := known.count(called):
                 places[name] = known.index(called)
                 if count > 1:
                     mistakes.append(f"columns: found {called!r} twice, expected once")
+                elif name not in columns and lowered.count(name) > 1:
+                    alike = [each for each in bared if each.lower() == name]
+                    choice = f": --column {name}={alike[0]}" if how.scalable else ""
+                    found = " and ".join(map(repr, alike))
+                    mistakes.append(f"columns: found {found}, expected one of them{choice}")
                 break
         else:
             if name not in columns:

@@ -28,6 +28,9 @@ POSITION_TOLERANCE = 1e-2
 #: Asperities at which a shift is tried, where rows are missing.
 MOST_TRIED = 1000
 
+#: Nodes with a load reach at least so far, over the size of the array, in the right unit.
+LEAST_REACH = 0.01
+
 #: Names of columns that can only number asperities.
 SURELY_INDEX = ("index", "asperity")
 
@@ -214,7 +217,15 @@ class _Placing:
         apart = np.full(len(self.scene), self.scene.sphere_radius)
         if len(self.scene) > 1:
             apart = nearest_distances(self.scene.asperities.positions)
-        for i in np.flatnonzero((values != 0) & (distances > apart[owners])):
+        far = np.flatnonzero((values != 0) & (distances > apart[owners]))
+        size = np.abs(self.scene.contact_points).max()
+        for power in (3, 6, 9) if len(far) else ():
+            points = self.points[values != 0] * 10.0**-power
+            near, their = _nearest(self.scene.contact_points, points)
+            if (near <= apart[their]).all() and np.abs(points).max() > LEAST_REACH * size:
+                self.mistakes.append(f"positions: {_too_far_out(power)}")
+                return owners
+        for i in far:
             found = (
                 f"a load at {self.points[i].tolist()}, {distances[i]:g} from the nearest asperity"
             )
@@ -290,11 +301,7 @@ class _Placing:
                 return f"{' and '.join(names)} {verb} the other sign: {ways}"
         for power in (*range(-9, 0), *range(1, 10)):
             if fits(points * 10.0**-power):
-                ways = " ".join(f"--scale {name}={10.0**-power:g}" for name in "xy")
-                return (
-                    f"found them 10^{power} times as far out as the scene's, expected the scene's "
-                    f"unit of length: {ways}"
-                )
+                return _too_far_out(power)
         tried: Sequence[Any] = positions[:MOST_TRIED] - points[0]
         if len(points) == len(positions):
             tried = [positions.mean(axis=0) - points.mean(axis=0)]
@@ -305,6 +312,14 @@ class _Placing:
                 expected = f"expected them from the axis of the sphere, to {allowed:.3g}"
                 return f"all are shifted by [{there}], {expected}"
         return ""
+
+
+def _too_far_out(power: int) -> str:
+    ways = " ".join(f"--scale {name}={10.0**-power:g}" for name in "xy")
+    return (
+        f"found them 10^{power} times as far out as the scene's, expected the scene's "
+        f"unit of length: {ways}"
+    )
 
 
 def _nearest(positions: Array, points: Array) -> tuple[Array, Indices]:

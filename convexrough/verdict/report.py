@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Indices
 from convexrough.compare import joined
+from convexrough.errors import ConvexroughError
 from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plausibility import described_modulus
@@ -154,10 +156,28 @@ def reason(claim: Claim) -> str:
     return ", ".join(parts)
 
 
-def junit(found: Verified) -> bytes:
-    """The findings as a suite of JUnit's, a case for each question."""
+def junit(found: Verified | ConvexroughError) -> bytes:
+    """The findings as a suite of JUnit's, a case for each question; or the error in their place."""
     suite = ElementTree.Element("testsuite", name="convexrough verify")
-    failures = 0
+    if isinstance(found, Verified):
+        kind, cases = "failure", list(_cases(found))
+    else:
+        kind, cases = "error", [("input", str(found))]
+    for name, text in cases:
+        case = ElementTree.SubElement(suite, "testcase", classname="convexrough.verify", name=name)
+        if text:
+            ElementTree.SubElement(case, kind, message=name).text = text
+    suite.set("tests", str(len(suite)))
+    for each in ("failure", "error"):
+        suite.set(f"{each}s", str(len(suite.findall(f"*/{each}"))))
+    root = ElementTree.Element("testsuites")
+    root.append(suite)
+    written: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return written
+
+
+def _cases(found: Verified) -> Iterator[tuple[str, str]]:
+    """Each question, and what is wrong; "" where nothing is."""
     for claim in found.claims:
         wrong = {what: which for what, which in claim.wrong.items() if len(which)}
         asked = {
@@ -169,18 +189,7 @@ def junit(found: Verified) -> bytes:
             "total": "" if claim.total_holds else _total(claim, ""),
         }
         for name, text in asked.items():
-            case = ElementTree.SubElement(
-                suite, "testcase", classname="convexrough.verify", name=f"{claim.many}: {name}"
-            )
-            if text:
-                failures += 1
-                ElementTree.SubElement(case, "failure", message=name).text = text
-    suite.set("tests", str(len(suite)))
-    suite.set("failures", str(failures))
-    root = ElementTree.Element("testsuites")
-    root.append(suite)
-    written: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
-    return written
+            yield f"{claim.many}: {name}", text
 
 
 def _named(scene: Scene, which: Indices) -> str:

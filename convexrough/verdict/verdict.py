@@ -208,6 +208,8 @@ def verify_on(
     if (given < -floor).any():
         first = int(np.argmax(given < -floor))
         expected = "a load that is not negative; a floor lets noise up to its size count as 0"
+        if given.max() <= floor:
+            expected = "compression to be positive; no load is: do they have the other sign?"
         raise InputError(f"loads[{first}]", found=given[first], expected=expected)
     claimed = np.where(given > floor, given, 0.0)
     total = None if problem.load is None else problem.load * problem.units.force

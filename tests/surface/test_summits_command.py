@@ -57,7 +57,8 @@ def test_a_scan_becomes_a_scene(command: Any) -> None:
     assert len(table) == len(summits)
     for name, values in (("x", summits.x), ("y", summits.y), ("height", summits.heights),
                          ("tip_radius", summits.tip_radii), ("deviation", summits.deviations),
-                         ("elliptic_load", summits.elliptic_loads)):  # fmt: skip
+                         ("elliptic_load", summits.elliptic_loads),
+                         ("eccentricity", summits.eccentricities)):  # fmt: skip
         assert [float(row[name]) for row in table] == values.tolist()
     scene = cr.read_scene("scene.toml").scene
     np.testing.assert_array_equal(scene.asperities.positions, summits.positions)
@@ -260,3 +261,12 @@ def test_figures_in_the_formats_asked_for(command: Any) -> None:
     assert Path("summits-map.pdf").read_bytes().startswith(b"%PDF")
     width = int.from_bytes(Path("summits-map.png").read_bytes()[16:20], "big")
     assert width < 300  # 4.4 inches
+
+
+@pytest.mark.usefixtures("surface")
+def test_mistakes_of_the_scene_are_named(command: Any) -> None:
+    scene = Path("scene.toml")
+    scene.write_text(scene.read_text().replace("radius = 10000.0", "radius = -1.0"))
+    outcome = command("summits", "scan.npz", "--scene", "scene.toml")
+    assert outcome.status == 2
+    assert outcome.err.startswith("convexrough: error: scene.toml: [sphere] radius: found -1")

@@ -15,6 +15,7 @@ from scipy.io import savemat
 
 import convexrough as cr
 from convexrough.errors import TableError
+from convexrough.tabular.columns import bound
 from convexrough.verdict.claims import Manner, read_loads
 
 COUNT = 12
@@ -326,6 +327,31 @@ def test_units_of_loads(tmp_path: Path, command: Any, case: Case, name: str) -> 
     assert all(each in outcome.err for each in said)
 
 
+def test_pixels_in_another_unit(tmp_path: Path, command: Any, case: Case) -> None:
+    """One line with the factor; pixels that are shifted have no factor."""
+    pixels = case.pixels()
+    scaled = {each: pixels[each] * (1 if each == "pressure" else 1e3) for each in pixels}
+    outcome = command("verify", "scene.toml", text()(tmp_path, scaled))
+    assert outcome.status == 2
+    assert outcome.err.count("\n") == 1
+    assert "found them 10^3 times as far out" in outcome.err
+    assert "--scale x=0.001 --scale y=0.001" in outcome.err
+    shifted = pixels | {"x": pixels["x"] + 2e-4}
+    outcome = command("verify", "scene.toml", text()(tmp_path, shifted))
+    assert "from the nearest asperity" in outcome.err
+    assert "10^" not in outcome.err
+
+
+def test_columns_that_differ_in_case(tmp_path: Path, command: Any, case: Case) -> None:
+    name = text()(tmp_path, case.table(Load=2 * case.loads[case.order]))
+    outcome = command("verify", "scene.toml", name)
+    assert outcome.status == 2
+    assert "columns: found 'load' and 'Load', expected one of them: --column" in outcome.err
+    for column, status in (("load", 0), ("Load", 3)):
+        options = ("--column", f"load={column}", "--within", "1e-6")
+        assert command("verify", "scene.toml", name, *options).status == status
+
+
 def test_units_of_a_pressure(tmp_path: Path, command: Any, case: Case) -> None:
     name = text()(tmp_path, case.pixels("x y pressure\xa0[MPa]"))
     outcome = command("verify", "scene.toml", name)
@@ -496,6 +522,25 @@ def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
     again = command("verify", "scene.toml", name, "--junit", "found.xml")
     assert again.status == 2
     assert "found.xml: is there already" in again.err
+
+
+def test_bounds_are_said_in_plain_numbers() -> None:
+    said = [bound(each) for each in (2e-6, 0.0123, 95.0, 100.0)]
+    assert said == ["2.1e-06", "0.013", "100", "100"]
+
+
+def test_refused_input_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
+    from xml.etree import ElementTree
+
+    name = text()(tmp_path, {"load": case.loads[1:]})
+    outcome = command("verify", "scene.toml", name, "--junit", "found.xml")
+    assert outcome.status == 2
+    (suite,) = ElementTree.parse(tmp_path / "found.xml").getroot().iter("testsuite")
+    assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "0", "1")
+    said = suite[0][0].text
+    assert said is not None
+    assert f"rows: found {len(case.loads) - 1}" in said
+    assert said in outcome.err
 
 
 def test_what_is_proved_is_said(tmp_path: Path, command: Any, case: Case) -> None:
