@@ -11,24 +11,26 @@ LOGGER = logging.getLogger("convexrough")
 
 
 def log_step(solver: str, step: int, objective: float, residual: float) -> None:
-    """Log a step of an iteration; `args` of the log record holds the four by name."""
-    LOGGER.info(
+    """Log a step of an iteration (DEBUG); `args` of the log record holds the four by name."""
+    LOGGER.debug(
         "%(solver)s: step %(step)d, objective %(objective).12g, residual %(residual).1e",
         {"solver": solver, "step": step, "objective": objective, "residual": residual},
     )
 
 
 @contextmanager
-def logged(call: Callable[[logging.LogRecord], object]) -> Iterator[None]:
-    """Call with every log record while the body runs."""
+def logged(
+    call: Callable[[logging.LogRecord], object], least: int = logging.INFO
+) -> Iterator[None]:
+    """Call with every log record of this level or above while the body runs."""
 
     class Handler(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             call(record)
 
-    handler, level = Handler(), LOGGER.level
+    handler, level = Handler(least), LOGGER.level
     LOGGER.addHandler(handler)
-    LOGGER.setLevel(logging.INFO)
+    LOGGER.setLevel(least)
     try:
         yield
     finally:
@@ -45,5 +47,5 @@ def logged_steps() -> Iterator[list[Mapping[str, Any]]]:
         if isinstance(record.args, Mapping):
             steps.append(record.args)
 
-    with logged(keep):
+    with logged(keep, logging.DEBUG):
         yield steps
