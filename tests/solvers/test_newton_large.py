@@ -332,7 +332,7 @@ def test_progress_of_the_steps(approach: float, caplog: pytest.LogCaptureFixture
     asperities = cr.Asperities.square(
         spacing=2.5e-3, tip_radius=0.02, within=0.01, height_std=1e-5, seed=1
     )
-    caplog.set_level("INFO", logger="convexrough")
+    caplog.set_level("DEBUG", logger="convexrough")
     cr.press(
         cr.Scene(1.0, asperities, MATERIAL, geometry="summit"),
         approach=approach,
