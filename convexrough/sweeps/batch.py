@@ -10,15 +10,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from convexrough.errors import ConvexroughError
-from convexrough.sweeps.measures import Column, Numbers, measured
+from convexrough.sweeps.measures import FAILURES, Column, Numbers, measured
 from convexrough.sweeps.scenes import Asked, Source
 from convexrough.sweeps.together import measured_together
 from convexrough.threads import one_thread
 from convexrough.version import __version__
-
-#: What can go wrong in a scene without anything being wrong with the others.
-FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 
 #: Rows are the same, bit for bit, where these are.
 VERSIONS = {"convexrough": __version__, "numpy": np.__version__, "scipy": scipy.__version__}

@@ -14,7 +14,7 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.contact import Contact
-from convexrough.errors import InputError
+from convexrough.errors import ConvexroughError, InputError
 from convexrough.friction.onset import onset_of_sliding
 from convexrough.run.stage import Stage, limit, unit_of
 from convexrough.tabular.units import UnitNames
@@ -26,6 +26,9 @@ Numbers = dict[tuple[str, str], float]
 
 #: Quantiles, over the loaded asperities, of the force at which they start to slide, over f P.
 ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
+
+#: What can go wrong in a scene without anything being wrong with the others.
+FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 
 #: Keys of a scene file that are lengths.
 LENGTHS = ("radius", "spacing", "tip_radius", "within", "height_std")

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from convexrough.errors import InputError
-from convexrough.sweeps.batch import FAILURES, VERSIONS, Batch
-from convexrough.sweeps.measures import Column, chosen, unit
+from convexrough.sweeps.batch import VERSIONS, Batch
+from convexrough.sweeps.measures import FAILURES, Column, chosen, unit
 from convexrough.sweeps.scenes import Source, Tables
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__

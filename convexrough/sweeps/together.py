@@ -10,12 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.errors import ConvexroughError
 from convexrough.rows import PressedRows, in_rows
 from convexrough.run.stages import Cycle
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth_reference
-from convexrough.sweeps.measures import Column, Numbers, row_label
+from convexrough.sweeps.measures import FAILURES, Column, Numbers, row_label
 from convexrough.sweeps.scenes import Asked
 
 #: Arrays along the rows, by the names of `Contacts` or `Cycles`.
@@ -77,7 +76,7 @@ def measured_together(
                 mine = [some[k] for k in rows.places.tolist()]
                 for k, known in _known(rows, mine, columns).items():
                     found[numbers[rows.places[k]]] = known, ""
-        except ConvexroughError:  # it is some scene's: one by one they say whose
+        except FAILURES:  # it is some scene's: one by one they say whose
             continue
     return found
 

@@ -85,3 +85,11 @@ def test_what_rows_do_not_know_is_measured_one_by_one(monkeypatch: pytest.Monkey
     assert len(asked) == 0
     rows({}, ["load", "duality_gap"])
     assert len(asked) == 2
+
+
+def test_where_rows_fail_each_scene_is_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(*_: Any) -> Any:
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(together, "in_rows", failing)
+    assert set(rows({}, ["load", "loss"])["status"].tolist()) == {"certified"}
