@@ -246,9 +246,10 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
     """Whether no indentation falls as the load rises from 0: "proved", or what is known.
 
     All that is asked of the contact's friction afterwards rests on it. Without asking it is proved
-    where an inverse of the asperities that touch costs no more than a few normal solutions.
+    where that costs no more than a few normal solutions.
 
-    most : how many may touch for that inverse to be made: it takes some seconds for thousands
+    most : for how many asperities the dearer search may be made, some milliseconds for each; the
+        cheap one does for most of those that do not lie at the edge of the contact
 
     >>> cr.prove_order(contact)
     'proved'

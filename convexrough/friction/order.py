@@ -34,7 +34,8 @@ solution stays in the box where it is the only one. For L0 = 0 all this holds do
 
 Of those that touch at P but are open at L1, where a path is proved in pieces, s_i <= 0 is asked.
 The second case of (a) needs no inverse. For the first B^-1 is computed, and bounded: with
-R = I - B X, column k of B^-1 - X is at most || R_k || / mu in the 2-norm.
+R = I - B X, column k of B^-1 - X is at most || R_k || / mu in the 2-norm. Where too many touch for
+an inverse, weights of near neighbours prove the same: `friction.sweeping`.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
+from convexrough.friction.sweeping import swept_rates
 from convexrough.normal.boxes import Box
 from convexrough.normal.level import Level
 from convexrough.normal.proved import Proved
@@ -66,10 +68,11 @@ Order = Literal["proved", "proved for one step", "fails"]
 #: A rate dn_i / dD0 below minus this is no rounding; what a linear solve may leave.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: Up to so many that touch the inverse costs no more than the levels themselves.
-MOST = 800
+#: Up to so many that touch the inverse costs no more than the levels themselves; for so many
+#: weights of least total are sought where more touch.
+INVERTED, MOST = 800, 1000
 
-#: Levels between that are tried: where an inverse is made, and where none is.
+#: Levels between that are tried: where an inverse is made; and where none is, to see rates alone.
 BETWEEN, FEW_BETWEEN = 7, 1
 
 #: Improvements of the bounds m; and the least c of the largest that is counted. Heuristics.
@@ -82,7 +85,7 @@ def order_between(
     """Whether order holds between the highest and the lowest of some loads, by bisection.
 
     at   : the level of a load
-    most : that touch, up to which an inverse is made
+    most : as of `swept_rates`
     """
     used = sorted(set(loads), reverse=True)
     top = at(used[0])
@@ -94,7 +97,7 @@ def order_between(
     if min(_least_rate(at(load), rising) for load in used) < -RATE_ROUNDING:
         return "fails"
     unproved = [(used[0], used[-1])]
-    left = BETWEEN if rising.sum() <= most else FEW_BETWEEN
+    left = BETWEEN if rising.sum() <= INVERTED else FEW_BETWEEN
     while len(unproved) <= left:  # each takes one level at least
         left -= 1
         high, low = unproved.pop(0)
@@ -108,7 +111,7 @@ def order_between(
         if _least_rate(level, rising) < -RATE_ROUNDING:
             return "fails"
         for a, b in ((high, middle), (middle, low)):
-            if not proved_between(at(a), at(b), rising, most):
+            if rising.sum() > INVERTED or not proved_between(at(a), at(b), rising, most):
                 unproved.append((a, b))
         if not unproved:
             return "proved"
@@ -127,8 +130,13 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     rates = span.rates(np.ones(len(span.c)))
     if (rates[span.support] > 0).all() and not len(span.unsettled(rates, rising)):
         return True
-    if len(span.support) > most or not span.mu > 0:
+    if not span.mu > 0:
         return False
+    if len(span.support) > INVERTED:
+        spare = np.where(rising, 0.0, span.spare)
+        return not len(
+            span.unsettled(swept_rates(upper.problem.influence, span.c, spare, most), rising)
+        )
     inverse = span.inverse()
     (below,), (upper_ends,) = inverse.bounds(lambda m: span.delta(m[0])[None])
     if not (below > 0).all():
@@ -138,7 +146,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     rates = span.rates(m)
     rates[span.support] = below
     left = span.unsettled(rates, rising)
-    if len(left) > most:
+    if len(left) > INVERTED:
         return False
     both = np.concatenate((span.support, left))
     entries = found.problem.influence.submatrix(both)[
@@ -258,10 +266,14 @@ class _Span(NamedTuple):
 
     def unsettled(self, rates: Array, rising: NDArray[np.bool_]) -> Indices:
         """Those with a rate that may be negative, and that must rise or might not stay open."""
-        gaps = -self.upper.indentation.upper
-        with np.errstate(invalid="ignore"):
-            stays = ~rising & (gaps > self.drop * -rates * (1 + SAFETY))
-        return np.flatnonzero(~((rates > 0) | stays))
+        return np.flatnonzero(~((rates > 0) | (~rising & (rates > -self.spare))))
+
+    @property
+    def spare(self) -> Array:
+        """(n,) what the rates of open ones may be less than 0, so that they stay open."""
+        gaps = np.maximum(-self.upper.indentation.upper, 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.nan_to_num(gaps / self.drop, posinf=np.inf) * (1 - SAFETY))
 
 
 class _Inverse(NamedTuple):

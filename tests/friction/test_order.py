@@ -15,9 +15,11 @@ from path_scenes import shaded
 from scenes import MATERIAL
 
 import convexrough as cr
+from convexrough.bench.scenes import scene as bench_scene
 from convexrough.friction import order
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import enclosed
+from convexrough.friction.sweeping import swept_rates
 
 NOTHING = Fraction(0)
 
@@ -116,14 +118,60 @@ def test_order_is_proved(name: str, influence: cr.influence.Kind) -> None:
 @pytest.mark.parametrize(
     "patch", [(0.0102, 0.07, 3e-5), (0.02, 0.07, 1e-4), (0.03, 0.02, 4e-4), (0.03, 0.03, 4e-4)]
 )
-def test_order_of_crowded_lattices_is_proved_by_an_inverse(patch: tuple[float, ...]) -> None:
+def test_order_of_crowded_lattices_is_proved(
+    patch: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Row sums alone do not do: 21 to 259 touch, with crowding 0.78 to 1."""
     contact = hexagonal(*patch)
     assert 0.78 < crowding(contact) < 1.0
     levels = levels_of(contact)
     rising, bottom = ~levels.top.open, levels.at(NOTHING)
+    assert order.proved_between(levels.top, bottom, rising)  # by an inverse
+    monkeypatch.setattr(order, "INVERTED", 0)
     assert not order.proved_between(levels.top, bottom, rising, 0)
-    assert order.proved_between(levels.top, bottom, rising)
+    assert order.proved_between(levels.top, bottom, rising)  # by sweeping
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("aim", [0.5, 0.9, 1.5, 2.5])
+def test_sweeping_says_what_an_inverse_says(aim: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It proves order of all random layouts of at most nine up to 0.9, and of none that fall."""
+    monkeypatch.setattr(order, "INVERTED", 0)
+    for seed in range(8):
+        contact = random_contact(seed, aim)
+        levels = levels_of(contact)
+        proved = order.proved_between(levels.top, levels.at(NOTHING), ~levels.top.open)
+        assert proved or aim > 0.9
+        assert not (proved and falls(contact))
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("name", ["rough", "dense", "rough, closest"])
+def test_swept_rates_bound_those_of_all_softer_contacts(name: str) -> None:
+    """For any 0 <= C <= C~, also where a bound is negative: here one of each third touches."""
+    scene, approach = SCENES[name]
+    contact = cr.press(with_friction(scene), approach=approach)
+    problem, rng = levels_of(contact).top.problem, np.random.default_rng(7)
+    c = 1.0 / problem.stiffness(np.maximum(levels_of(contact).top.loads.value, 1e-3))
+    c = np.where(rng.random(len(c)) < 1 / 3, c, 0.0)
+    spare = np.full(len(c), 0.05)
+    bounds = swept_rates(problem.influence, c, spare, 1000)
+    assert (bounds[c > 0] > 0).all()
+    assert (bounds > -0.05).all()
+    A = problem.influence.matrix
+    for _ in range(20):
+        softer = c * rng.random(len(c)) ** rng.integers(0, 4)
+        rates = np.linalg.solve(np.eye(len(c)) + A * softer, np.ones(len(c)))
+        assert (rates >= bounds).all()
+
+
+def test_order_of_thousands_is_proved_without_an_inverse() -> None:
+    """1,162 of 2,083 touch; the bound of a loss is finite, and no inverse is made."""
+    contact = cr.press(bench_scene("scattered", 6.0), approach=5e-5)
+    assert np.count_nonzero(contact.loads) > order.INVERTED
+    cycle = cr.cycle(contact, maximum=0.25 * contact.load)
+    assert cycle.order == "proved"
+    assert cycle.loss_error <= 1e-11 * cycle.loss
 
 
 def test_order_where_one_just_touches_is_proved() -> None:

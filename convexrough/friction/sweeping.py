@@ -1,0 +1,316 @@
+r"""Order by sweeping: charges at near neighbours prove that no rate is negative.
+
+As in `friction.order`, C~ >= 0 is diagonal, and y(C) = (I + A C)^-1 1 for 0 <= C <= C~, where
+I + A C is regular. Let asperity i have weights w_j >= 0, of total 1, of some neighbours j != i on
+the support of C~, and let t_i be such that for all others k != i there
+
+    A_ik <= t_i (w_k / C~_k + sum over j != k of w_j A_jk).                                     (1)
+
+If t_i < 1 on the support, y(C) > 0 there, and y_i(C) >= 1 - t_i for all i. For follow y(s C) from
+y(0) = 1 up to s = 1. As long as no rate of the support is negative, z = s C y is not, and w_k z_k /
+C~_k <= w_k y_k. So (1), times z_k and summed, says by the rows of y + A z = 1 that
+
+    (A z)_i <= t_i sum_j w_j (y_j + (A z)_j) = t_i,   that is   y_i = 1 - (A z)_i >= 1 - t_i.
+
+So no rate of the support ever reaches 0.
+
+(1) compares potentials. A charge 1 at i is swept onto its neighbours; the potential of these, each
+spread over a shell of radius R_j = scale C~_j and there as on its shell, may nowhere be less.
+With d_j = z_j - z_i as complex numbers, that at z_i + r e^(i phi), r > d = max |d_j|, is more than
+1 / r by at least r^-3 times
+
+    r Re(e^(-i phi) sum w_j d_j) + (sum w_j |d_j|^2 - 3 |sum w_j d_j^2|) / 4
+      - (5 |sum w_j d_j^3| + 3 |sum w_j |d_j|^2 d_j|) / (8 r) - sum w_j |d_j|^4 / (r (r - d)),
+
+by Legendre's polynomials, those of degree 4 and more bounded by 1. So only near ones are looked at.
+
+Weights without first and second moments, sum w_j d_j = sum w_j d_j^2 = 0, and with the least energy
+do where neighbours are all around. At an edge a barrier method finds weights that meet (1) with the
+least total at near neighbours and at some far away; then (1) is looked at where it is not known.
+For one outside of the contact one neighbour alone does, if that is nearer to all others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from convexrough.arrays import Array, Indices
+from convexrough.influence.coupling import Influence
+from convexrough.roundoff import ROUNDOFF
+
+#: Neighbours that get the weights of least energy, and those of least total, in one search after
+#: the other, each with the constraint that the last one met least. Heuristics, like what follows.
+NEIGHBOURS, MORE = 14, (32, 32, 32, 80, 80, 80)
+
+#: How many near ones weights of least total look at, and at one in each sector of rings; how near
+#: the least total they come before they are tried.
+NEAR, SECTORS, RINGS, CENTRED = 60, 24, 8, 3.0
+
+#: Newton's steps at most of weights of least total, and what they leave of it at least.
+STEPS, LEAST = 40, 1e-8
+
+#: Searches for weights that are not negative: each drops those that are.
+SEARCHES = 8
+
+#: What the total of weights is less than 1, so that rates are positive, and not just 0.
+SHORT = 1e-10
+
+#: Directions in which the extent of the support is known, and numbers held at once.
+DIRECTIONS, NUMBERS = 256, 2**20
+
+
+def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Array:
+    """(n,) lower bounds on y(C) for all 0 <= C <= C~; all -inf if one of the support may be 0.
+
+    c     : (n,) C~, 0 where open
+    spare : (n,) rates of open ones may be less than 0 by so much, and need not be known better
+    most  : for how many weights of least total are sought
+    """
+    support, others = np.flatnonzero(c > 0), np.flatnonzero(c == 0)
+    rates = np.full(len(c), -np.inf)
+    if len(support) < 2:
+        return rates + np.inf if len(support) == 0 else np.ones(len(c))
+    swept = _Swept(influence, support, influence.scale * c, np.where(c > 0, 0.0, spare))
+    rates[others] = swept.outside(others)
+
+    def unsettled(which: Indices) -> NDArray[np.bool_]:
+        return ~((rates[which] > 0) | (rates[which] > -swept.spare[which]))
+
+    for group in (support, others):
+        left = group[unsettled(group)]
+        rates[left], worst = swept.rates(left, *swept.lightest(left))
+        looked = np.empty((len(left), 0), dtype=np.intp)
+        for count in MORE:
+            failed = unsettled(left)
+            left, looked = left[failed], np.column_stack((looked, worst))[failed]
+            if len(left) > most:
+                break
+            rates[left], worst = swept.rates(left, *swept.tightest(left, count, looked))
+        if not (rates[support] > 0).all():
+            return np.full(len(c), -np.inf)
+    return rates
+
+
+@dataclass(frozen=True, eq=False)
+class _Swept:
+    """A coupling whose charges are swept onto the shells of a support, of radii (n,).
+
+    spare : (n,) what t_i may be more than 1
+    """
+
+    influence: Influence
+    support: Indices
+    shells: Array
+    spare: Array
+
+    @cached_property
+    def places(self) -> NDArray[np.complex128]:
+        """(n,) the points, about their middle."""
+        x, y = self.influence.points.T
+        return np.asarray((x - (x.min() + x.max()) / 2) + 1j * (y - (y.min() + y.max()) / 2))
+
+    @cached_property
+    def extent(self) -> float:
+        """At least the largest distance."""
+        return 2.01 * float(np.abs(self.places).max())
+
+    @cached_property
+    def lost(self) -> float:
+        """What (1) and the potential far away, over 1 / r, lose by SHORT and by rounding."""
+        moved = ROUNDOFF * self.extent / float(self.influence.separations().min())
+        return 2 * SHORT + 8 * (self.influence.entry_error + moved) + 64 * ROUNDOFF
+
+    @cached_property
+    def _tree(self) -> Any:
+        from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+
+        return cKDTree(self._plane(self.places[self.support]))
+
+    @staticmethod
+    def _plane(places: NDArray[np.complex128]) -> Array:
+        return np.column_stack((places.real, places.imag))
+
+    def neighbours(self, which: Indices, count: int) -> Indices:
+        """(m, count) the nearest of the support, without the asperity itself."""
+        count = min(count, len(self.support) - 1)
+        _, found = self._tree.query(self._plane(self.places[which]), count + 1)
+        nearest = self.support[found]
+        itself = np.argsort(nearest == which[:, None], axis=1, kind="stable")
+        return np.asarray(np.take_along_axis(nearest, itself[:, :count], axis=1))
+
+    def potentials(self, charges: Indices, places: Indices) -> Array:
+        """Of charges 1 at places, on their shells if those are the same; shapes are broadcast."""
+        apart = self.places[charges] - self.places[places]
+        squares = apart.real**2 + apart.imag**2
+        return np.asarray(1.0 / np.where(charges == places, self.shells[charges], np.sqrt(squares)))
+
+    def outside(self, which: Indices) -> Array:
+        """(m,) bounds on rates by sweeping onto one neighbour, where all are nearer to that."""
+        near, here = self.neighbours(which, NEIGHBOURS), self.places[which][:, None]
+        away, middle = self.places[near] - here, (self.places[near] + here) / 2
+        nearer = self._least_along(away) - (away.conj() * middle).real
+        clear = self.shells[near] < (1 - self.lost) * np.abs(away)
+        found = (clear & (nearer > self.lost * self.extent**2)).any(axis=1)
+        return np.where(found, SHORT / 2, -np.inf)
+
+    def lightest(self, which: Indices) -> tuple[Indices, Array]:
+        """(m, s) neighbours, and weights with the least energy, without first and second moments.
+
+        Weights are all 0 where some would be negative.
+        """
+        near = self.neighbours(which, NEIGHBOURS)
+        weights = np.zeros(near.shape)
+        some = max(1, NUMBERS // (near.shape[1] + 5) ** 2)
+        for start in range(0, len(which), some):
+            part = slice(start, start + some)
+            weights[part] = self._lightest(which[part], near[part])
+        return near, weights
+
+    def _lightest(self, which: Indices, near: Indices) -> Array:
+        """With Lagrange's multipliers, without neighbours whose weights would be negative."""
+        (m, s), rows = near.shape, 5
+        away = self.places[near] - self.places[which][:, None]
+        least = np.abs(away).min(axis=1)[:, None]
+        powers = [(away / least) ** k for k in range(3)]
+        sums = np.stack([part for p in powers for part in (p.real, p.imag)], axis=1)
+        sums = np.delete(sums, 1, axis=1)  # the imaginary part of 1
+        coupled = self.potentials(near[:, :, None], near[:, None, :]) * least[:, :, None]
+        target = np.zeros((m, s + rows))
+        target[:, :s], target[:, s] = least / np.abs(away), 1.0
+        kept, weights, todo = np.ones((m, s), dtype=bool), np.zeros((m, s)), np.arange(m)
+        for _ in range(SEARCHES):
+            here = np.pad(kept[todo].astype(float), ((0, 0), (0, rows)), constant_values=1.0)
+            system = np.zeros((len(todo), s + rows, s + rows))
+            system[:, :s, :s], system[:, s:, :s] = coupled[todo], sums[todo]
+            system[:, :s, s:] = sums[todo].mT
+            system *= here[:, :, None] * here[:, None, :]
+            dropped = 1.0 - here
+            dropped[:, s:] = -1e-13  # so that it is never singular
+            system[:, range(s + rows), range(s + rows)] += dropped
+            found = np.linalg.solve(system, (target[todo] * here)[:, :, None])[:, :s, 0]
+            fits = (found >= 0).all(axis=1)
+            weights[todo[fits]] = found[fits]
+            kept[todo] &= found >= 0
+            todo = todo[~fits]
+        off = np.abs((sums @ weights[:, :, None])[:, :, 0] - target[:, s:]).max(axis=1)
+        weights[off > 1e-9] = 0.0
+        return weights
+
+    def tightest(self, which: Indices, count: int, looked: Indices) -> tuple[Indices, Array]:
+        """(m, s) neighbours, and weights of the least total with (1), t_i = 1, where many are seen.
+
+        By a barrier: from far inside of the constraints, until the total is less than 1.
+        """
+        near = self.neighbours(which, count)
+        weights = np.empty(near.shape)
+        some = max(1, NUMBERS // max(near.shape[1] * (NEAR + RINGS * SECTORS), len(self.support)))
+        for start in range(0, len(which), some):
+            part = slice(start, start + some)
+            weights[part] = self._tightest(which[part], near[part], looked[part])
+        return near, weights
+
+    def _tightest(self, which: Indices, near: Indices, looked: Indices) -> Array:
+        spread = self._spread(which, near[:, 0])
+        seen = np.concatenate((self.neighbours(which, NEAR), spread, looked), axis=1)
+        apart = np.abs(self.places[seen] - self.places[which][:, None])
+        ratios = self.potentials(near[:, :, None], seen[:, None, :]) * apart[:, None, :]
+        diagonal = np.arange(near.shape[1])
+        weights = np.repeat(2.0 / ratios.sum(axis=1).min(axis=1)[:, None], len(diagonal), axis=1)
+        todo, price = np.arange(len(which)), 1.0 / weights.sum(axis=1)
+        for _ in range(STEPS):
+            w, ratio = weights[todo], ratios[todo]
+            room = np.einsum("is,isk->ik", w, ratio) - 1.0
+            scaled = ratio / room[:, None]
+            downhill = scaled.sum(axis=2) + 1.0 / w - price[todo, None]
+            bending = scaled @ scaled.mT
+            bending[:, diagonal, diagonal] += 1.0 / w**2
+            step = np.linalg.solve(bending, downhill[:, :, None])[:, :, 0]
+            shrinks = np.maximum(
+                (-step / w).max(axis=1), (-np.einsum("is,isk->ik", step, scaled)).max(axis=1)
+            )
+            weights[todo] = w + step * np.minimum(1.0, 0.9 / np.maximum(shrinks, 1e-9))[:, None]
+            price[todo] *= 3.0
+            left = CENTRED * len(seen[0]) / price[todo]
+            todo = todo[(1.0 - weights[todo].sum(axis=1) < left) & (left > LEAST)]
+            if not len(todo):
+                break
+        return weights
+
+    def _spread(self, which: Indices, nearest: Indices) -> Indices:
+        """(m, k) some of the support in all directions and at all distances; else the nearest."""
+        away = self.places[self.support] - self.places[which][:, None]
+        itself = self.support == which[:, None]
+        apart = np.abs(np.where(itself, self.extent, away))
+        ring = np.log(apart / apart.min(axis=1, keepdims=True)) / np.log(self.extent / apart.min())
+        sector = np.angle(away) % (2 * np.pi) / (2 * np.pi)
+        place = (ring.clip(0, 0.999) * RINGS).astype(int) * SECTORS
+        place += np.minimum((sector * SECTORS).astype(int), SECTORS - 1)
+        found = np.repeat(nearest[:, None], RINGS * SECTORS, axis=1)
+        row, column = np.nonzero(~itself)
+        found[row, place[row, column]] = self.support[column]
+        return np.asarray(found)
+
+    def rates(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
+        """(m,) 1 - t of (1), and k where it is least; -inf without weights."""
+        total = weights.sum(axis=1, keepdims=True)
+        known = total[:, 0] > 0
+        weights = np.divide(weights, total, out=np.zeros_like(weights), where=known[:, None])
+        reach, beyond = self._reach(which, near, weights)
+        reach = np.where(known, reach, 0.0)
+        centres = self._plane(self.places[which])
+        counts = self._tree.query_ball_point(centres, reach, return_length=True)
+        blocks = np.cumsum(counts) * near.shape[1] // NUMBERS
+        worst, place = beyond, near[:, 0].copy()
+        for block in np.unique(blocks):
+            rows = np.flatnonzero(blocks == block)
+            within = self._tree.query_ball_point(centres[rows], reach[rows])
+            row = np.repeat(rows, counts[rows])
+            seen = self.support[np.concatenate(within).astype(np.intp)]
+            row, seen = row[seen != which[row]], seen[seen != which[row]]
+            swept = self.potentials(near[row], seen[:, None])
+            swept = np.einsum("ij,ij->i", weights[row], swept)
+            ratio = self.potentials(which[row], seen) / swept
+            np.maximum.at(worst, row, ratio)
+            most = ratio == worst[row]
+            place[row[most]] = seen[most]
+        t = (1.0 - SHORT) * (1.0 + self.lost - 2 * SHORT) * worst
+        return np.where(known, 1.0 - t, -np.inf), place
+
+    def _reach(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Array]:
+        """(m,) a distance, or more than all are, and t beyond it over the total of the weights.
+
+        That is 1, or else, as a charge moved by d has at r at least the potential 1 / (r + d),
+        1 + d / r, where so much may be spared.
+        """
+        away = (self.places[near] - self.places[which][:, None]) * (weights > 0)
+        apart = np.abs(away)
+        first, second, third, mixed = (
+            (weights * moment).sum(axis=1) for moment in (away, away**2, away**3, apart**2 * away)
+        )
+        room = self._least_along(first) - (first.conj() * self.places[which]).real
+        room += ((weights * apart**2).sum(axis=1) - 3 * np.abs(second)) / 4
+        room -= self.lost * self.extent**2
+        odd = (5 * np.abs(third) + 3 * np.abs(mixed)) / 8
+        rest = (weights * apart**4).sum(axis=1)
+        most, spare = apart.max(axis=1), self.spare[which] / 2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            expanded = most + (odd + np.sqrt(odd**2 + 4 * room * rest)) / (2 * room)
+            spared = most / spare
+        expanded = np.where(room > 0, np.minimum(1.01 * expanded, self.extent), self.extent)
+        reach = np.minimum(expanded, spared)
+        return reach, np.where(spared < expanded, 1.0 + spare, 1.0)
+
+    def _least_along(self, directions: NDArray[np.complex128]) -> Array:
+        """(...) lower bounds on Re(conj(p) z) over the support, by the two directions next to each p."""
+        step = 2 * np.pi / DIRECTIONS
+        around = np.exp(1j * step * np.arange(DIRECTIONS + 1))
+        least = np.array([(side.conj() * self.places[self.support]).real.min() for side in around])
+        angle = np.angle(directions) % (2 * np.pi) / step
+        k = np.minimum(angle.astype(int), DIRECTIONS - 1)
+        before, after = np.sin(step * np.stack((k + 1 - angle, angle - k)).clip(0.0)) / np.sin(step)
+        return np.asarray(np.abs(directions) * (before * least[k] + after * least[k + 1]))
