@@ -143,7 +143,7 @@ def test_what_is_not_proved_is_said(here: Executor) -> None:
     graze["normal"] = {}
     table = cr.sweep(graze, executor=here)
     assert numbers(table, "status", "message") == [
-        ["undecided", "certified"], ["not certified: 1 of the asperities undecided", ""]
+        ["undecided", "certified"], ["not certified: undecided asperities: 1", ""]
     ]  # fmt: skip
 
 
