@@ -13,6 +13,9 @@ from convexrough.tabular.units import UnitNames
 #: Contacts of fewer asperities than this get a warning.
 FEW = 5
 
+#: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
+RUBBER, DIAMOND = 1e6, 1.2e12
+
 #: Contact radius over radius of curvature at which a paraboloid differs from a sphere by 1 %.
 STEEP = 0.2
 
@@ -89,6 +92,17 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
             f"mean pressure up to {normal['mean_pressure']:.4g}{unit} exceeds the hardness "
             f"{normal['hardness']:.4g}{unit} on {normal['beyond_hardness']} of "
             f"{normal['contact']} asperities: they would yield"
+        )
+
+
+def unlikely_modulus(modulus: float, units: UnitNames) -> Iterator[str]:
+    """A warning if the contact modulus is that of a gel, or of no pair of bodies; needs units."""
+    unit = units.unit("pressure")
+    if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
+        limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"
+        yield (
+            f"contact modulus is {described_modulus(modulus, units)}: {limit} Pa; check that it "
+            "is in the units of [units]"
         )
 
 

@@ -159,7 +159,7 @@ def write_figures(
     folder: Path,
     figures: Mapping[str, Figure],
     *,
-    formats: Sequence[str] = ("png", "svg"),
+    formats: Sequence[str] = ("png",),
     dpi: int = 200,
 ) -> list[Path]:
     """Write each figure in each format; return the paths."""

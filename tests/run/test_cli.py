@@ -282,7 +282,7 @@ def test_nothing_is_solved_while_writing_or_drawing(
     monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
     ran = command("run", "a.toml")
     assert (ran.status, ran.err) == (0, "")
-    assert (tmp_path / "a-results" / "hysteresis.svg").exists()
+    assert (tmp_path / "a-results" / "hysteresis.png").exists()
 
 
 # Every line of what counts as bad input, through the command.

@@ -203,7 +203,7 @@ def test_files(command: Any, contact: cr.Contact, tmp_path: Path) -> None:
     outcome = command("verify", "a.toml", loads, "--out", "found", "--json")
     folder = tmp_path / "found"
     assert {path.name for path in folder.iterdir()} == {
-        "files.json", "verdict.csv", "verdict.json", "verdict.png", "verdict.svg",
+        "files.json", "verdict.csv", "verdict.json", "verdict.png",
     }  # fmt: skip
     assert json.loads(outcome.out) == json.loads((folder / "verdict.json").read_text())
     with (folder / "verdict.csv").open() as file:
