@@ -1,4 +1,4 @@
-"""`read`: a surface from a file, by its kind, in one unit of length."""
+"""`read`: a surface from a file, with all lengths in one unit."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from convexrough.tabular.arrays import named_arrays, reading
 from convexrough.tabular.text import WORKBOOKS
 from convexrough.tabular.units import one_unit
 
-#: Names of files that are text.
+#: Suffixes of text files.
 TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 
-#: What the heights are called in an .npz with several arrays.
+#: Names of the heights in an .npz with several arrays.
 HEIGHTS = ("heights", "height", "z")
 
-#: Rms slopes outside of these are of heights and pixels in different units.
+#: Rms slopes outside this range suggest different units of heights and pixels.
 SLOPES = (1e-7, 10.0)
 
-#: Relative difference of two pixel sizes that are the same.
+#: Relative difference up to which two pixel sizes count as equal.
 SAME = 1e-6
 
 
@@ -40,20 +40,20 @@ def read(
     detrend: Trend | None = "plane",
     fill: bool = False,
 ) -> Surface:
-    """A surface from .npy, .npz, a matrix or list in text, or what SurfaceTopography reads.
+    """The surface in a file: .npy, .npz, .mat, text, or a format that SurfaceTopography reads.
 
-    pixel  : size of a pixel, or those along x and y, [unit]; needed where the file has none
-    unit   : of the pixel, and of the heights unless `height_unit` is given; needed nowhere. A file
-        that names another is refused. Heights in another known unit are converted
-    detrend : the best "plane" or "sphere" to take away, or None
-    fill   : holes (nan, or masked) become as high as a soap film; else they are refused
+    pixel  : [unit] size of a pixel, or sizes along x and y; required if the file states none
+    unit   : unit of the pixel, and of the heights unless `height_unit` is given; optional. A
+        different unit in the file is an error. Heights in another known unit are converted
+    detrend : "plane" or "sphere" to subtract the best one, or None
+    fill   : True to fill holes (nan, or masked) with a harmonic function; else holes are an error
 
-    An .npz holds `heights` and, if it likes, `pixel`, `unit` and `height_unit`. Text is a matrix,
-    with or without Gwyddion's comments on its size, or columns x, y and height on a grid. Other
-    files need the extra `surface`.
+    An .npz file contains `heights`, and may contain `pixel`, `unit` and `height_unit`. A text file
+    is a matrix, possibly with Gwyddion's comments on its size, or columns x, y and height on a
+    grid. Formats of instruments need the extra `surface`.
 
-    Raises FileError where the file cannot be read, as SurfaceTopography is not installed, say, and
-    InputError where it holds no usable map.
+    Raises FileError if the file cannot be read or SurfaceTopography is needed and not installed;
+    InputError if the file contains no usable map.
 
     >>> np.savez(folder / "scan.npz", heights=np.random.default_rng(1).normal(size=(64, 64)))
     >>> cr.surface.read(folder / "scan.npz", pixel=2.5, unit="µm").size
@@ -98,7 +98,7 @@ def _pixel(
 
 
 def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
-    """Without holes, and how many there were."""
+    """The heights without holes, and the number of holes filled."""
     holes = int(np.count_nonzero(np.isnan(heights)))
     if holes == 0:
         return heights, 0
@@ -111,7 +111,7 @@ def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
 
 
 def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | None) -> HeightGrid:
-    """What is in a file, by its kind."""
+    """The map in a file, read according to its suffix."""
     kind = path.suffix.lower()
     with reading(path):
         if kind in TEXT:
