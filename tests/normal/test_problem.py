@@ -73,6 +73,34 @@ def test_the_approach_bound_holds_for_any_weights(sampled: Case, seed: int) -> N
     assert bound * problem.units.length >= approach * (1 - 1e-12)
 
 
+@settings(max_examples=25, deadline=None)
+@given(random_cases(crowding=2.0), st.floats(0.01, 1))
+def test_convexity_number(sampled: Case, size: float) -> None:
+    """The smallest eigenvalue of the scaled Hessian is at least 1 - theta."""
+    scene, approach, kind = sampled
+    problem = assembled(scene, approach=approach, influence=kind)
+    if len(problem) == 0:
+        return
+    loads = problem.bounds(problem.approach_bound) * size
+    root = 1 / np.sqrt(problem.stiffness(loads))
+    hessian = np.eye(len(problem)) + root[:, None] * problem.influence.matrix * root
+    theta = problem.convexity_number(loads)
+    assert np.linalg.eigvalsh(hessian)[0] >= 1 - theta - 1e-12
+    # theta is 2 a / (pi s), in the words of the contact radius.
+    radii = hertz.contact_radius(
+        problem.to_scene(loads) * problem.units.force,
+        scene.material.contact_modulus,
+        scene.relative_radii,
+    )[problem.candidates]
+    points = scene.contact_points[problem.candidates]
+    apart = np.hypot(*(points[:, None] - points).T)
+    np.fill_diagonal(apart, np.inf)
+    true = float((4 * radii / np.pi / apart.min(axis=0)).max())
+    assert theta >= true * (1 - 1e-9)
+    if kind == "dense":  # a lattice takes its spacing for every distance to the nearest
+        assert theta == pytest.approx(true, rel=1e-9)
+
+
 @settings(max_examples=15, deadline=None)
 @given(random_cases(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
 def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) -> None:
