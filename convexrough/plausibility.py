@@ -13,6 +13,9 @@ from convexrough.tabular.units import UnitNames
 #: Fewer asperities in contact than this are no rough surface.
 FEW = 5
 
+#: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
+RUBBER, DIAMOND = 1e6, 1.2e12
+
 #: Contact radius over radius from which the parabola differs from the sphere by 1 %.
 STEEP = 0.2
 
@@ -88,6 +91,17 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
             f"mean pressure up to {normal['mean_pressure']:.4g}{unit} beyond the hardness, "
             f"{normal['hardness']:.4g}{unit}, on {normal['beyond_hardness']} of "
             f"{normal['contact']} asperities: they would yield"
+        )
+
+
+def unlikely_modulus(modulus: float, units: UnitNames) -> Iterator[str]:
+    """A contact modulus that only gels have, or no pair of bodies, where units are named."""
+    unit = units.unit("pressure")
+    if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
+        limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"
+        yield (
+            f"contact modulus is {described_modulus(modulus, units)}: {limit} Pa; is it in the "
+            "units of [units]?"
         )
 
 

@@ -72,11 +72,11 @@ def press_options(command: Command) -> Command:
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
               help="Width in pixels of the square to which a tip is fitted.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Smallest prominence of a hill, as a fraction of Sz.")  # fmt: skip
+              help="Smallest prominence of a hill, over the height range Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,
-              help="Table for a scene file; figures go to its folder.")  # fmt: skip
+              help="Table of summits to write; figures go to the same folder.")  # fmt: skip
 @click.option("--no-figures", is_flag=True, help="Do not write figures.")
 @figure_options
 @click.option("--force", is_flag=True, help="Overwrite a table of an earlier run.")

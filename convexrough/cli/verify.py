@@ -116,8 +116,8 @@ def verify(
 
     LOADS is a table with a column load: text (CSV, TSV, ...), .xlsx, .mat, .npy, .npz or Parquet.
     Columns x and y, or an index, name the asperity of each row; without them the rows are in the
-    order of the scene. The table claims that exactly the asperities with a load touch. If there is
-    a column pressure, rows are nodes or pixels, and their forces are summed at the nearest
+    order of the scene. An asperity with a load is claimed to touch, any other to be open. If there
+    is a column pressure, rows are nodes or pixels, and their forces are summed at the nearest
     asperities.
 
     Exit status: 0 only if the claimed set is proved right, every load and shear force is close

@@ -11,7 +11,7 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
-from convexrough.tabular.table import Reading, read_table
+from convexrough.tabular.table import HOLES, Reading, read_table
 from convexrough.tabular.text import SAMPLE, STYLES, WORKBOOKS, Style, lines_of, sniff, stripped
 
 #: What the third column of a list may be called.
@@ -63,15 +63,15 @@ def _style(body: Sequence[tuple[int, str]]) -> Style | None:
         return None
     style = sniff([line for _, line in body[:SAMPLE]], STYLES)
     first = stripped(style.split(body[0][1]))
-    heads = any(cell and style.number(cell) is None for cell in first)
+    heads = any(cell.lower() not in HOLES and style.number(cell) is None for cell in first)
     return None if heads or len(first) == 3 else style
 
 
 def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array:
-    """The cells of all lines; empty ones are holes."""
+    """The cells of all lines; empty ones, and words such as BAD, are holes."""
     rows: list[Array] = []
     for number, line in body:
-        cells = [cell or "nan" for cell in stripped(style.split(line))]
+        cells = ["nan" if it.lower() in HOLES else it for it in stripped(style.split(line))]
         if (values := style.numbers(cells)) is None:
             found = [style.number(cell) for cell in cells]
             if None in found:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
 from convexrough.surface.detrend import Trend
-from convexrough.surface.grid import HeightGrid, read_grid
+from convexrough.surface.grid import HeightGrid, read_grid, steps
 from convexrough.surface.holes import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import named_arrays, reading
@@ -26,6 +26,10 @@ HEIGHTS = ("heights", "height", "z")
 
 #: Rms slopes outside of these are of heights and pixels in different units.
 SLOPES = (1e-7, 10.0)
+
+#: Numbers that mark pixels without a height, where they lie farther from all heights than so many
+#: times the range of these; and from which size any number there does.
+MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
 #: Relative difference of two pixel sizes that are the same.
 SAME = 1e-6
@@ -46,9 +50,11 @@ def read(
     unit   : of the pixel, and of the heights unless `height_unit` is given; needed nowhere. A file
         that names another is refused. Heights in another known unit are converted
     detrend : the best "plane" or "sphere" to take away, or None
-    fill   : holes (nan, or masked) become as high as a soap film; else they are refused
+    fill   : holes become as high as a soap film; else they are refused. Holes are nan, masked, BAD
+        in text, and marks such as -9999 or 1e38 that lie far from all heights
 
-    An .npz holds `heights` and, if it likes, `pixel`, `unit` and `height_unit`. Text is a matrix,
+    An .npz or .mat holds `heights` and, if it likes, `pixel`, or x and y of the columns and rows,
+    `unit` and `height_unit`. Text is a matrix,
     with or without Gwyddion's comments on its size, or columns x, y and height on a grid. Other
     files need the extra `surface`.
 
@@ -99,10 +105,17 @@ def _pixel(
 
 def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
     """Without holes, and how many there were."""
+    marks = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
+    if marks.any() and (rest := heights[~marks & ~np.isnan(heights)]).size:
+        marks &= np.abs(heights - np.median(rest)) > FAR * np.ptp(rest)
+        named = [f"{each:g}" for each in np.unique(heights[marks])]
+        heights = np.where(marks, np.nan, heights)
+    else:
+        named = []
     holes = int(np.count_nonzero(np.isnan(heights)))
     if holes == 0:
         return heights, 0
-    found = f"{holes:,} holes (nan) in {heights.size:,} pixels"
+    found = f"{holes:,} holes ({', '.join(['nan', *named])}) in {heights.size:,} pixels"
     if holes == heights.size:
         raise InputError("heights", found=found, expected="some heights")
     if not fill:
@@ -125,18 +138,37 @@ def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | Non
 
 def _arrays(path: Path) -> HeightGrid:
     """The map of a file of arrays."""
-    named = {name: np.asarray(values) for name, values in named_arrays(path).items()}
-    if "" in named:
-        return HeightGrid(_numbers(named[""]))
-    maps = [name for name, values in named.items() if values.ndim == 2]
+    found = {name: np.asarray(values) for name, values in named_arrays(path).items()}
+    if "" in found:
+        return HeightGrid(_numbers(found[""]))
+    named = {name.lower(): values for name, values in found.items()} | found
+    maps = [name for name in found if named[name].ndim == 2 and name.lower() not in ("x", "y")]
     chosen = next((name for name in HEIGHTS if name in named), maps[0] if len(maps) == 1 else None)
     if chosen is None:
-        found = ", ".join(named) or "none"
-        raise InputError("arrays", found=found, expected='one called "heights"', where=str(path))
+        names = ", ".join(found) or "none"
+        raise InputError("arrays", found=names, expected='one called "heights"', where=str(path))
     size = np.atleast_1d(named["pixel"]).tolist() if "pixel" in named else None
     both = None if size is None else checked_pixel(tuple(size) if len(size) > 1 else size[0])
     units = [str(named[name]) if name in named else "" for name in ("unit", "height_unit")]
-    return HeightGrid(_numbers(named[chosen]), both, *units)
+    heights = _numbers(named[chosen])
+    if both is None and "x" in named and "y" in named:
+        heights, both = _placed(path, heights, *(_numbers(np.squeeze(named[it])) for it in "xy"))
+    return HeightGrid(heights, both, *units)
+
+
+def _placed(path: Path, heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
+    """Heights in the order of x and y, with the pixel: of two vectors, or a matrix each."""
+    vectors = x.ndim == y.ndim == 1
+    shape = (len(y), len(x)) if vectors else x.shape
+    if heights.shape != shape or not (vectors or y.shape == shape):
+        found = " by ".join(map(str, heights.shape))
+        expected = f"{' by '.join(map(str, shape))}, as y and x are long"
+        expected += "; transpose it" if heights.T.shape == shape else ""
+        raise InputError("heights", found=found, expected=expected, where=str(path))
+    (column, dx), (row, dy) = (steps(path, name, it) for name, it in (("x", x), ("y", y)))
+    placed = np.full((int(row.max()) + 1, int(column.max()) + 1), np.nan)
+    placed[row[:, None] if vectors else row, column] = heights
+    return placed, (dx, dy)
 
 
 def _numbers(values: NDArray[np.generic]) -> Array:

@@ -200,7 +200,13 @@ class Surface(Record, Plottable):
             max_height=self.max_height,
             moments=self.moments,
         )
-        return find_summits(self.heights, self.hills, origin, prune, fit)
+        try:
+            return find_summits(self.heights, self.hills, origin, prune, fit)
+        except InputError as error:
+            if error.what != "summits" or not self.warnings:
+                raise
+            expected = f"{error.expected}; {self.warnings[0]}"
+            raise InputError("summits", found=error.found, expected=expected) from error
 
 
 def checked_pixel(pixel: float | tuple[float, float]) -> tuple[float, float]:

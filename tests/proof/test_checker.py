@@ -91,13 +91,13 @@ def test_it_runs_alone(document: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("contents", "reason"),
     [
-        (b"", "no JSON: Expecting value"),
-        (b"\xff\xfe", "no JSON: 'utf-8' codec"),
+        (b"", "not JSON: Expecting value"),
+        (b"\xff\xfe", "not JSON: 'utf-8' codec"),
         (b"[" * 100_000, "nested too deeply"),
         (b"[]", "expected a table"),
         (b'{"format": 1}', "the number 1: numbers are strings"),
         (b'{"format": NaN}', "the number NaN"),
-        (b'{"format": "", "format": ""}', "a key is there twice"),
+        (b'{"format": "", "format": ""}', "a key appears twice"),
         (b'{"format": ""}', "expected a table of format, scene"),
         (b" " * (checker.MOST_BYTES + 1), "more than"),
     ],

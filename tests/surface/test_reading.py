@@ -10,6 +10,7 @@ from warnings import catch_warnings
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.io import savemat
 
 import convexrough as cr
 
@@ -71,6 +72,36 @@ def test_lists(tmp_path: Path, header: str) -> None:
     named = "µm" in header
     assert surface.unit == ("mm" if named else "")
     assert_allclose(surface.heights, HEIGHTS * (1e-3 if named else 1), rtol=1e-14)
+
+
+@pytest.mark.parametrize("form", ["vectors", "matrices", "matrices along x"])
+def test_matlab_with_axes(tmp_path: Path, form: str) -> None:
+    x, y = (2 * X[0], 3 * Y[:, 0]) if form == "vectors" else (2 * X, 3 * Y)
+    turned = "T" if "along" in form else "real"
+    arrays = {"X": getattr(x, turned), "Y": getattr(y, turned), "z": getattr(HEIGHTS, turned)}
+    savemat(tmp_path / "a.mat", arrays)
+    surface = raw(tmp_path / "a.mat")
+    assert_allclose(surface.pixel, (2, 3))
+    assert_array_equal(surface.heights, HEIGHTS)
+    savemat(tmp_path / "a.mat", arrays | {"z": arrays["z"].T})
+    with pytest.raises(cr.InputError, match="as y and x are long; transpose it"):
+        raw(tmp_path / "a.mat")
+
+
+@pytest.mark.parametrize("mark", ["nan", "BAD", "-9999", "1.70141e38", "N/A"])
+@pytest.mark.parametrize("listed", [False, True])
+def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
+    cells = np.array([[f"{each:.9f}" for each in row] for row in HEIGHTS], dtype=object)
+    cells[3, 4:6] = mark
+    rows = zip(X.ravel(), Y.ravel(), cells.ravel(), strict=True) if listed else cells
+    content = "".join(",".join(map(str, row)) + "\n" for row in rows)
+    path = text(tmp_path, "x,y,z\n" + content if listed else content)
+    pixel = None if listed else 1.0
+    with pytest.raises(cr.ConvexroughError, match=r"2 holes .*--fill"):
+        raw(path, pixel=pixel)
+    filled = raw(path, pixel=pixel, fill=True)
+    assert filled.filled == 2
+    assert_allclose(np.delete(filled.heights, 3, 0), np.delete(HEIGHTS, 3, 0), atol=1e-9)
 
 
 def test_a_file_is_levelled_unless_asked(tmp_path: Path) -> None:

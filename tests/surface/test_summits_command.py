@@ -254,6 +254,18 @@ def test_the_whole_map_beside_its_asperities(command: Any, surface: cr.surface.S
     assert "--whole needs --scene or --radius" in command("summits", "ball.npz", "--whole").err
 
 
+def test_a_tilt_that_leaves_no_summit_is_named(command: Any, surface: cr.surface.Surface) -> None:
+    tilted = surface.heights + np.arange(256)
+    np.savez("tilt.npz", heights=tilted, pixel=1.0, unit="µm")
+    refused = command("summits", "tilt.npz", "--detrend", "none")
+    assert refused.status == 2
+    assert "; a plane, slopes " in refused.err
+    assert "--detrend plane, removes it" in refused.err
+    for form in ("plane", "sphere"):
+        found = command("summits", "tilt.npz", "--detrend", form, "--no-figures", "--force")
+        assert (found.status, "variance" in found.err) == (0, False)
+
+
 @pytest.mark.usefixtures("surface")
 def test_figures_in_the_formats_asked_for(command: Any) -> None:
     assert command("summits", "scan.npz", "--formats", "pdf,png", "--dpi", "50").status == 0

@@ -114,6 +114,7 @@ def doubts_of(normal: Summary) -> Iterator[str]:
 
 def cautions(normal: Summary, units: UnitNames) -> Iterator[str]:
     """Warnings about the limits of the model, which the certificate does not cover."""
+    yield from plausibility.unlikely_modulus(normal["contact_modulus"], units)
     named = units.force and units.length
     yield from plausibility.doubts(normal, f"{units.force}/{units.length}²" if named else "")
 

@@ -13,6 +13,7 @@ from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.friction.cycle import steady
+from convexrough.friction.fretting import fretting, fretting_columns
 from convexrough.friction.path import load_path
 from convexrough.friction.phases import PhaseLosses, phase_losses
 from convexrough.friction.shapes import elliptic_path
@@ -191,7 +192,8 @@ class Settled(Single):
     def tables(self) -> dict[str, Columns]:
         x, y = self.contact.scene.asperities.positions.T
         columns = self.found[0].columns("slips", "stick_radii", "status")
-        tables = {"steady": {"x": x, "y": y, **columns}}
+        worn = fretting_columns([fretting(self.found[0])])
+        tables = {"steady": {"x": x, "y": y, **columns}, "steady_fretting": worn}
         for losses in self.found[1:]:
             tables["phase_losses"] = _by_phase(losses)
         return tables
