@@ -125,9 +125,9 @@ def refines(problem: NormalProblem) -> bool:
     return not problem.influence.stored or len(problem) <= FEW
 
 
-def refined(problem: Problem, start: Trial) -> Trial:
+def refined(problem: Problem, best: Trial) -> Trial:
     """The trial whose residual further corrections do not halve."""
-    best, size, rounding = start, defect_of(start), rounding_of(start)
+    size, rounding = defect_of(best), rounding_of(best)
     todo = size > rounding
     for _ in range(CORRECTIONS):
         if not todo.any():
@@ -158,6 +158,12 @@ def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool
 
     enough : a reduction of the residual by this factor is enough: a number, or (m,) of rows
     """
+    loads, missing = completed(problem, _after_step(problem, state, enough, todo))
+    return trial(problem, loads, missing, problem.moved(state.loads, state.product, loads))
+
+
+def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Pair:
+    """(n,) the loads of `corrected`, before they are scaled to a prescribed total."""
     loads, inside = state.loads, state.inside
     gap = state.gap.value
     local, change = state.local, np.zeros(gap.shape)
@@ -177,10 +183,8 @@ def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool
     following = loads + Pair.exact(change)
     gone = left & ~entering
     if gone.any():
-        following = Pair(np.where(gone, 0.0, following.high), np.where(gone, 0.0, following.low))
-    following, missing = completed(problem, following)
-    product = problem.moved(state.loads, state.product, following)
-    return trial(problem, following, missing, product)
+        return Pair(np.where(gone, 0.0, following.high), np.where(gone, 0.0, following.low))
+    return following
 
 
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
