@@ -25,8 +25,9 @@ from convexrough.roundoff import ROUNDOFF
 #: The error of a level may be at most this, so that rounding makes it exact.
 SURE = 0.45
 
-#: Slices unless more are asked for.
-SLICES = 3
+#: Number of slices, and the number of sites of a box above which there is one more: on 6.6 million
+#: sites, three slices prove loads to 7e-13 of the largest, and four to 3e-15.
+SLICES, LARGE = 3, 2**22
 
 #: Whole numbers of at most so many bits are cut off at once: float64 holds them with a rest.
 MOST_BITS = 48
@@ -125,9 +126,7 @@ class Sliced:
     budget: float
 
     @classmethod
-    def of(
-        cls, box: SiteBox, values: Values, norm: float, unit: float, count: int = SLICES
-    ) -> Sliced:
+    def of(cls, box: SiteBox, values: Values, norm: float, unit: float, count: int) -> Sliced:
         """norm : about the 2-norm of the kernel, over all differences of two sites."""
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
