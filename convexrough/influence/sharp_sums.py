@@ -20,7 +20,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence.mesh import PLACES, twofold_weights
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.sharp_pairs import SharpPairs, soft_terms, soft_values
-from convexrough.influence.sliced import Distances, Sliced
+from convexrough.influence.sliced import SLICES, Distances, Sliced
 from convexrough.influence.softened import TWOFOLD_WEIGHT, Softened, lebesgue
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair, two_product, two_sum
@@ -106,7 +106,7 @@ class MeshSums:
         self.product, self.lows = product, _low_weights(product)
         self.pairs = SharpPairs.of(product)
         values, norm = SoftValues.of(product, unit), unit * product.kernel.norm
-        self.sliced = Sliced.of(mesh, values, norm, unit)
+        self.sliced = Sliced.of(mesh, values, norm, unit, SLICES)
         self.places = np.add.outer(np.arange(mesh.shape[0]) * mesh.padded[1], range(mesh.shape[1]))
 
     def __call__(self, loads: Pair) -> Ball:

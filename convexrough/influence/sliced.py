@@ -26,8 +26,9 @@ from convexrough.roundoff import ROUNDOFF
 #: The error of a level may be at most this, so that rounding makes it exact.
 SURE = 0.45
 
-#: Default number of slices.
-SLICES = 3
+#: Number of slices, and the number of sites of a box above which there is one more: on 6.6 million
+#: sites, three slices prove loads to 7e-13 of the largest load, and four to 3e-15.
+SLICES, LARGE = 3, 2**22
 
 #: Largest number of bits in a slice: float64 holds these and a rest.
 MOST_BITS = 48
@@ -128,9 +129,7 @@ class Sliced:
     budget: float
 
     @classmethod
-    def of(
-        cls, box: SiteBox, values: Values, norm: float, unit: float, count: int = SLICES
-    ) -> Sliced:
+    def of(cls, box: SiteBox, values: Values, norm: float, unit: float, count: int) -> Sliced:
         """Slices of the kernel; norm : about its 2-norm over all differences of two sites."""
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))

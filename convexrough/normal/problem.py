@@ -166,10 +166,11 @@ class NormalProblem:
         errors = off.of(product) + (off.relative + 2 * ROUNDOFF) * most
         return Ball.around(product, errors * (1 + SAFETY))
 
-    def correct(self, slopes: Array, defect: Array, todo: Any = True) -> Array:
+    def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
         """(n,) a correction of the unknowns of the normal map, by one Newton step.
 
         slopes : (n,) c = dP/dn, 0 where open;  defect : (n,) of the normal map
+        enough : a reduction of the defect by this factor is enough
         """
         return correct(
             self.influence,
@@ -177,7 +178,7 @@ class NormalProblem:
             np.sqrt(slopes),
             defect,
             balanced=self.load is not None,
-            tolerance=REDUCTION,
+            tolerance=max(REDUCTION, enough),
         )
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:

@@ -61,6 +61,16 @@ class Newton:
         start: Array | None = None,
     ) -> Solution:
         """The loads of the candidates in the problem's units, from any start without negatives."""
+        loads, approach, iterations = self._found(problem, start)
+        if self._refines(problem):  # the iteration ended early for this
+            trial = refined_loads(problem, loads).frozen()
+            approach, residual = float(trial.approach.value), float(trial.excess.max())
+            return Solution(trial.loads.high, approach, iterations, residual, True, trial)
+        answer = Solution.of(problem, loads, approach, iterations)
+        return replace(answer, refine=not self.tolerance > 0)
+
+    def _found(self, problem: NormalProblem, start: Array | None) -> tuple[Array, float, int]:
+        """The loads (n,), the approach and the number of steps."""
         indentation = _start(problem, start)
         highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
@@ -74,28 +84,17 @@ class Newton:
             state, steps = self._iterate(problem, near, begin)
             iterations += steps
             if len(near) == len(problem):
-                return self._ended(problem, state.forces, state, iterations)
+                return state.forces, state.approach, iterations
             # The gaps of the asperities that were left out.
             loads, gap = _everywhere(problem, near, state)
             touched = gap < 0
             touched[near] = False
             if not touched.any():
-                return self._ended(problem, loads, state, iterations)
+                return loads, state.approach, iterations
             indentation = -gap
             indentation[near] = state.unknown
             touched[near] = True  # none leaves, so that the loop ends
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
-
-    def _ended(
-        self, problem: NormalProblem, loads: Array, state: PressingState, iterations: int
-    ) -> Solution:
-        """The solution; it is refined here if the iteration ended early for that."""
-        if self._refines(problem):
-            trial = refined_loads(problem, loads).frozen()
-            approach, residual = float(trial.approach.value), float(trial.excess.max())
-            return Solution(trial.loads.high, approach, iterations, residual, True, trial)
-        answer = Solution.of(problem, loads, state.approach, iterations)
-        return replace(answer, refine=not self.tolerance > 0)
 
     def _refines(self, problem: NormalProblem) -> bool:
         return problem.influence.cheap_sums and not self.tolerance > 0

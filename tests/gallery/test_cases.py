@@ -1,6 +1,5 @@
 """The hard cases: answers proved anew, and everything of the package run on all of them."""
 
-import dataclasses
 import doctest
 import json
 import re
@@ -182,22 +181,6 @@ def test_sheared_and_cycled(name: str) -> None:
     assert within(state.displacement, [case.displacement], proof.displacement_error)
 
 
-@pytest.mark.sample(3)
-@each_family
-def test_sheared_with_vectors(name: str) -> None:
-    """At nu = 0 the tensor is the scalar kernel, and the answer is that of Ciavarella and Jaeger.
-
-    Ours has nu = 0.3, which divides displacements by c_t and leaves forces as they are.
-    """
-    case, contact = gallery.case(name), pressed(name)
-    scene = contact.scene
-    smooth = dataclasses.replace(scene, material=cr.Material(scene.material.contact_modulus, 0.0))
-    state = cr.shear_vector(dataclasses.replace(contact, scene=smooth), force=case.shear_force)
-    if case.forces:
-        assert true_shear_statuses(case, state.status)
-        assert within(state.forces[:, 0], case.forces, state.certificate.force_errors)
-
-
 @pytest.mark.parametrize("name", ["reversals-random", "reversals-nested"])
 def test_a_hundred_thousand_reversals(name: str, pytestconfig: pytest.Config) -> None:
     """The last of them wipes all others out; without --full some are left out before it."""
@@ -220,16 +203,6 @@ def test_an_asperity_loses_contact_as_the_load_rises() -> None:
     assert all(contact.crowding < 1 for contact in contacts)
     scenes = [contact.scene.asperities.heights.tolist() for contact in contacts]
     assert scenes[0] == scenes[1] == scenes[2]
-
-
-def test_a_load_path_across_lost_contact_claims_nothing() -> None:
-    """Order fails, on which its memory curve and errors rest."""
-    contact = pressed("losing-contact-after")
-    loads = contact.load * np.array([0.86, 0.951, 1.0])
-    path = cr.load_path(contact.scene, loads=loads, forces=0.1 * loads)
-    assert path.order == "fails"
-    assert np.isinf(path.asperity_force_errors).all()
-    assert {*path.status[:, 1:].ravel()} == {"undecided"}
 
 
 def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:

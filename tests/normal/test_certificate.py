@@ -228,17 +228,6 @@ def test_the_rounding_of_the_residual_is_counted(name: str, kind: Kind) -> None:
         ).all()
 
 
-def test_gaps_of_screened_asperities() -> None:
-    """A small difference of a large height and a large drop keeps the rounding of both."""
-    height = 3.1**2 / 2 - 1e-8 - 1e-12
-    scene = cr.Scene(
-        1.0, cr.Asperities([[0, 0], [3.1, 0]], 0.02, [0, height]), MATERIAL, geometry="summit"
-    )
-    certificate = cr.press(scene, approach=1e-8).certificate
-    exact = reference(scene, approach=1e-8)
-    assert_honest(certificate, cr.press(scene, approach=1e-8).loads, exact)
-
-
 @pytest.mark.sample(10)
 @pytest.mark.parametrize("seed", range(40))
 def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:

@@ -144,7 +144,7 @@ def test_not_certified_is_exit_status_three(
     assert outcome.status == 3
     assert Path("summits.csv").exists()
     assert " none " in outcome.out
-    assert "not to be trusted" in outcome.err
+    assert "cannot be trusted" in outcome.err
 
 
 @pytest.mark.usefixtures("surface")
@@ -232,7 +232,7 @@ def test_holes_are_filled_where_asked_and_counted(command: Any) -> None:
 @pytest.mark.usefixtures("surface")
 def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any) -> None:
     outcome = command("summits", "scan.npz", "--radius", "1e4", "--approach", "-100")
-    assert "warning: at a pruning of 0.05 nothing touches: trust is that of a" in outcome.err
+    assert "warning: at a pruning of 0.05 nothing touches, so the model is not" in outcome.err
     assert "to be trusted     nothing, as nothing touches" in outcome.out
 
 

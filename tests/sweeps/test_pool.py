@@ -86,7 +86,7 @@ def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None
 def test_an_executor_that_broke_is_said_to_be() -> None:
     with (
         ProcessPoolExecutor(1, mp_context=SPAWN) as mine,
-        pytest.raises(cr.WorkerError, match="of no use any more"),
+        pytest.raises(cr.WorkerError, match="executor is broken"),
     ):
         run(deadly(PLAN, 3), mine)
 
