@@ -99,7 +99,7 @@ def test_where_there_is_none(command: Any) -> None:
     """All else is computed and written; what is missing is said, and the status says so."""
     keys = 'of = "loss"\nfraction = 1.0\nholding = "approach"'
     said = "[gradient] fraction: found 1, a force of 1.804266945e-07: gross sliding, expected a "
-    said += "force below f P: with the approach held f P may fall below the force"
+    said += "force below f P: at constant approach f P may fall below the force"
     write(f"[gradient]\n{keys}\n[cycle]\nmaximum_fraction = [0.5]\n")
     outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 3

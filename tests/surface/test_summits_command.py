@@ -165,7 +165,7 @@ def test_nothing_is_overwritten_unasked(command: Any) -> None:
     ("arguments", "message"),
     [
         (("missing.npy",), "missing.npy: cannot be read: No such file"),
-        (("bare.npy",), "bare.npy: pixel: found none, expected its size, as the file does not say"),
+        (("bare.npy",), "bare.npy: pixel: found none, expected its size, which the file does not"),
         (("bare.npy", "--pixel", "one"), "--pixel: found 'one', expected a number, or two"),
         (("bare.npy", "--pixel", "1,30"), "pixel: found 1 by 30, expected sides at most 1 to 10"),
         (("bare.npy", "--pixel", "-1"), "pixel: found -1.0, expected a positive number"),
