@@ -127,7 +127,7 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         (matrix(1e-9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
         (matrix(), {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
         (matrix(), {"pixel": 1.0, "unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
-        (matrix(), {"pixel": 1.0, "height_unit": "nm"}, "unit: found none, expected the unit of the pix"),
+        (matrix(), {"pixel": 1.0, "height_unit": "nm"}, "unit: found none, expected the unit of"),
         (
             "# Width: 9 µm\n# Height: 7 µm\n" + matrix(),
             {"unit": "nm"},
