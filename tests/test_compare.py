@@ -293,7 +293,7 @@ def test_command_with_a_log(command: Any, tmp_path: Path) -> None:
     assert all(np.isfinite([float(number) for number in row]).all() for _, *row in steps)
     again = command("compare", "a.toml", "--log", "log.csv")
     assert (again.status, again.out) == (2, "")
-    assert "log.csv: is there already" in again.err
+    assert "log.csv: exists already" in again.err
 
 
 def fail(*_: Any, **__: Any) -> None:

@@ -95,7 +95,7 @@ def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float =
     raise SolverError(
         f"pressures not found to {accuracy:g} of the overlap in {STEPS} steps",
         solver="boundary elements",
-        advice="press less deep, or on a smoother map",
+        advice="use a smaller approach, or a smoother map",
     )
 
 

@@ -81,8 +81,8 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
             curvature = float(0 - k / np.sqrt(b * b + c * c + 1 - 2 * a * k)) / size
             removed = Removed(kind, level + size * float(q0), slopes, curvature)
             return removed, level + size * z
-    expected = "one that spans the map; a plane always does"
-    raise InputError("detrend", found="no best sphere", expected=expected)
+    expected = 'one that covers the map, or "plane"'
+    raise InputError("detrend", found="no sphere that fits", expected=expected)
 
 
 def _least_squares(factors: list[Array], misfit: Array) -> Array:

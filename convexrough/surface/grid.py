@@ -123,7 +123,7 @@ def _from_list(path: Path) -> HeightGrid:
         found = f"{len(z):,} points of a grid of {heights.size:,}"
         raise InputError("x, y", found=found, expected="a regular grid", where=str(path))
     if len(np.unique(row * heights.shape[1] + column)) < len(z):
-        raise InputError("x, y", found="a place twice", expected="each once", where=str(path))
+        raise InputError("x, y", found="a point twice", expected="each once", where=str(path))
     heights[row, column] = z
     return HeightGrid(heights, (dx, dy), units[0], units[2])
 
@@ -134,7 +134,7 @@ def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:
     apart = np.diff(levels)
     if not np.isfinite(levels).all() or len(levels) < 2:
         found = "one value or none" if len(levels) < 2 else "values that are not finite"
-        raise InputError(name, found=found, expected="places on a grid", where=str(path))
+        raise InputError(name, found=found, expected="coordinates on a grid", where=str(path))
     clear = apart[apart > 1e-3 * apart.max()]  # smaller differences are rounding errors
     step = float(np.median(clear))
     count = np.rint((levels[-1] - levels[0]) / step)
@@ -143,6 +143,6 @@ def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:
     number = np.rint(lines)
     if np.abs(lines - number).max() > OFF_GRID:
         worst = float(values[np.argmax(np.abs(lines - number))])
-        expected = f"places {step:g} apart"
+        expected = f"coordinates {step:g} apart"
         raise InputError(name, found=f"{worst:g}", expected=expected, where=str(path))
     return number.astype(np.intp), step

@@ -40,7 +40,7 @@ def read_instrument(
             topography = reader.topography(**given)
     except ReadFileError as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise FileError(f"{path}: no format that SurfaceTopography knows: {reason}") from error
+        raise FileError(f"{path}: SurfaceTopography cannot read it: {reason}") from error
     if topography.dim != 2:
         raise InputError("file", found="a line scan", expected="a map", where=str(path))
     heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)

@@ -69,7 +69,7 @@ def read(
         length = one_unit("unit", unit, grid.unit)
         upwards = one_unit("height_unit", height_unit, grid.height_unit)
         if upwards and not length:
-            expected = f"that of a pixel, as heights are {upwards.name}"
+            expected = f"the unit of the pixel, as heights are in {upwards.name}"
             raise InputError("unit", found="none", expected=expected)
         heights, holes = _mended(grid.heights, fill)
         if upwards and length:
@@ -90,7 +90,7 @@ def _pixel(
 ) -> tuple[float, float]:
     if given is None:
         if found is None:
-            expected = "its size, as the file does not say: pixel=, or --pixel"
+            expected = "its size, which the file does not state: pixel=, or --pixel"
             raise InputError("pixel", found="none", expected=expected)
         return checked_pixel(found)
     if found is None:

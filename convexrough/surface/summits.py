@@ -219,5 +219,5 @@ def _checked_fit(fit: int, shape: tuple[int, int]) -> int:
         raise InputError("fit", found=repr(fit), expected="an odd number of pixels, at least 3")
     if min(shape) < fit:
         found = f"{shape[1]} by {shape[0]} pixels"
-        raise InputError("map", found=found, expected=f"at least the {fit} by {fit} of a fit")
+        raise InputError("map", found=found, expected=f"at least {fit} by {fit}, as fit is {fit}")
     return int(fit)

@@ -214,7 +214,7 @@ def checked_pixel(pixel: float | tuple[float, float]) -> tuple[float, float]:
     """The sizes (dx, dy) of a pixel, checked."""
     both = pixel if isinstance(pixel, (tuple, list)) else (pixel, pixel)
     if len(both) != 2:
-        raise InputError("pixel", found=f"{len(both)} numbers", expected="one, or that of x and y")
+        raise InputError("pixel", found=f"{len(both)} numbers", expected="one or two")
     dx, dy = (checks.positive("pixel", each) for each in both)
     if max(dx, dy) > MOST_ASPECT * min(dx, dy):
         found = f"{dx:g} by {dy:g}"
@@ -229,7 +229,7 @@ def _checked(heights: ArrayLike) -> Array:
         raise InputError("heights", found=f"shape {grid.shape}", expected=expected)
     if holes := np.count_nonzero(np.isnan(grid)):
         found = f"{holes:,} holes (nan) in {grid.size:,} pixels"
-        raise InputError("heights", found=found, expected="none, or leave to fill them")
+        raise InputError("heights", found=found, expected="none: `read` can fill them")
     if not (good := np.abs(grid) <= checks.LARGEST).all():
         row, column = np.argwhere(~good)[0]
         found = f"{grid[row, column]} in row {row}, column {column}"

@@ -107,12 +107,12 @@ class Folder:
 def open_folder(path: Path) -> Folder:
     """The folder of an existing sweep. Raises FileError if there is none."""
     if not (path / MANIFEST).exists():
-        raise FileError(f"{path}: no sweep: there is no {MANIFEST}")
+        raise FileError(f"{path}: not a sweep: there is no {MANIFEST}")
     try:
         with file_errors(path / MANIFEST, "be read"):
             manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
         if not isinstance(manifest, dict) or manifest.get("schema") != 2:
-            raise ValueError("no sweep of this version")
+            raise ValueError("not a sweep of this version")
     except ValueError as error:
         raise FileError(f"{path / MANIFEST}: cannot be read: {error}") from error
     return Folder(path, manifest)
@@ -133,7 +133,7 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
             # Another process may write a manifest meanwhile, of the same sweep or another.
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
         if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
-            raise FileError(f"{path}: holds {strangers[0]}, and no sweep; --out takes another")
+            raise FileError(f"{path}: holds {strangers[0]}, but no sweep; --out names another")
         if not (path / MANIFEST).exists():
             write_text(path / MANIFEST, to_json(manifest) + "\n")
     folder = open_folder(path)

@@ -46,7 +46,7 @@ def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
         dead += yield from _together(iter((batch,)), executor)
     if dead:
         which = ", ".join(map(str, dead))
-        raise WorkerError(f"the process that computed scenes {which} died, twice")
+        raise WorkerError(f"the process that computed scenes {which} died twice")
 
 
 def _together(

@@ -78,7 +78,7 @@ def sweep(
     if isinstance(what, (str, os.PathLike, Mapping)):
         for name, value in given.items():
             if value is not None:
-                raise InputError(name, found="given", expected="in the tables of the sweep")
+                raise InputError(name, found="given", expected="none: the sweep tables have it")
         from convexrough.sweeps.file import plan_of, read_sweep  # it loads pydantic
 
         if isinstance(what, Mapping):
@@ -146,7 +146,7 @@ def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
         raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
     first, stop = plan.parts * (k - 1) // n, plan.parts * k // n
     if (count := (stop - first) * plan.size) > MOST:
-        expected = f"at most {MOST:,} at once; a part of the sweep (K/N) may be that small"
+        expected = f"at most {MOST:,} at once: compute the sweep in parts (K/N)"
         where = str(plan.said["source"])
         raise InputError("scenes", found=f"about {count:,}", expected=expected, where=where)
     return [plan.part(number) for number in range(first, stop)]

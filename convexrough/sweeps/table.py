@@ -224,7 +224,7 @@ class SweepTable(Record):
     def _refuse_unknown(self, names: Iterable[str]) -> None:
         for name in names:
             if name not in self.columns:
-                expected = f"one of the table: {checks.nearest(name, self.columns)}"
+                expected = f"a column of the table: {checks.nearest(name, self.columns)}"
                 raise InputError("column", found=repr(name), expected=expected)
 
     def _rows(self) -> Iterator[tuple[str, str]]:

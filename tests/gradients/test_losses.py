@@ -148,12 +148,12 @@ def test_gross_sliding_from_one_side() -> None:
 def test_no_derivative_in_gross_sliding() -> None:
     contact = pressed("rough", "load")
     force = FRICTION * contact.load
-    with pytest.raises(cr.InputError, match="with the approach held f P may fall below"):
+    with pytest.raises(cr.InputError, match="at constant approach f P may fall below"):
         cr.cycle(contact, maximum=force).gradient(holding="approach")
     pair = cr.Asperities([[-0.0015, 0.0], [0.0015, 0.0]], 0.02)
     even = with_friction(cr.Scene(1.0, pair, cr.Material(1.0, 0.3), geometry="summit"))
     together = cr.press(even, load=1e-8)
-    with pytest.raises(cr.InputError, match="several asperities slide last, together"):
+    with pytest.raises(cr.InputError, match="several asperities slide last"):
         cr.cycle(together, maximum=FRICTION * together.load).gradient()
     with pytest.raises(cr.InputError, match="asperity: found 1, which slides last, together with"):
         cr.onset_gradient(together, 1)
@@ -192,7 +192,7 @@ def test_normalised(name: str, holding: Any) -> None:
         check(of, explicit)
     errors = np.abs(g.height_errors).max()
     assert 0 < errors <= SHARP * np.abs(g.heights).max()
-    with pytest.raises(cr.InputError, match="the gradient of a cycle"):
+    with pytest.raises(cr.InputError, match="the gradient of the loss of a cycle"):
         _ = contact.gradient(load=1.0).normalised
 
 

@@ -358,13 +358,13 @@ def test_a_point_that_is_repeated_has_two_sides() -> None:
 def test_what_has_no_derivative() -> None:
     contact = small()
     scene = contact.scene
-    with pytest.raises(cr.InputError, match="a contact that carries some load"):
+    with pytest.raises(cr.InputError, match="a contact with a load"):
         cr.press(scene, approach=-1e-4).gradient(load=1.0)
-    with pytest.raises(cr.InputError, match="at least one: weights"):
+    with pytest.raises(cr.InputError, match="weights of at least one"):
         contact.gradient()
     with pytest.raises(cr.InputError, match='expected "load" or "approach"'):
         contact.gradient(load=1.0, holding="both")  # type: ignore[arg-type]
-    with pytest.raises(cr.InputError, match="where all slide, a history has no derivative"):
+    with pytest.raises(cr.InputError, match="in gross sliding a history has no derivative"):
         cr.history(contact, forces=[FRICTION * contact.load]).gradient(losses=[1.0])
     with pytest.raises(cr.InputError, match="19 values, one per asperity"):
         contact.gradient(loads=[1.0, 2.0])

@@ -34,7 +34,7 @@ def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("precious")
     outcome = command("new", "mine.toml")
     assert outcome.status == 2
-    assert "mine.toml: is there already, and stays as it is; name another" in outcome.err
+    assert "mine.toml: exists already; name another" in outcome.err
     assert (tmp_path / "mine.toml").read_text() == "precious"
     assert command("new", "no/such/folder.toml").status == 2
 

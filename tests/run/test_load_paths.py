@@ -156,7 +156,10 @@ def test_nothing_is_proved_where_order_fails(command: Any, monkeypatch: pytest.M
     summary = json.loads(Path("out/summary.json").read_text())
     for stage in ("path", "steady", "shakedown"):
         assert summary[stage]["order"] == "fails"
-        assert f"not proved: the order of indentations, on which [{stage}] rests" in outcome.err
+        assert (
+            f"not proved: the order of indentations that the proof of [{stage}] needs"
+            in outcome.err
+        )
     assert summary["steady"]["loss_error"] is None
     assert summary["steady"]["undecided"] > 0
     assert summary["shakedown"]["proved"] is False

@@ -50,7 +50,7 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
     assert command("check", "proof.json").status == 0
     again = command("verify", "first.toml", loads, "--proof")
     assert again.status == 2
-    assert "proof.json: is there already" in again.err
+    assert "proof.json: exists already" in again.err
 
 
 def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:
