@@ -58,7 +58,7 @@ def test_the_papers_example(kind: Kind) -> None:
     assert contact.model_error == pytest.approx(0.002, abs=5e-4)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_fifty_digits(name: str, kind: Kind, control: str) -> None:

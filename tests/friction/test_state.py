@@ -10,7 +10,7 @@ from scenes import MATERIAL, PAPER_APPROACH, paper
 import convexrough as cr
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("fraction", FRACTIONS)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("influence", KINDS)

@@ -72,7 +72,7 @@ def true_shear_statuses(case: cr.gallery.HardCase, statuses: Any) -> bool:
     return bool(((statuses == allowed) | (statuses == "undecided")).all())
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @each_case
 def test_the_stored_answer_is_computed_anew(name: str) -> None:
     case = json.loads(gallery_answers.PATH.read_text())[name]
@@ -112,7 +112,7 @@ def test_cases_are_as_near_as_their_names_say() -> None:
         assert pressed(f"discs-{count}-overlapping").crowding == pytest.approx(1.05)
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(10)
 @each_operator
 def test_statuses_and_bounds_when_pressed(name: str, operator: Any) -> None:
     case, contact = gallery.case(name), pressed(name, operator)
@@ -143,7 +143,7 @@ def test_proofs_end_where_the_cases_say(threshold: str, below: str, above: str) 
     assert scopes == [below, above]
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(8)
 @each_case
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: solver.name)
 def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
@@ -163,7 +163,7 @@ def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
     assert case.check(contact.loads).error < SQUARED
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @each_case
 def test_sheared_and_cycled(name: str) -> None:
     case, contact = gallery.case(name), pressed(name)
@@ -213,7 +213,7 @@ def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
     return cr.Scene(radius, asperities, material, scene.friction, scene.geometry)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @each_family
 @pytest.mark.parametrize(("length", "modulus"), [(2.0**5, 2.0**-4), (2.0**-11, 2.0**10)])
 def test_powers_of_two_scale_every_bit(name: str, length: float, modulus: float) -> None:
@@ -237,7 +237,7 @@ def test_powers_of_two_scale_every_bit(name: str, length: float, modulus: float)
     assert loss == cr.cycle(one, maximum=case.shear_force).loss * force * length
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(6)
 @each_case
 def test_verify_is_not_fooled(name: str) -> None:
     """One asperity forgotten, one loaded too many: the nearest to being right."""

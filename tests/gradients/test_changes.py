@@ -61,7 +61,7 @@ CASES = [
 ]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("name", "holding", "fraction"), CASES)
 def test_everything_that_changes(name: str, holding: str, fraction: float) -> None:
     contact = pressed(name, holding)

@@ -44,7 +44,7 @@ def assert_both(
         assert max(loss.balance_defect, moved.balance_defect) < 1e-14
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("fraction", [1e-2, 0.4, 0.999])
 def test_every_derivative(name: str, fraction: float) -> None:
@@ -84,7 +84,7 @@ def random_scene(rng: np.random.Generator) -> tuple[cr.Scene, float]:
     return scene, float(approach - scene.offsets.max())
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("seed", range(40))
 def test_no_bound_is_too_small(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -108,7 +108,7 @@ def test_gaps_of_asperities_that_could_not_touch() -> None:
 STATES = [("summit", "load", 1e-3), ("summit", "approach", 0.5), ("closest", "load", 0.95)]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("geometry", "holding", "fraction"), STATES)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_any_sum_of_forces_and_slips(
@@ -292,7 +292,7 @@ def assert_path(gradient: cr.Gradient, contact: cr.Contact, P: Any, Q: Any, valu
         assert float(slope) == pytest.approx(gradient.friction, rel=1e-12)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("name", "number"),
     [

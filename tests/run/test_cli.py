@@ -67,7 +67,7 @@ def test_json_is_one_object_and_the_summary(command: Any, tmp_path: Path) -> Non
 
 
 def test_paper(command: Any, tmp_path: Path) -> None:
-    outcome = command("paper", "--json", "--no-figures")
+    outcome = command("paper", "--json", "--no-figures", "--html")
     assert outcome.status == 0
     paper = json.loads(outcome.out)["paper"]
     assert paper["contacts"] == {"paper": 37, "computed": 37}
@@ -81,6 +81,7 @@ def test_paper(command: Any, tmp_path: Path) -> None:
         *("fig7_asperities", "fig8_loops", "fig9_energy"),
     }
     assert (folder / "summary.json").exists()
+    assert (folder / "slider.html").stat().st_size < 1_000_000
     assert paper["sliding_at_half"] == {"paper": 6, "computed": 6}
     assert paper["sliding_ring_at_half"]["computed"] == "A"
     assert paper["first_slide"]["computed"] == pytest.approx(0.352, abs=5e-4)

@@ -99,7 +99,7 @@ def residual(problem: NormalProblem, contact: cr.Contact) -> float:
     return problem.residual(loads, approach) / approach
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("kind", ["lattice", "scattered"])
 @pytest.mark.parametrize("name", SCENES)
@@ -177,7 +177,7 @@ def test_manufactured_contacts(
     assert not ((contact.status == "contact") & (gaps > 1e-9 * approach)).any()
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", ["none", "one", "far", "huge", "random", "opposite"])
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_any_start(kind: str, control: str) -> None:
@@ -198,7 +198,7 @@ def test_any_start(kind: str, control: str) -> None:
     assert_allclose(contact.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("approach", "steps"), [(-1e-6, 0), (1e-12, 6), (1e-8, 8), (1e-6, 8), (1e-5, 8), (1e-4, 12)]
 )

@@ -22,7 +22,7 @@ from convexrough import FrictionConic, shear_vector
 from convexrough.vector_shear.problem import VectorProblem
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("fraction", [1e-40, *VECTOR_FRACTIONS, 0.9999])
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_cones_and_newton_agree(nu: float, fraction: float) -> None:
