@@ -338,14 +338,6 @@ def test_command_beyond_the_convex_range(command: Any, tmp_path: Path) -> None:
     assert all("too dense for a convex program" in row["message"] for row in rest)
 
 
-def test_command_with_wrong_input(command: Any, tmp_path: Path) -> None:
-    assert command("compare", "none.toml").status == 2
-    (tmp_path / "a.toml").write_text(scene_text(normal="approach = nan"))
-    ran = command("compare", "a.toml")
-    assert (ran.status, ran.out) == (2, "")
-    assert "a.toml: [normal] approach: found nan" in ran.err
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("name", "solver"),

@@ -324,28 +324,6 @@ def test_bad_scenes(command: Any, tmp_path: Path, scene: str, expected: str) -> 
 
 
 @pytest.mark.parametrize(
-    ("summits", "expected"),
-    [
-        (None, "summits.csv: cannot be read: No such file or directory"),
-        (b"", "summits.csv: empty"),
-        (b"x,y\n", "summits.csv: rows: found none"),
-        (b"x,y\n1,1\n0,0\n1,1\n", "asperities 0 and 2 (from 0) at a distance of 0"),
-        (b"x,y,height\n0,0,inf\n", "summits.csv: row 2, column height: found inf"),
-        (b"x,y\n0,\xff\n", "summits.csv: row 2, column y: found '\xff'"),
-    ],
-)
-def test_bad_summits(command: Any, tmp_path: Path, summits: bytes | None, expected: str) -> None:
-    (tmp_path / "a.toml").write_text(scene_text(SUMMITS))
-    if summits is not None:
-        (tmp_path / "summits.csv").write_bytes(summits)
-    outcome = command("run", "a.toml")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert expected in outcome.err
-    assert outcome.err.startswith("convexrough: error: summits.csv")
-    assert not (tmp_path / "a-results").exists()
-
-
-@pytest.mark.parametrize(
     ("loads", "expected"),
     [
         ("load\n" + "1e-9\n" * 36, "loads.csv: rows: found 36, expected 61"),
