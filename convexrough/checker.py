@@ -1,16 +1,17 @@
 """Check a proof of which asperities touch, and which slide: python checker.py proof.json
 
-Needs the standard library only and believes nothing in the file. The contact law asks of n contact
-radii a_i, with loads P_i = 4 E* a_i^3 / (3 R_i), D_i = D0 + d_i and relative radii R_i,
+This file needs only the standard library and trusts no claim of the proof. With contact radii a_i,
+loads P_i = 4 E* a_i^3 / (3 R_i), relative radii R_i, distances r_ij, offsets d_i and
+D_i = D0 + d_i at the approach D0, the contact law of n asperities is
 
     a_i^2 / R_i + sum_j 4 a_j^3 / (3 pi R_j r_ij)  =  D_i  where a_i > 0,  >=  D_i  where a_i = 0.
 
-The file states a scene, radii near its solution, a box of radii, why the energy is convex on that
-box, and what it claims. Its numbers are float64 in hexadecimal: exact rationals. Numbers computed
-here are rational, too, or enclosed between rationals. docs/theory/proof-file-steps.md derives
-them, under the numbers (1) to (12) that comments cite.
+A proof file contains a scene, radii near its solution, a box of radii, an argument that the energy
+is convex on this box, and claims. Its numbers are float64 in hexadecimal, so exact rationals. The
+checker computes with rationals and with intervals between rationals. Comments cite the equations
+(1) to (12) of docs/theory/proof-file-steps.md.
 
-Exit status: 0 all that is claimed is proved; 1 refused, with the reason; 2 unreadable.
+Exit status: 0 if all claims are proved; 1 if one is refused, with the reason; 2 if unreadable.
 """
 
 from __future__ import annotations
@@ -30,11 +31,11 @@ FORMAT = "convexrough proof 2"
 MOST_ASPERITIES, MOST_BYTES = 3000, 1 << 24
 MOST_INVERTED = 600  # touching asperities whose matrix is inverted to prove order: half a minute
 BITS = 128  # significant bits to which the ends of an interval are rounded, outwards
-GRID = 200  # bits of the largest coordinate as an integer: points are known to 1 on that grid
+GRID = 200  # bits of the largest coordinate as an integer; points are rounded to this grid
 NEAREST = 1 << 100  # asperities nearer than this on the grid are refused
-UNIT = 1 << 320  # an inverse distance is an integer over this, too small by SLACK at most
+UNIT = 1 << 320  # inverse distances are integers over this, too small by at most the factor SLACK
 SLACK = 1 + Fraction(1, 1 << 96)
-FAR = 1 << 400  # stands for the distance of an asperity to itself, as it does not push itself
+FAR = 1 << 400  # the distance from an asperity to itself, so that it does not displace itself
 ROOT_BITS = 60  # of the integer Cholesky factor
 ONE_BITS = 80  # of fixed-point numbers in the proof of order
 ONE = 1 << ONE_BITS
@@ -43,18 +44,18 @@ Tell = Callable[[str], object]
 
 
 class Refused(Exception):
-    """Something that is claimed is not proved."""
+    """A claim is not proved."""
 
 
 class Unreadable(Exception):
-    """This is not a proof."""
+    """The file is not a proof."""
 
 
 # Numbers ------------------------------------------------------------------------------------------
 
 
 def rounded(x: Fraction | int, up: bool) -> Fraction:
-    """To BITS significant bits."""
+    """x rounded up or down to BITS significant bits."""
     n, d = x.as_integer_ratio()
     shift = BITS - n.bit_length() + d.bit_length()
     n, d = n << max(shift, 0), d << max(-shift, 0)
@@ -63,7 +64,7 @@ def rounded(x: Fraction | int, up: bool) -> Fraction:
 
 
 def root(x: Fraction, up: bool) -> Fraction:
-    """The square root to about BITS bits."""
+    """The square root of x, rounded up or down to about BITS bits."""
     if x <= 0:
         return Fraction(0)
     scale = Fraction(2) ** (BITS + (x.denominator.bit_length() - x.numerator.bit_length()) // 2)
@@ -72,7 +73,7 @@ def root(x: Fraction, up: bool) -> Fraction:
 
 
 class Interval:
-    """Holds a real number between two rationals."""
+    """An interval between two rationals, which contains a real number."""
 
     def __init__(self, low: Fraction | int, high: Fraction | int | None = None) -> None:
         self.low = rounded(low, up=False)
@@ -93,14 +94,14 @@ class Interval:
     def __truediv__(self, other: Interval | Fraction | int) -> Interval:
         other = interval(other)
         if other.low <= 0:
-            raise Refused("a number that is divided by may be 0")
+            raise Refused("a divisor may be 0 or negative")
         return self * Interval(1 / other.high, 1 / other.low)
 
     def positive_part(self) -> Interval:
         return Interval(max(self.low, Fraction(0)), max(self.high, Fraction(0)))
 
     def root(self) -> Interval:
-        """Of a number that is not negative."""
+        """The square root of a number that is not negative."""
         return Interval(root(self.low, up=False), root(self.high, up=True))
 
     def wider(self, by: Fraction) -> Interval:
@@ -126,11 +127,11 @@ PI = Interval(*(Fraction(31415926535897932384626433832795028841971 + i, 10**40) 
 
 
 def read(path: str) -> Any:
-    """The file as JSON without numbers, and without keys that are there twice."""
+    """The contents of a file of JSON without numbers and without repeated keys."""
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len(dict(pairs)) < len(pairs):
-            raise Unreadable("a key is there twice")
+            raise Unreadable("a key appears twice")
         return dict(pairs)
 
     def refuse(text: str) -> None:
@@ -146,13 +147,13 @@ def read(path: str) -> Any:
     except OSError as error:
         raise Unreadable(error.strerror or "no file") from error
     except ValueError as error:
-        raise Unreadable(f"no JSON: {error}") from error
+        raise Unreadable(f"not JSON: {error}") from error
     except RecursionError as error:
         raise Unreadable("nested too deeply") from error
 
 
 def table(value: Any, *keys: str) -> list[Any]:
-    """The values of these keys; there may be no others, which would not be checked."""
+    """The values of these keys. Other keys are refused, as they would not be checked."""
     if not isinstance(value, dict) or set(value) != set(keys):
         found = ", ".join(value) if isinstance(value, dict) else type(value).__name__
         raise Unreadable(f"expected a table of {', '.join(keys)}, found {found[:200]}")
@@ -166,7 +167,7 @@ def as_list(values: Any, n: int | None = None) -> list[Any]:
 
 
 def number(text: Any) -> Fraction:
-    """A float64 as float.hex writes it, and no other way: so nothing is rounded in reading."""
+    """A float64 exactly as float.hex writes it, so that reading rounds nothing."""
     try:
         value = float.fromhex(text)
         if math.isfinite(value) and value.hex() == text:
@@ -181,31 +182,31 @@ def numbers(values: Any, n: int | None = None) -> list[Fraction]:
 
 
 def added(texts: Any) -> Fraction:
-    """A number to more digits than float64 has: the sum of a list."""
+    """The sum of a list, a number with more digits than float64 has."""
     return sum(numbers(texts), Fraction(0))
 
 
 def digest(scene: Any, prescribed: Any) -> str:
-    """SHA-256 of both as one JSON object with sorted keys and without blanks."""
+    """SHA-256 of both as one JSON object with sorted keys and without spaces."""
     given = {"prescribed": prescribed, "scene": scene}
     text = json.dumps(given, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 class Scene(NamedTuple):
-    """What is given; lengths are exact."""
+    """The scene, without rounding of lengths."""
 
-    modulus: Fraction  # E*, which only turns radii into loads
-    ratio: Fraction  # Poisson's
+    modulus: Fraction  # E*, used only for loads from radii
+    ratio: Fraction  # Poisson's ratio
     friction: Fraction
     radii: list[Fraction]  # R_i
     offsets: list[Interval]  # d_i
-    points: list[tuple[int, int]]  # where asperities touch, in grid units, rounded down
+    points: list[tuple[int, int]]  # contact points in grid units, rounded down
     grid: Fraction  # grid units per unit of length
 
 
 def curvatures(value: Any) -> list[Fraction]:
-    """Of the base along x and y: 1 / R of one radius for both or of one for each, 0 of "inf"."""
+    """Curvatures of the base along x and y, from one radius or two; 0 for "inf"."""
     radii = as_list(value, 2) if isinstance(value, list) else [value, value]
     found = [Fraction(0) if text == "inf" else number(text) for text in radii]
     if any(text != "inf" and radius <= 0 for text, radius in zip(radii, found, strict=True)):
@@ -247,7 +248,7 @@ def read_scene(given: Any) -> Scene:
 def distances(
     scene: Scene, some: Sequence[int], chosen: list[int], tell: Tell
 ) -> Iterator[tuple[int, list[int]]]:
-    """Of some asperities: the number, and integers m with m - 2 < r_ij < m + 3 for `chosen` (1)."""
+    """For each i of `some`: i, and integers m with m - 2 < r_ij < m + 3 for j in `chosen` (1)."""
     place = {j: k for k, j in enumerate(chosen)}
     points = [scene.points[j] for j in chosen]
     for i in some:
@@ -263,15 +264,15 @@ def distances(
 
 
 class Box(NamedTuple):
-    """Radii 0 <= a_i <= b_i, where the Hessian is at least 1 - theta of its local part."""
+    """A box 0 <= a_i <= b_i, on which the Hessian is at least 1 - theta of its local part."""
 
-    radii: list[Fraction]  # b_i; those with b_i = 0 are fixed open
-    able: list[int]  # the others
+    radii: list[Fraction]  # b_i; asperities with b_i = 0 are fixed open
+    able: list[int]  # indices of the others
     theta: Fraction
 
 
 def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
-    """Proves that A + diag(theta / (2 E* b)) is positive semidefinite (2)."""
+    """The box, after a proof that A + diag(theta / (2 E* b)) is positive semidefinite (2)."""
     b, theta, shells = numbers(given[0], len(scene.points)), number(given[1]), given[2]
     able = [i for i in range(len(b)) if b[i] > 0]
     if min(b) < 0 or not 0 < theta < 1:
@@ -287,7 +288,7 @@ def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
 def prove_by_shells(
     scene: Scene, shells: list[Fraction], radii: list[Fraction], able: list[int], tell: Tell
 ) -> None:
-    """That A + diag(1 / (2 E* radii)) is, by spheres that overlap little or not at all (3)."""
+    """Prove A + diag(1 / (2 E* radii)) >= 0 by spheres that overlap little or not at all (3)."""
     sizes = [math.floor(shells[i] * scene.grid) for i in able]
     if min(sizes, default=1) <= 0:
         raise Refused("a shell is not positive")
@@ -302,7 +303,7 @@ def prove_by_shells(
 
 
 def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: Tell) -> None:
-    """That A + diag(1 / (2 E* radii)) is, by a Cholesky factorisation in integers (4)."""
+    """Prove A + diag(1 / (2 E* radii)) >= 0 by a Cholesky factorisation in integers (4)."""
     scale = [math.isqrt(math.floor(2 * c * scene.grid * 4**ROOT_BITS)) for c in radii]
     wholes, parts = (PI.high * UNIT).as_integer_ratio()
     factor: list[list[int]] = []
@@ -321,19 +322,19 @@ def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: T
 
 
 class State(NamedTuple):
-    """Where a solution is proved to be, and the loads near it. Forces and V are over E*."""
+    """Intervals that contain a solution, and the loads near it. Forces and V are over E*."""
 
-    near: list[Interval]  # loads of the radii given, scaled to the prescribed total, if any
-    pushed: list[Interval]  # (A P)_i of them
+    near: list[Interval]  # loads of the given radii, scaled to the prescribed total, if any
+    pushed: list[Interval]  # (A P)_i of these loads
     approach: Interval  # D0 of the solution
-    depths: list[Interval]  # D_i - (A P)_i of it: the indentation, or minus the gap
-    loads: list[Interval]  # P_i of it
-    total: Interval  # their sum
-    energy: Interval  # V of it: the least energy of all loads with this total
+    depths: list[Interval]  # D_i - (A P)_i of the solution: the indentation, or minus the gap
+    loads: list[Interval]  # P_i of the solution
+    total: Interval  # sum of the P_i
+    energy: Interval  # V of the solution: the least energy of all loads with this total
 
 
 def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
-    """That there is one solution in the box with this load, or with the approach of the place."""
+    """The one solution in the box with this load, or without one with the approach in `place`."""
     radii, centre = table(place, "radii", "approach")
     a = [added(radius) for radius in as_list(radii, len(scene.points))]
     approach, b, R, d = added(centre), box.radii, scene.radii, scene.offsets
@@ -347,7 +348,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
         scaling = Interval(1).wider((load / added_up(near) - 1).size())
         near, local, pushed = ([x * scaling for x in xs] for xs in (near, local, pushed))
 
-    # (6) How far away the solution is in energy, so in each load (7): it is inside the box.
+    # (6) The distance of the solution in energy, then in each load (7): it is inside the box.
     trial = [d[i] + approach - pushed[i] for i in everyone]
     gaps = [local[i] - trial[i] for i in everyone]
     off = [gaps[i].size() if a[i] > 0 else max(-gaps[i].low, Fraction(0)) for i in everyone]
@@ -357,7 +358,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
     if any(near[i].high + error[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
         raise Refused("the solution may be outside the box")
 
-    # (8) How deep each asperity is pressed: by the approach, less what the others push.
+    # (8) The indentation of each asperity: D_i less the displacement by the others.
     moved = [(distance * s.root()).high for s in spread]
     shift = Fraction(0)
     if load is not None:
@@ -367,7 +368,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
             if error[i] < near[i].low
         ]
         if not known:
-            raise Refused("no asperity is sure enough to touch to tell the approach")
+            raise Refused("no asperity is proved to touch, so the approach is not bounded")
         shift = min(known)
     D0 = Interval(approach).wider(shift)
     depths = [trial[i].wider(moved[i] + shift) for i in everyone]
@@ -377,7 +378,7 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
     deep = [depth.positive_part() for depth in depths]
     loads = [(x * x * x * R[i]).root() * Fraction(4, 3) for i, x in enumerate(deep)]
 
-    # (9) The energy of the solution, at most distance * misfit below that of the loads near it.
+    # (9) The energy of the solution, at most distance * misfit below that of the near loads.
     mean = [local[i] * Fraction(3, 5) + pushed[i] * Fraction(1, 2) - d[i] for i in everyone]
     energy = added_up([near[i] * mean[i] for i in everyone if a[i] > 0])
     energy += Interval(-(distance * misfit).high, 0)
@@ -406,9 +407,9 @@ def push(
 
 
 def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
-    """Whether all solutions of the contact law are in the box: "global", else "local" (10).
+    """The scope: "global" if all solutions are proved to be in the box, else "local" (10).
 
-    top : None where the approach is prescribed, else any number above all (A P)_i
+    top : None if the approach is prescribed, else any number above all (A P)_i
     """
     ceiling = state.approach
     if top is not None:
@@ -427,16 +428,16 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
 
 
 def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
-    """How far D0 may fall from here, with the load, and no indentation rise: (11).
+    """A fall of D0 from this state during which no indentation rises as the load falls (11).
 
-    With C = diag(2 a) and H = (I + A C)^-1 that is so if  sum_k!=i max(-H_ik, 0) < H_ii  of those
-    that may touch, and if the gap of all others is more than what this is missed by times the fall.
+    With C = diag(2 a) and H = (I + A C)^-1 let m_i = sum_k!=i max(-H_ik, 0) - H_ii. It is proved if
+    m_i < 0 for all that may touch, and if the gap of every other exceeds m_i times the fall.
     """
     near = [i for i, x in enumerate(state.depths) if x.high > 0]
     reach = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
     weights = [math.ceil(2 * a * scene.grid) for a in reach]
     parts, wholes = (ONE / PI.high).as_integer_ratio()
-    rows: dict[int, list[int]] = {}  # of A C, in parts of ONE, less than `rounding` too small
+    rows: dict[int, list[int]] = {}  # rows of A C times ONE, too small by less than `rounding`
     sums: dict[int, int] = {}
     able = [i for i, d in enumerate(scene.offsets) if (state.approach + d).high > 0]
     for i, apart in distances(scene, able, near, tell):
@@ -457,10 +458,10 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
 def missed_by_inverse(
     rows: dict[int, list[int]], near: list[int], rounding: int, tell: Tell
 ) -> dict[int, Fraction]:
-    """sum_k!=i max(-H_ik, 0) - H_ii in parts of ONE, rounded up: from any X near (I + A C)^-1."""
+    """sum_k!=i max(-H_ik, 0) - H_ii times ONE, rounded up, from an approximation X of H."""
     n, place = len(near), {i: k for k, i in enumerate(near)}
     X = [[*rows[i][:k], ONE, *rows[i][k + 1 :]] for k, i in enumerate(near)]
-    for k in range(n):  # Gauss and Jordan's elimination, in place
+    for k in range(n):  # Gauss-Jordan elimination in place
         if X[k][k] <= 0:
             return dict.fromkeys(rows, Fraction(1))
         tell(f"inverting: {k} of {n}")
@@ -497,7 +498,7 @@ def missed_by_inverse(
 def prove_shear(
     scene: Scene, box: Box, pressed: State, ordered: Fraction, entry: Any, tell: Tell
 ) -> dict[str, Any]:
-    """A friction state: the difference of two pressed ones (12)."""
+    """What is proved of a friction state, the difference of two normal solutions (12)."""
     force, place = table(entry, "force", "held")
     f, unit = scene.friction, scene.friction * scene.modulus
     if number(force) <= 0 or f <= 0:
@@ -511,7 +512,7 @@ def prove_shear(
     statuses, slips = list[str](), list[Interval]()
     for i, (at, after) in enumerate(zip(pressed.depths, held.depths, strict=True)):
         if not in_order and after.high > 0 and held.loads[i].high > pressed.loads[i].low:
-            raise Refused(f"asperity {i} may be dragged along by the others, against the theorem")
+            raise Refused(f"asperity {i} may be dragged along by others: no theorem covers this")
         touches, slip = status(at, "contact", "open"), gap_of(after) * travel
         statuses.append(status(after, "partial", "sliding") if touches == "contact" else touches)
         slips.append(Interval(slip.low if at.low > 0 else 0, slip.high if at.high > 0 else 0))
@@ -533,12 +534,12 @@ WEAKER = {"global": "local", "local": "local", "proved": "proved for one step"}
 
 
 def prove(document: Any, tell: Tell) -> dict[str, Any]:
-    """All that is proved: statuses, and intervals of what can be claimed within bounds."""
+    """All that is proved: statuses, and intervals of loads, gaps, forces, slips and losses."""
     form, given, prescribed, named, argument, pressed, sheared, _ = table(document, *KEYS)
     if form != FORMAT:
         raise Unreadable(f"expected the format {FORMAT!r}")
     if named != digest(given, prescribed):
-        raise Refused("the sha256 is not that of this scene and what is prescribed")
+        raise Refused("the sha256 is not that of this scene and its prescribed load or approach")
     scene, load, top = read_scene(given), None, None
     *convexity, ceiling = table(argument, "box", "convexity_number", "shells", "ceiling")
     if isinstance(prescribed, dict) and "load" in prescribed:
@@ -546,7 +547,7 @@ def prove(document: Any, tell: Tell) -> dict[str, Any]:
     elif [*table(prescribed, "approach")] != table(pressed, "radii", "approach")[1]:
         raise Refused("the approach is not the one prescribed")
     elif ceiling is not None:
-        raise Unreadable("there is no ceiling under a prescribed approach")
+        raise Unreadable("the ceiling must be null if the approach is prescribed")
     box = read_box(scene, convexity, tell)
     state = prove_state(scene, box, pressed, load, tell)
     ordered = ordered_fall(scene, box, state, tell) if as_list(sheared) else Fraction(0)
@@ -570,7 +571,7 @@ def status(depth: Interval, positive: str, negative: str) -> str:
 
 
 def hold(what: str, claimed: Any, proved: Any) -> None:
-    """Compare claims with what is proved: statuses and bounds, in tables and lists."""
+    """Compare claims with what is proved. Raises Refused if a claim is not proved."""
     if isinstance(proved, dict):
         for key, claim in zip(proved, table(claimed, *proved), strict=True):
             hold(f"{what} {key}", claim, proved[key])
@@ -587,7 +588,7 @@ def hold(what: str, claimed: Any, proved: Any) -> None:
 
 
 def sentence(document: Any) -> str:
-    """What the claims say: a line of the contact, and one of each shear force."""
+    """The claims in words: of the contact, and of each shear force."""
     claims, ((control, value),) = document["claims"], document["prescribed"].items()
     bounds = [numbers(pair, 2) for pair in claims["loads"]]
     largest = max(high for _, high in bounds) or Fraction(1)
@@ -616,7 +617,7 @@ def counted(claims: Any, *statuses: str) -> str:
 
 
 def check(document: Any, tell: Tell) -> str:
-    """What is proved, in words. Raises Refused where more is claimed, and Unreadable."""
+    """The claims in words. Raises Refused if more is claimed than proved, and Unreadable."""
     proved = prove(document, tell)
     hold("claims", document["claims"], proved)
     return sentence(document)

@@ -62,6 +62,12 @@ sphinx_gallery_conf = {
 }
 
 
+def without_checks(app: Sphinx, page: str, source: list[str]) -> None:
+    """Pages of the course show no `assert`: the scripts check what the text says."""
+    if page.startswith("course/"):
+        source[0] = re.sub(r"\n+ +assert .*", "", source[0])
+
+
 def to_the_course(app: Sphinx, page: str, source: list[str]) -> None:
     """Links to a script of the course lead to its page; in the repository, to the script."""
     source[0] = re.sub(
@@ -74,3 +80,4 @@ def to_the_course(app: Sphinx, page: str, source: list[str]) -> None:
 def setup(app: Sphinx) -> None:
     app.connect("autodoc-process-docstring", literal_docstring)
     app.connect("source-read", to_the_course)
+    app.connect("source-read", without_checks)

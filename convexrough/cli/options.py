@@ -42,7 +42,7 @@ def figure_options(command: Command) -> Command:
     for option in (
         click.option("--dpi", type=click.IntRange(50, 600), default=200, show_default=True,
                      help="Pixels per inch of figures."),
-        click.option("--formats", metavar="LIST", default="png,svg", show_default=True,
+        click.option("--formats", metavar="LIST", default="png", show_default=True,
                      callback=lambda *given: _formats(given[-1]),
                      help="Formats of figures: png, svg, pdf."),
     ):  # fmt: skip

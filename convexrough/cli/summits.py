@@ -72,11 +72,11 @@ def press_options(command: Command) -> Command:
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
               help="Width in pixels of the square to which a tip is fitted.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Smallest prominence of a hill, as a fraction of Sz.")  # fmt: skip
+              help="Smallest prominence of a hill, over the height range Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,
-              help="Table for a scene file; figures go to its folder.")  # fmt: skip
+              help="Table of summits to write; figures go to the same folder.")  # fmt: skip
 @click.option("--no-figures", is_flag=True, help="Do not write figures.")
 @figure_options
 @click.option("--force", is_flag=True, help="Overwrite a table of an earlier run.")
@@ -123,22 +123,22 @@ def summits(
     for message in report.warnings_about(scanned):
         say_aside("warning", message)
     if scanned.curve is None:
-        say_aside("hint", "--scene or --radius presses on them: how strong must the pruning be?")
+        say_aside("hint", "use --scene or --radius to press on the summits and choose --prune")
     return DONE if scanned.certified else NOT_CERTIFIED
 
 
 def _claim(path: Path, force: bool) -> None:
-    """Refuse to replace a table unasked, before anything is computed."""
+    """Raise FileError unless this path may be written; called before anything is computed."""
     if path.suffix.lower() != ".csv":
         raise FileError(f"{path}: found {path.suffix or 'no ending'}, expected .csv")
     if path.exists() and not force:
-        raise FileError(f"{path}: is there already; --force replaces it, --out names another")
+        raise FileError(f"{path}: exists already; --force replaces it, --out names another")
     if not path.parent.is_dir():
         raise FileError(f"{path}: no folder {path.parent}")
 
 
 def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:
-    """The table that a scene file reads, the curve and the figures beside it."""
+    """Write the table that a scene file reads, the curve and the figures; return the paths."""
     from convexrough.run.results import write_figures, write_tables
     from convexrough.surface.report import curve_columns, summit_columns
 

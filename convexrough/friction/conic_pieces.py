@@ -1,8 +1,8 @@
-"""The elastic energy of one asperity after a step, as pieces that are exact in cones.
+"""The elastic energy of one asperity after a step, in pieces that cones represent exactly.
 
-W(T) = the integral of its own deflection over its force is convex, and made of a stuck piece and
-one for each sign and each old layer that the front may end in:
-docs/theory/without-order.md, "The step as one cone program".
+W(T), the integral of the asperity's deflection over its shear force T, is convex. It consists of a
+stuck piece, and of a slipping piece for each sign and each old layer in which the slip front may
+end: docs/theory/without-order.md, "The step as one cone program".
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from convexrough.arrays import Array
 from convexrough.friction.curve import MemoryCurve
 from convexrough.sphere import hertz
 
-#: Places of the variables of a piece: its weight, y1, ..., y5 and z.
+#: A piece has LIFT variables: its weight, y1, ..., y5 and z. The others are positions among them.
 LIFT, Y3, Y5, Z = 7, 3, 5, 6
 
-#: Layers thinner than this part of the load are no pieces: they carry less than the solver leaves.
+#: Layers thinner than this part of the load are left out: they carry less than the solver's error.
 THIN = 1e-9
 
 
 class ConePiece(NamedTuple):
-    """A part of W. Forces are over the load N_b of the asperity, displacements over k N_b^(2/3).
+    """A piece of W. Forces are in units of the asperity's load N_b, displacements of k N_b^(2/3).
 
-    With L = N / N_b from low to high,  T = force - rate L,  deflection = own - rate L^(2/3)  and
-    W = own T + (3/5) rate^2 L^(5/3) + energy. A stuck piece has rate 0: |T - force| <= high, and
-    W = own (T - force) + (T - force)^2 softness / 2 + energy.
+    A slipping piece has L = N / N_b from low to high,  T = force - rate L,  the deflection
+    own - rate L^(2/3)  and  W = own T + (3/5) rate^2 L^(5/3) + energy. A stuck piece has rate 0,
+    |T - force| <= high  and  W = own (T - force) + (T - force)^2 softness / 2 + energy.
     """
 
     low: float
@@ -39,7 +39,7 @@ class ConePiece(NamedTuple):
     softness: float = 0.0
 
     def forces(self) -> tuple[float, float]:
-        """Where it begins and ends, in growing order."""
+        """The smallest and the largest force on the piece."""
         if self.rate == 0.0:
             return self.force - self.high, self.force + self.high
         ends = self.force - self.rate * self.low, self.force - self.rate * self.high
@@ -52,12 +52,12 @@ class ConePiece(NamedTuple):
         return self.own - self.rate * float(np.cbrt(level)) ** 2
 
     def distance(self, force: float) -> float:
-        """By how much a force is outside."""
+        """The distance of a force from the piece; 0 on it."""
         low, high = self.forces()
         return max(low - force, force - high, 0.0)
 
     def objective(self, shift: float) -> Array:
-        """(LIFT,) W less shift T^2 / 2 in the weight, y1, ..., y5 and z; t^6 = y5 - z."""
+        """(LIFT,) coefficients of W - shift T^2 / 2 in the variables of a piece; t^6 = y5 - z."""
         found = np.zeros(LIFT)
         found[0] = self.energy - shift * self.force**2 / 2.0
         if self.rate == 0.0:
@@ -71,7 +71,7 @@ class ConePiece(NamedTuple):
         return found
 
     def cost(self, force: float) -> float:
-        """W, without `energy`."""
+        """W - energy."""
         if self.rate == 0.0:
             return (self.own + 0.5 * self.softness * (force - self.force)) * (force - self.force)
         level = max((self.force - force) / self.rate, 0.0)
@@ -79,7 +79,7 @@ class ConePiece(NamedTuple):
 
 
 def pieces_of(curve: MemoryCurve, own: float, k: float) -> list[ConePiece]:
-    """Those of an asperity with this curve, once its indentation has become `own` > 0."""
+    """The pieces of an asperity with this old curve, at its new indentation `own` > 0."""
     load = float(hertz.load(own, k))
     base = min(float(curve.load), own)
     old, heights = ([float(each) for each in of] for of in (curve.levels, curve.heights))

@@ -1,11 +1,10 @@
 """The general step as one second-order cone program: a check of Newton's method and of the rules.
 
-Of each asperity, W(T) = the integral of its own deflection over its force after the step is convex,
-and made of pieces: a stuck one, and one for each sign and each old layer that the front may end in.
-Each is exact in the cones of `convexrough.convex.cones`, and their hull is W: piece j has a weight
-w_j, which stands for the 1 in its cones, and weights, forces and energies add up. Derived in
-docs/theory/without-order.md, "The step as one cone program". Own displacements are over c_t f, and
-forces over f.
+The energy W(T) of each asperity consists of the pieces of `conic_pieces`. The cones of
+`convexrough.convex.cones` represent each piece exactly, and W is the convex hull of the pieces:
+piece j has a weight w_j, which replaces the 1 in its cones. The weights of an asperity add up to 1,
+and the forces and energies of its pieces to those of the asperity. Displacements are in units of
+c_t f, forces of f: docs/theory/without-order.md, "The step as one cone program".
 """
 
 from __future__ import annotations
@@ -29,12 +28,12 @@ from convexrough.sphere import hertz
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
-#: What Clarabel is asked for, and its share of the way to the boundary of the cones in a step.
+#: Tolerance of Clarabel, and the part of the way to the boundary of the cones that a step takes.
 TOLERANCE, STEP = 1e-11, 0.9
 
 
 class ConicStepper(Stepper):
-    """Steps by the cone program, through Clarabel."""
+    """General steps that Clarabel solves as cone programs."""
 
     def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
         program = StepProgram.assemble(self, now, level, total)
@@ -59,12 +58,13 @@ class ConicStepper(Stepper):
 
 @dataclass(frozen=True, eq=False)
 class StepProgram:
-    """One step, of the n asperities that touch after it.
+    """The cone program of one step, for the n asperities that touch after it.
 
-    total  : of their forces;  which : (n,) their indices in the scene
-    loads, own : (n,) N_b and the indentations;  parts : (n,) p_i, of the step during which each
-        touches;  shells : (n,) make the coupling semidefinite
-    pieces : all of them, with the place of their asperity among the n
+    total  : sum of their shear forces;  which : (n,) their indices in the scene
+    loads, own : (n,) loads N_b and indentations after the step
+    parts  : (n,) p_i, the fraction of the step during which the asperity touches
+    shells : (n,) diagonal that makes the coupling positive semidefinite
+    pieces : position of the asperity among the n, and a piece of its energy
     """
 
     stepper: Stepper
@@ -79,7 +79,7 @@ class StepProgram:
 
     @classmethod
     def assemble(cls, stepper: Stepper, now: Bundle, level: Snapshot, total: float) -> StepProgram:
-        """Raises SolverError where no shells that the cones allow make the coupling convex."""
+        """The program of a step. Raises SolverError if the shells exceed what the cones allow."""
         which = np.flatnonzero(level.loads > 0)
         k, own = stepper.coefficients[which], level.indentations[which]
         gaps = np.maximum(-now.level.indentations[which], 0.0)
@@ -107,7 +107,7 @@ class StepProgram:
 
     @property
     def energies(self) -> Array:
-        """(n,) what W / p is counted in."""
+        """(n,) the units of W_i / p_i."""
         return np.asarray(self.loads * self.own / self.parts)
 
     @property
@@ -116,10 +116,10 @@ class StepProgram:
         return np.asarray(self.shells * self.loads * self.parts / self.own)
 
     def apply(self) -> ConeProgram:
-        """Unknowns: T_i / N_i, and of each piece its weight and its lift.
+        """The program for Clarabel, in T_i / N_i and the variables of each piece.
 
-        A stuck piece has the force above its middle in the place of y3, the square over the weight
-        in that of y5, and no other.
+        Of these a stuck piece uses three: its weight, y3 for the difference of the force from the
+        middle of the piece, and y5 for the square of this difference over the weight.
         """
         from scipy import sparse  # 0.1 s to import: only when solving
 
@@ -148,7 +148,7 @@ class StepProgram:
         )
 
     def _equalities(self, width: int) -> csc_matrix:
-        """The total; the weights of each asperity add up to 1; and forces of pieces to its own."""
+        """Rows for the total force, and for the sums of weights and of forces of each asperity."""
         from scipy.sparse import csc_matrix
 
         n = len(self.which)
@@ -163,7 +163,7 @@ class StepProgram:
         return csc_matrix(rows)
 
     def _cones(self, width: int) -> tuple[csc_matrix, Array]:
-        """Each piece within its bounds, and its lift in the cones."""
+        """Rows and constants of the cones: the bounds of each piece, then its energy."""
         from scipy.sparse import csc_matrix, lil_matrix, vstack
 
         n, five = len(self.which), 1.5 * self.shifts.max() > FOUR_CONES_LIMIT
@@ -188,14 +188,14 @@ class StepProgram:
         return csc_matrix(rows), np.append(plain, lifts.constant)
 
     def invert(self, raw: RawAnswer) -> tuple[Array, float]:
-        """(N,) forces of all asperities of the scene, and the displacement."""
+        """(N,) shear forces of all asperities of the scene, and the displacement x of the step."""
         n, unit = len(self.which), float(self.energies.max())
         forces = np.zeros(len(self.now.carried))
         forces[self.which] = np.clip(raw.x[:n], -1.0, 1.0) * self.loads
         return forces, float(-raw.multipliers[0]) * unit / float(self.loads.sum())
 
     def deflections(self, forces: Array) -> Array:
-        """(N,) own deflections under these forces, by the piece that each force lies on."""
+        """(N,) own deflections under these forces, each from the nearest piece."""
         found = np.zeros(len(forces))
         for place, i in enumerate(self.which):
             part = float(forces[i] / self.loads[place])

@@ -1,16 +1,16 @@
 """The memory curve: the tangential state under varying normal load, as plane geometry.
 
-The state after any path of the total load P and T = Q / f is one polygon from (0, 0) to the
-present point, no steeper than 45 degrees: heights Th(s) over levels 0 <= s <= P. It is also the
-path without slip to the same state. A straight segment of the path changes it by one of three
-rules:
+P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
+after any path of (P, T) is one polygon from (0, 0) to the present point, no steeper than 45
+degrees: heights Th(s) over levels 0 <= s <= P. A contact loaded along this polygon would reach the
+same state without slip. A straight segment of the path changes the polygon by one of three rules:
 
-- where P rises and T follows no faster, everything sticks: the segment is appended;
-- where the path runs back along the curve, nothing slips: the curve gets shorter;
+- if P rises and T changes no faster, everything sticks: the segment is appended;
+- if the path runs back along the curve, nothing slips: the curve gets shorter;
 - else the contact slips, with sign c = +-1, from the top down to the *front* L: below L the curve
   is kept, and a straight line of slope c joins it to the new point.
 
-Derived in docs/theory/paths.md, "The rules". Nothing here knows elasticity. All numbers are
+Derived in docs/theory/paths.md, "The rules". The rules do not depend on elasticity. All numbers are
 rational, as float64 numbers are, and every rule is exact.
 """
 
@@ -31,10 +31,10 @@ from convexrough.record import Along, Table, in_text
 
 
 class Piece(NamedTuple):
-    """A front on its way down through one old layer, while the load changes in proportion.
+    """The way of the slip front down through one old layer; the load changes linearly on it.
 
-    sign   : c of the slip;  slope : th of the layer; a loss is proportional to 1 - c th
-    top, bottom : levels L of the front;  load_before, load_after : P there
+    sign   : c of the slip;  slope : th of the layer; the loss is proportional to 1 - c th
+    top, bottom : levels L of the front before and after;  load_before, load_after : P
     """
 
     sign: int
@@ -46,7 +46,7 @@ class Piece(NamedTuple):
 
     @property
     def load_constant(self) -> bool:
-        """The load stays."""
+        """True if P does not change."""
         return self.load_before == self.load_after
 
 
@@ -54,7 +54,7 @@ class Piece(NamedTuple):
 class MemoryCurve(Table, Plottable):
     """A state: vertices (levels[k], heights[k]) from the origin, slopes[k] from k to k + 1.
 
-    front : level L down to which the contact slipped last; None where all of it stuck last
+    front : level L of the slip front at the end of the last segment; None if nothing slips there
 
     >>> curve, _ = cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)
     >>> float(curve.front), float(curve.heights[-1])
@@ -70,21 +70,21 @@ class MemoryCurve(Table, Plottable):
 
     @classmethod
     def pressed(cls, load: Fraction | float) -> MemoryCurve:
-        """The state pressed to a load without shear."""
+        """The state of a contact pressed to a load without shear."""
         return cls().go(load, 0)[0]
 
     @property
     def load(self) -> Fraction:
-        """P."""
+        """The load P, at the last vertex."""
         return self.levels[-1]
 
     @property
     def height(self) -> Fraction:
-        """T."""
+        """T = Q / f, at the last vertex."""
         return self.heights[-1]
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        """Rounded: fractions are long."""
+        """The printed rows; fractions are rounded."""
         for name, (_, values) in self._variables().items():
             yield name, in_text(values)
         yield "front", "none" if self.front is None else in_text(float(self.front))
@@ -112,9 +112,9 @@ class MemoryCurve(Table, Plottable):
     def go(
         self, load: Fraction | float, height: Fraction | float
     ) -> tuple[MemoryCurve, list[Piece]]:
-        """The state after a straight segment of the path to (P, T), and the pieces that cost.
+        """The state after a straight segment to (P, T), and the pieces of its loss.
 
-        Raises InputError where |T| > P: that would be gross sliding.
+        Raises InputError if |T| > P, which friction does not allow.
         """
         load, height = Fraction(load), Fraction(height)
         if abs(height) > load:
@@ -127,20 +127,20 @@ class MemoryCurve(Table, Plottable):
         return curve, pieces
 
     def _stroke(self, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
-        """As much of the segment as one of the rules covers."""
+        """The state after as much of the segment as one rule covers, and the pieces of its loss."""
         added, shear = load - self.load, height - self.height
         if added > 0 and abs(shear) <= added:
             return self._with(shear / added, load, height), []
         if added >= 0:
             return self._slip(1 if shear > 0 else -1, load, height)
-        lean = shear - self.slopes[-1] * added  # over the old curve, or under it
+        lean = shear - self.slopes[-1] * added  # positive if the path leaves above the old curve
         sign = 1 if lean > 0 else -1
         if lean == 0:
             return self._run_back(load, height), []
         return self._slip(sign, *self._crossing(sign, load, height))
 
     def _run_back(self, load: Fraction, height: Fraction) -> MemoryCurve:
-        """Along the top layer, to the point or to the end of the layer."""
+        """The state after running back along the top layer, to the point or the layer's end."""
         last = len(self.slopes) - 1
         below = self._cut(last)
         if load <= self.levels[last]:
@@ -148,12 +148,12 @@ class MemoryCurve(Table, Plottable):
         return below._with(self.slopes[last], load, height)
 
     def _crossing(self, sign: int, load: Fraction, height: Fraction) -> tuple[Fraction, Fraction]:
-        """Where a falling segment meets the old curve again, all above which is forgotten then.
+        """The point where a falling segment meets the old curve again; else the segment's end.
 
-        Or its end, where it does not.
+        The state forgets the curve above this point.
         """
         direction = (height - self.height) / (load - self.load)
-        over = Fraction(0)  # sign times (path - old curve), on the way down
+        over = Fraction(0)  # sign times (path - old curve)
         for k in reversed(range(len(self.slopes))):
             high, end = self.levels[k + 1], max(self.levels[k], load)
             before = over
@@ -166,10 +166,10 @@ class MemoryCurve(Table, Plottable):
         return load, height
 
     def _slip(self, sign: int, load: Fraction, height: Fraction) -> tuple[MemoryCurve, list[Piece]]:
-        """With a sign, down to the front; within a layer P moves in proportion to it.
+        """The state after slip of this sign on the segment, and the layers that the front crosses.
 
-        The line of slope c that ends at the moving point meets the lower end of a layer when a part
-        of the segment is done. Layers that have this slope already are passed at once.
+        The line of slope c that ends at the moving point reaches the lower end of a layer after a
+        `part` of the segment, linear in the level. It passes layers of slope c at once.
         """
         added = load - self.load
         rate = (height - self.height) - sign * added
@@ -197,12 +197,12 @@ class MemoryCurve(Table, Plottable):
         return replace(curve, front=front), pieces
 
     def _cut(self, vertex: int) -> MemoryCurve:
-        """The curve up to a vertex."""
+        """The curve from the origin to a vertex."""
         part = slice(vertex + 1)
         return MemoryCurve(self.levels[part], self.heights[part], self.slopes[:vertex])
 
     def _with(self, slope: Fraction, load: Fraction, height: Fraction) -> MemoryCurve:
-        """One layer more, up to a point; layers of equal slope are one."""
+        """The curve with one more layer, up to a point; layers of equal slope are merged."""
         count = len(self.slopes)
         if count and self.slopes[-1] == slope:
             count -= 1

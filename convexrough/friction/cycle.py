@@ -170,7 +170,7 @@ class Cycle(Table, Plottable):
 
     @cached_property
     def _walk(self) -> _Closed:
-        """The closed path, with the memory curves along it."""
+        """The closed path and its memory curves."""
         levels = self.contact.cached(FrictionLevels)
         pairs = zip(map(Fraction, self.loads.tolist()), self.forces.tolist(), strict=True)
         points = [(P, height_at(P, Q, self.scene)) for P, Q in pairs]
@@ -308,7 +308,7 @@ def cycles(
     checks.exactly_one("maximum", maximum, "displacement", displacement)
     if displacement is not None:
         if minimum is not None:
-            expected = "none beside a displacement, whose cycles are symmetric"
+            expected = "none: the cycle of a displacement is symmetric"
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
         heights = [levels.load - levels.displaced(x) for x in amplitudes]
@@ -398,7 +398,7 @@ class _Closed(Walk):
 
     @cached_property
     def stuck(self) -> Point:
-        """(L*, T*)"""
+        """The load L* and T* of the head of this module."""
         plus, minus = min(p + t for p, t in self.points), min(p - t for p, t in self.points)
         return (plus + minus) / 2, (plus - minus) / 2
 
@@ -422,7 +422,7 @@ def _cycles(
     closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
     levels.prepare(load for each in closed for load in each.needed)
     for needed in sorted((each.needed for each in closed), key=min):
-        levels.order(needed)  # what the widest proves holds of the others
+        levels.order(needed)  # a proof for the widest range of loads holds for the others
     spent = losses(levels, [pieces for each in closed for pieces in (each.first, each.later)])
     moved = displacements_of(levels, [curve for each in closed for curve in each.steady])
     ends = np.cumsum([0, *(each.once for each in closed)]).tolist()
@@ -435,7 +435,7 @@ def _cycles(
 def _cycle(
     contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
 ) -> Cycle:
-    """One cycle. spent : losses of the first and of later cycles;  moved : displacements."""
+    """The cycle with these losses (first and later cycles) and displacements at its points."""
     levels, order = closed.levels, closed.order
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
@@ -532,7 +532,7 @@ def loops(
 
 
 def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
-    """The loop through the points at which Q has changed by twice `way`, down and up again."""
+    """The loop, with points where Q has fallen, and then risen, by twice the values `way`."""
     high, low, contact = cycle.maximum, cycle.minimum, cycle.contact
     way = np.concatenate(([0.0], way, [cycle.force_amplitude]))
     forces = np.concatenate((high - 2.0 * way, (low + 2.0 * way)[1:]))

@@ -1,14 +1,15 @@
-"""Fretting: how far each asperity slips, what that costs, and the shear tractions that it bears.
+"""Fretting: slip, energy loss and shear traction of each asperity in a steady cycle.
 
-Slip in a contact disc whose stick disc has the radius c grows with the distance r from the centre:
-its amplitude in a steady cycle is  f c_t [g + (r^2/R) h(c/r)],
+f is the coefficient of friction, c_t Mindlin's ratio, R the relative radius of an asperity. Slip in
+a contact disc with a stick disc of radius c grows with the distance r from the centre. Its
+amplitude in a steady cycle is  f c_t [g + (r^2/R) h(c/r)]  with
 
-    h(x) = 1/2 - x^2 + [(2 x^2 - 1) asin(x) + x sqrt(1 - x^2)] / pi:
+    h(x) = 1/2 - x^2 + [(2 x^2 - 1) asin(x) + x sqrt(1 - x^2)] / pi.
 
-g is the amplitude of gross slip over f c_t, 0 where a disc sticks, and the other term Hertz's gap
-at r of a contact of radius c. That holds up to the radius of the disc at the least load of the
-cycle; what lies beyond is not always in contact, and its slip is not known. Tractions are sums of
-Hertz pressures over the levels s_k of the memory curve, b_k its bends:
+f c_t g is the amplitude of gross slip, 0 if a disc sticks. (r^2/R) h(c/r) is the gap, at the
+distance r, of a Hertz contact of radius c. The formula holds inside the contact disc at the least
+load of the cycle; farther out contact is lost in each cycle and the slip is not known. The shear
+traction is a sum of Hertz pressures over the levels s_k of the memory curve with its bends b_k:
 
     q(r) = f (2 E* / pi R) sum_k b_k sqrt(a(s_k)^2 - r^2).
 
@@ -34,8 +35,8 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
-#: How many distances from the centre are tried for the largest traction, besides where it has a
-#: kink: all that count at constant load. Else it is found to about 0.1 %.
+#: Number of distances from the centre, besides the kinks of the traction, at which the largest
+#: traction is sought. At constant load it lies at a kink; else the error is about 0.1 %.
 DISTANCES = 64
 
 
@@ -43,17 +44,17 @@ DISTANCES = 64
 class Fretting(Table, Plottable):
     """Fretting of each asperity in a steady cycle; arrays are (n,), 0 where open.
 
-    status           : that of the cycle
-    slip_amplitudes  : [length] half the range of slip at the rim of the disc at the least load: all
-        that is always in contact. nan where intermittent: slip between touches is not known
-    gross_slip_amplitudes : [length] half the range of slip of the whole disc, 0 where some sticks;
-        nan where intermittent
+    status           : `Cycle.status`
+    slip_amplitudes  : [length] half the range of slip at the rim of the contact disc at the least
+        load of the cycle; nan where "intermittent": slip between touches is not known
+    gross_slip_amplitudes : [length] half the range of slip of the whole disc, 0 if some of it
+        sticks; nan where "intermittent"
     losses           : [force length] energy lost per cycle: `Cycle.asperity_losses`
     mean_tractions   : [force / length^2] the largest |Q_i| / (pi a_i^2) at the points of the path
-    largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path; to
-        about 0.1 % where the load varies
+    largest_tractions : [force / length^2] the largest |q| on the disc at the points of the path;
+        the error is about 0.1 % where the load varies
 
-    All but statuses are nan where order fails.
+    If `cycle.order` is "fails", all arrays except the status are nan.
 
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.25 * contact.load))
     >>> print(f"{worn.slip_amplitudes.max():.3g}", worn.losses.argmax())
@@ -79,7 +80,7 @@ class Fretting(Table, Plottable):
 
 
 def fretting(cycle: Cycle) -> Fretting:
-    """The fretting of each asperity in a steady cycle, of `cycle` or `steady`.
+    """The fretting of each asperity in a steady cycle from `cycle` or `steady`.
 
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.1 * contact.load))
     >>> bool((worn.mean_tractions <= worn.largest_tractions).all())
@@ -118,7 +119,7 @@ def fretting(cycle: Cycle) -> Fretting:
 def _largest(bends: Array, radii: Sequence[Array]) -> Array:
     """(n,) the largest |sum_k b_k sqrt(a_k^2 - r^2)| over r; radii : a_k, (n,) each, rising.
 
-    It is smooth in sqrt(a_k^2 - r^2) between two of the radii, where some distances are tried.
+    Between two of the radii the sum is smooth in sqrt(a_k^2 - r^2); some distances are tried there.
     """
     squares = np.square(radii)
     parts = np.linspace(1.0, 0.0, max(4, DISTANCES // max(1, len(radii))), endpoint=False)
@@ -131,13 +132,13 @@ def _largest(bends: Array, radii: Sequence[Array]) -> Array:
 
 
 def rim_gap(x: Array) -> Array:
-    """h(x): Hertz's gap at the radius a over a^2 / R, of a contact of the radius x a."""
+    """h(x): the gap of a Hertz contact of radius x a at the distance a, in units of a^2 / R."""
     root = np.sqrt((1.0 - x) * (1.0 + x))
     return np.maximum(0.5 - x**2 + ((2.0 * x**2 - 1.0) * np.arcsin(x) + x * root) / np.pi, 0.0)
 
 
 def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
-    """The columns of fretting.csv: a row for each touching asperity in each cycle."""
+    """The columns of fretting.csv, with a row for each touching asperity in each cycle."""
     names = ("status", "losses", "slip_amplitudes", "gross_slip_amplitudes", "mean_tractions",
              "largest_tractions")  # fmt: skip
     rows = list[dict[str, NDArray[Any]]]()
@@ -151,6 +152,6 @@ def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
 
 
 def _over(part: Array, whole: Array) -> Array:
-    """(n,) part over whole, 0 where there is none."""
+    """(n,) part / whole; 0 where whole is 0."""
     quotient: Array = np.divide(part, whole, out=np.zeros(len(whole)), where=whole > 0)
     return quotient

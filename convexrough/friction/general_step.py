@@ -1,13 +1,14 @@
-"""The general step: no order of indentations assumed, each asperity with a memory of its own.
+"""The general step, for indentations that may fall as the load rises.
 
-Every asperity keeps its own curve in the plane of its indentation and its deflection over c_t f. A
-straight step to (P, T) presses at P, where the indentations become delta_i, and then solves
+Each asperity keeps its own memory curve, in the plane of its indentation and its deflection over
+c_t f. A straight step to (P, T) presses with the load P and then solves, by Newton's method,
 
-    eta_i + (A (T_i(eta_i) - T_i before))_i = x,    sum T_i(eta_i) = T
+    eta_i + (A (T_i(eta_i) - T_i before))_i = x,    sum T_i(eta_i) = T.
 
-for what each asperity must take up, by Newton's method. Where indentations are ordered one step per
-segment is exact; else it is of second order in the step. Derived in docs/theory/without-order.md,
-"The general step".
+A is the influence matrix, x the displacement of the bodies in the step, and eta_i the part of x
+that asperity i takes up by deflection and slip. If no indentation falls as the load rises, one step
+per segment is exact; else the error is of second order in the step:
+docs/theory/without-order.md, "The general step".
 """
 
 from __future__ import annotations
@@ -29,26 +30,29 @@ from convexrough.friction.state import States, by_status
 from convexrough.influence import couple
 from convexrough.sphere import hertz
 
-#: The residual of a step, over the largest indentation, that ends it; a thousand times that is
-#: accepted where rounding leaves no less.
+#: Newton's method stops at this residual, relative to the largest indentation. A thousand times as
+#: much is accepted where rounding prevents less.
 ACCURATE = 1e-14
 
-#: Newton steps, halvings of each, and halvings of the step itself before giving up.
+#: The largest numbers of Newton steps, of halvings of each, and of halvings of the general step.
 ITERATIONS, HALVINGS, CUTS = 60, 30, 6
 
-#: Steps per segment.
+#: The smallest and the largest number of steps per segment.
 FEWEST, MOST = 4, 64
 
-#: What twice as many may change of a loss and of displacements, and a loss too small, beside the
-#: largest, to ask for.
+#: Doubling of the steps ends at these relative changes of each loss and of the displacements.
+#: Losses below NEGLIGIBLE times the largest need not settle.
 SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 
 
 @dataclass(frozen=True)
 class Bundle:
-    """The state after a step: own curves, T_i (n,) and positions (n,) own + drift over c_t f.
+    """The state of n asperities after a step.
 
-    load : P, by name;  displacement : X / (c_t f);  work : of T along it, over c_t f^2
+    load    : P, as it identifies a level
+    curves  : the memory curve of each asperity;  carried : (n,) T_i
+    positions : (n,) deflection plus drift, over c_t f
+    displacement : X / (c_t f);  work : work of the shear force along X, over c_t f^2
     """
 
     load: Fraction
@@ -66,7 +70,7 @@ class Bundle:
 
 
 class Stepper:
-    """Steps of one scene; small scenes, as it works with the matrix."""
+    """Makes general steps of a scene that is small enough for its influence matrix."""
 
     def __init__(self, levels: FrictionLevels) -> None:
         scene = levels.scene
@@ -78,7 +82,7 @@ class Stepper:
         self.A = couple(scene, everyone, 1.0 / (np.pi * modulus), "dense").matrix
 
     def start(self, curve: MemoryCurve) -> Bundle:
-        """A state without shear, at the load of a curve."""
+        """The state without shear at the load of this curve."""
         level = self.levels.snapshot(curve.load)
         own = tuple(MemoryCurve.pressed(max(each, 0.0)) for each in level.indentations)
         zero = np.zeros(len(own))
@@ -87,7 +91,7 @@ class Stepper:
     def along(
         self, start: MemoryCurve, points: Sequence[tuple[Fraction, Fraction]], steps: int
     ) -> list[Bundle]:
-        """The states after each point, each segment in so many steps."""
+        """The state after each point, with this number of steps per segment."""
         now, found = self.start(start), list[Bundle]()
         load, height = start.load, start.height
         for target, shear in points:
@@ -102,7 +106,7 @@ class Stepper:
         return found
 
     def step(self, now: Bundle, load: Fraction, height: Fraction, cuts: int = CUTS) -> Bundle:
-        """One straight step; in two halves where Newton's method does not get there."""
+        """The state after one straight step; in two halves if Newton's method does not converge."""
         level = self.levels.snapshot(load)
         if load == 0:
             nothing = self.start(MemoryCurve())
@@ -143,7 +147,7 @@ class Stepper:
         return Bundle(now.load, level, iterate.curves, iterate.carried, moved, displacement, work)
 
     def stored(self, state: Bundle) -> float:
-        """The elastic energy over c_t f^2: own deflections along the curves, and the coupling."""
+        """The elastic energy over c_t f^2: of own deflections along the curves, and of coupling."""
         own = 0.0
         for curve, k in zip(state.curves, self.coefficients, strict=True):
             carried = 0.0
@@ -158,10 +162,10 @@ class Stepper:
 
 
 class SteppedPath(NamedTuple):
-    """What general steps find at m points, of which nothing is proved.
+    """Results of general steps at m points, without proofs.
 
-    losses : (m,) since the beginning, nan where steps do not settle them;  status : (m, N)
-    fronts : (m, N) indentations down to which each asperity slipped last, or its own
+    losses : (m,) [force length] since the start; nan if they do not settle;  status : (m, N)
+    fronts : (m, N) indentation at the slip front of each asperity; its own if it sticks
     """
 
     states: States
@@ -177,13 +181,13 @@ def followed(
     steps: int | None = None,
     stepper: type[Stepper] | None = None,
 ) -> SteppedPath:
-    """The general step along a path, so many times per segment.
+    """The results of general steps along a path.
 
-    The error of n steps is about e / n^2, so of losses by n and 2n steps (4 W_2n - W_n) / 3 is
-    given, and how it changes from one doubling to the next estimates its error.
+    The loss W_n by n steps has an error of about e / n^2, with some constant e. The loss returned
+    is (4 W_2n - W_n) / 3; its change from one doubling to the next estimates its error.
 
-    steps : default twice as many until every loss changes by less than SETTLED of itself, and
-        displacements by less than SETTLED_MOTION of the largest
+    steps : per segment, and the loss is then W_n; None doubles them until each loss changes by less
+        than SETTLED of itself and the displacements by less than SETTLED_MOTION of the largest
     """
     by = (stepper or Stepper)(levels)
 
@@ -234,18 +238,18 @@ class _Iterate(NamedTuple):
     curves: tuple[MemoryCurve, ...]
     carried: Array
     slopes: Array  # dT_i / deta_i
-    defect: Array  # of the n equations
-    excess: float  # of the total
+    defect: Array  # (n,) of the first equations above
+    excess: float  # sum of T_i less T
 
     @property
     def residual(self) -> float:
-        """The largest defect, the excess as a displacement among them."""
+        """The largest defect; the excess of the total counts as a displacement."""
         stiffness = float(self.slopes.sum())
         missing = abs(self.excess) / stiffness if stiffness > 0 else np.inf
         return max(float(np.abs(self.defect).max()), missing if self.excess else 0.0)
 
     def newton(self, A: Array) -> tuple[Array, float]:
-        """The step of eta and x."""
+        """The Newton step of eta and of x."""
         n = len(self.eta)
         matrix = np.empty((n + 1, n + 1))
         matrix[:n, :n] = A * self.slopes
@@ -261,13 +265,13 @@ class _Iterate(NamedTuple):
 
 
 class _Trial(NamedTuple):
-    """A step under way: from a state to a level of the normal load."""
+    """The equations of a step from a state to a level of the normal load."""
 
     stepper: Stepper
     now: Bundle
     level: Snapshot
-    deflections: Array  # (n,) before
-    parts: Array  # (n,) of the step during which each touches
+    deflections: Array  # (n,) before the step
+    parts: Array  # (n,) fraction of the step during which each asperity touches
 
     @classmethod
     def of(cls, stepper: Stepper, now: Bundle, level: Snapshot) -> _Trial:
@@ -277,7 +281,7 @@ class _Trial(NamedTuple):
         return cls(stepper, now, level, now.deflections, parts)
 
     def even(self, total: float) -> tuple[Array, float]:
-        """A start at which nothing slides: each asperity carries the same part of friction."""
+        """Start values of eta and x: each asperity carries the same part of its friction limit."""
         own = np.maximum(self.level.indentations, 0.0)
         wanted = total / self.level.load * own - self.deflections
         eta = np.divide(wanted, self.parts, out=np.zeros_like(own), where=self.parts > 0)
@@ -304,7 +308,7 @@ class _Trial(NamedTuple):
 
 
 def _slope(old: MemoryCurve, curve: MemoryCurve, k: float) -> float:
-    """dT_i over the deflection: of the chord of what is appended, or at the front."""
+    """The derivative of T_i by the deflection: along the appended segment, or at the front."""
     high = float(curve.load)
     if curve.front is None and curve.load > old.load:
         low = float(old.load)

@@ -1,10 +1,10 @@
-"""The normal solutions of a contact at rational total loads, and what friction needs of its scene.
+"""The normal solutions of a contact at rational total loads, and the units of friction.
 
-Forces are counted in f times the unit of loads, displacements in c_t f times the unit of lengths,
-c_t = (2 - nu) / (2 (1 - nu)). A total load is named by a rational number [force]: where the load
-is prescribed it is that load. Where the approach is prescribed the load P follows, and is known to
-thirty digits only: the name of P is its float64 number, and L stands for P less the difference of
-the names. A load of 0 is 0.
+Shear forces are in units of f times the unit of loads, displacements in units of c_t f times the
+unit of lengths, with c_t = (2 - nu) / (2 (1 - nu)) and Poisson's ratio nu. A rational number
+[force] identifies a level. If the load is prescribed, it is the total load of the level. If the
+approach is prescribed, the load P is computed, to thirty digits: the float64 number nearest to P
+identifies P, and a number smaller by d identifies the load P - d. 0 always means the load 0.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 
-#: Roundoffs of f P by which a shear force may differ from f P and count as gross sliding.
+#: A shear force within this many roundoffs of f P counts as f P: gross sliding.
 AT_THE_END = 16
 
 
@@ -38,16 +38,17 @@ Made = TypeVar("Made")
 
 
 class FrictionLevels:
-    """The levels of a contact, named by rational loads [force]; `contact.cached(FrictionLevels)`.
+    """The levels of a contact by rational loads [force], made by `contact.cached(FrictionLevels)`.
 
-    scene : with friction;  load : P;  candidates : (n,) of N asperities of the scene
+    scene : of N asperities, with friction;  load : P
+    candidates : (n,) indices of the asperities that may touch at loads up to P
     """
 
     def __init__(self, contact: Contact) -> None:
         self._levels = contact.cached(levels_of)
         self._named: dict[Fraction, Level] = {}
         self._cache: dict[Any, Any] = {}
-        self._ordered: Fraction | None = None  # down to where order is proved
+        self._ordered: Fraction | None = None  # the least load down to which order is proved
         self.scene = contact.scene
         self.by_load = contact.prescribed_load is not None
         self.candidates = self._levels.problem.candidates
@@ -62,21 +63,21 @@ class FrictionLevels:
 
     @cached_property
     def force_unit(self) -> Ball:
-        """What levels' loads are shear forces in [force]."""
+        """[force] the unit of shear forces."""
         return self.coefficient * self.units.force
 
     @cached_property
     def travel_unit(self) -> Ball:
-        """What levels' lengths are tangential displacements in [length]."""
+        """[length] the unit of tangential displacements."""
         return self.coefficient * self.ratio * self.units.length
 
     @cached_property
     def loss_unit(self) -> Ball:
-        """c_t f^2, in the scene's units [force length]."""
+        """[force length] the unit of energy losses, c_t f^2 times the units of load and length."""
         return self.force_unit * self.travel_unit
 
     def height(self, force: float | Fraction) -> Fraction:
-        """T = Q / f at the load P."""
+        """T = Q / f for a shear force Q at the load P."""
         return height_at(self.load, force, self.scene)
 
     @property
@@ -86,21 +87,21 @@ class FrictionLevels:
 
     @property
     def proved(self) -> bool:
-        """The normal solution at P is proved."""
+        """True if the normal solution at P is proved."""
         return self.top.solution is not None
 
     @property
     def presses(self) -> int:
-        """How many normal problems were solved, with that of P."""
+        """The number of normal problems solved so far, including that at P."""
         return 1 + self._levels.presses
 
     @property
     def known(self) -> list[Fraction]:
-        """The loads of all levels so far."""
+        """The loads of all levels found so far, and P."""
         return [*self._named, self.load]
 
     def at(self, load: Fraction) -> Level:
-        """The level of a load from 0 to P."""
+        """The level at a load from 0 to P."""
         if load == self.load:
             return self.top
         if load not in self._named:
@@ -109,14 +110,14 @@ class FrictionLevels:
         return self._named[load]
 
     def prepare(self, loads: Iterable[Fraction]) -> None:
-        """Find the levels of these loads together, where that is cheaper than one by one."""
+        """Find the levels at these loads together, where this is cheaper than one by one."""
         new = sorted({x for x in loads if x not in self._named and 0 < x < self.load})
         if len(new) > 1:
             found = zip(new, self._levels.prepare(self._balls(new)), strict=True)
             self._named |= {load: level for load, level in found if level is not None}
 
     def rows(self, loads: Sequence[Fraction]) -> Rows:
-        """Levels, a row for each."""
+        """The levels at these loads, as rows."""
         levels = [self.at(load) for load in loads]
         return Rows(
             Ball.stacked([level.load for level in levels]),
@@ -128,9 +129,9 @@ class FrictionLevels:
         )
 
     def displaced(self, displacement: float) -> Fraction:
-        """The load of the level whose approach is D0(P) - X / (c_t f), X >= 0 [length].
+        """The load of the level with the approach D0(P) - X / (c_t f), for X >= 0 [length].
 
-        That of first loading to X. Raises InputError beyond gross sliding.
+        It is P - Q / f of first loading to X. Raises InputError if X exceeds that of gross sliding.
         """
         if not displacement <= self.farthest * (1 + 1e-14):
             found = f"{displacement:.17g}: gross sliding"
@@ -152,12 +153,12 @@ class FrictionLevels:
 
     @cached_property
     def farthest(self) -> float:
-        """[length] X in gross sliding."""
+        """[length] the displacement X at which gross sliding begins."""
         far = (self.top.approach - self.at(Fraction(0)).approach) * self.travel_unit
         return float(far.value)
 
     def order(self, loads: Iterable[Fraction], most: int = MOST) -> Order:
-        """Whether no indentation falls with the load, from the least of these loads to P."""
+        """Whether it is proved that no indentation falls as the load rises, from the least to P."""
         asked = frozenset({*loads, self.load})
         if self._ordered is not None and min(asked) >= self._ordered:
             return "proved"
@@ -169,14 +170,14 @@ class FrictionLevels:
         return found
 
     def cached(self, name: Any, make: Callable[[], Made]) -> Made:
-        """make(), once for each name."""
+        """The result of make(), computed once for each name."""
         if name not in self._cache:
             self._cache[name] = make()
         made: Made = self._cache[name]
         return made
 
     def snapshot(self, load: Fraction) -> Snapshot:
-        """A level in the scene's units, for all its asperities."""
+        """The level at a load in the scene's units, for all asperities of the scene."""
         level = self.at(load)
         return Snapshot(
             load=float(load),
@@ -187,12 +188,12 @@ class FrictionLevels:
         )
 
     def loads(self, level: Level) -> Ball:
-        """(N,) P_i in own units."""
+        """(N,) loads P_i in units of the levels."""
         found: Ball = of_rows(self.to_scene, level.loads)
         return found
 
     def indentations(self, level: Level) -> Ball:
-        """(N,) n_i in own units; of asperities that cannot touch to some sixteen digits."""
+        """(N,) indentations n_i in units of the levels, to float64 for those that cannot touch."""
         known, others = level.indentation, self._others
         if len(others) == 0:
             return known
@@ -213,7 +214,7 @@ class FrictionLevels:
 
     @cached_property
     def _others(self) -> Indices:
-        """Asperities of the scene that cannot touch at loads up to P."""
+        """Indices of the asperities that cannot touch at loads up to P."""
         left = np.ones(len(self.scene), dtype=bool)
         left[self.candidates] = False
         return np.flatnonzero(left)
@@ -224,18 +225,18 @@ class FrictionLevels:
         return self._levels.problem.influence.onto(points)
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
-        """(..., N) values of the candidates, among zeros for all others of the scene."""
+        """(..., N) values of the candidates, and 0 for all other asperities."""
         return among_zeros(values, self.candidates, len(self.scene), axis=-1)
 
     def _balls(self, loads: Sequence[Fraction]) -> Ball:
-        """(k,) loads in own units; 0 is 0."""
+        """(k,) loads in units of the levels."""
         if self.by_load:
             return exactly(loads).scaled(1.0 / self.units.force)
         return self.top.load - exactly([self.load - x for x in loads]).scaled(1 / self.units.force)
 
 
 def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction:
-    """T = Q / f, exactly; P or -P where it is that to rounding: gross sliding."""
+    """T = Q / f, exactly; P or -P if |T| differs from P by rounding only."""
     height = Fraction(force) / Fraction(checks.friction(scene.friction))
     if abs(load - abs(height)) > AT_THE_END * Fraction(ROUNDOFF) * load:
         return height
@@ -243,13 +244,13 @@ def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction
 
 
 def prove_order(contact: Contact, *, most: int = 5000) -> Order:
-    """Whether no indentation falls as the load rises from 0: "proved", or what is known.
+    """Whether it is proved that no indentation falls as the load rises from 0 to that of `contact`.
 
-    All that is asked of the contact's friction afterwards rests on it. Without asking it is proved
-    where that costs no more than a few normal solutions.
+    The result is "proved", "proved for one step" or "fails", as in `Cycle.order`. Later results for
+    this contact reuse the proof. It may take a search for some asperities, mostly those at the edge
+    of the contact; without this call, the search is made for at most 1,000 asperities.
 
-    most : for how many asperities the dearer search may be made, some milliseconds for each; the
-        cheap one does for most of those that do not lie at the edge of the contact
+    most : largest number of asperities for which the search is made, some milliseconds for each
 
     >>> cr.prove_order(contact)
     'proved'
@@ -262,7 +263,7 @@ class Snapshot(NamedTuple):
     """A normal solution in the scene's units. Arrays are (N,).
 
     load, loads : [force];  indentations : [length] minus the gap where open
-    touching, open : proved
+    touching, open : true where this is proved
     """
 
     load: float
@@ -273,12 +274,12 @@ class Snapshot(NamedTuple):
 
 
 def exactly(values: Sequence[Fraction]) -> Ball:
-    """(k,) rational numbers as balls."""
+    """(k,) balls that contain these rational numbers."""
     pairs = [Pair.nearest(value) for value in values]
     high, low = (np.array([pair[part] for pair in pairs]) for part in (0, 1))
     return Ball.around(Pair(high, low), PAIR_ROUNDOFF * np.abs(high) + TINY)
 
 
 def rounded(ball: Ball) -> tuple[Array, Array]:
-    """The float64 numbers nearest to a ball, and bounds on their errors."""
+    """The centres of a ball as float64 numbers, and bounds on their errors."""
     return frozen(np.array(ball.value)), frozen(np.array(ball.error))

@@ -1,12 +1,13 @@
-"""What slip costs, in units of c_t f^2: by asperities, by the energy V, and along a path.
+"""The energy loss of slip, in units of c_t f^2: of asperities, of the whole contact, along a path.
 
-Where the front of slip is at the level L while the load is P, the loss grows with falling L at the
-rate (1 - c th) of -dB/dL, with th the slope of the layer that it runs through, c the sign, and
+While the load is P and the slip front falls through the level L, the loss grows by
+(1 - c th) (-dB/dL) per unit of L. Here th is the slope of the layer at L, c the sign of the slip,
 
     B = sum_i (6/5) P_i delta_i e(1 - P_i(L) / P_i) + P_i g_i(L)
-      = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)]
+      = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)],
 
-wherever no indentation falls with the load (docs/theory/losses.md).
+V the energy of the normal solution, and P_i, delta_i, g_i, D0 the loads, indentations, gaps and
+approach. This holds if no indentation falls as the load rises (docs/theory/losses.md).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ Pair: TypeAlias = tuple[Fraction, Fraction]
 
 
 def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
-    """(k, n) the parts of B in partial slip and in sliding, of levels P and L in rows."""
+    """(k, n) the parts of B from partial slip and from sliding, for rows of levels P and L."""
     nothing = Ball.exact(np.zeros(high.loads.shape))
     loaded = high.loads.value > 0
     P = where(loaded, high.loads, 1.0 + nothing)
@@ -50,13 +51,13 @@ def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
 
 
 def trapezoid_loss(high: Level, low: Level) -> Ball:
-    """B by the energy: twice the error of the trapezoid rule on D0 between two levels."""
+    """B from the energy: twice the error of the trapezoid rule on D0 between two levels."""
     run = high.load - low.load
     return (high.energy - low.energy) * 2.0 - run * (high.approach + low.approach)
 
 
 def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
-    """(m,) what the pieces of each of m segments cost."""
+    """(m,) the loss on each of m segments, from its pieces."""
     pieces = [piece for each in costs for piece in each]
     found = exactly([1 - p.sign * p.slope for p in pieces]) * _integrals(levels, pieces)
     ends = np.cumsum([0, *map(len, costs)]).tolist()
@@ -64,7 +65,7 @@ def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
 
 
 def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
-    """(k,) of -dB/dL along each piece."""
+    """(k,) the integral of -dB/dL along each piece."""
     levels.prepare(load for piece in pieces for load in piece[2:])
     still = np.array([piece.load_constant for piece in pieces], dtype=bool)
     at, found = (
@@ -84,7 +85,7 @@ def _integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
 
 
 def _of_pairs(levels: FrictionLevels, pairs: Sequence[Pair]) -> tuple[Ball, Ball]:
-    """(k, n) `asperity_losses` of loads P and L."""
+    """(k, n) `asperity_losses` for pairs of loads P and L."""
     loads = sorted({load for pair in pairs for load in pair})
     rows, place = levels.rows(loads), {load: k for k, load in enumerate(loads)}
     high, low = (np.array([place[pair[end]] for pair in pairs]) for end in (0, 1))
@@ -92,16 +93,16 @@ def _of_pairs(levels: FrictionLevels, pairs: Sequence[Pair]) -> tuple[Ball, Ball
 
 
 def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
-    """(k,) integrals of -dB/dL along fronts from L0 down to L1, the load going from P0 to P1.
+    """(k,) integrals I of -dB/dL for a front from L0 down to L1 while the load goes from P0 to P1.
 
-    With run = L0 - L1, D = D0(L0) - D0(L1), and the means m of D0 on [L1, L0] and M on [P1, P0],
-    both less D0(L1), it is
+    With run = L0 - L1, D = D0(L0) - D0(L1), and the means m of D0 on [L1, L0] and M of D0 on
+    [P1, P0], both less D0(L1),
 
         I = (P0 - L0) D - (P0 - P1) m + run (2 m - M).
 
-    D0 rises and is concave, so m lies in [D/2, D], M between its trapezoid and the larger of its
-    ends, and D in [0, run / (2 E* a(L1))]: of each the smaller enclosure counts, so that fronts
-    that hardly run keep their digits.
+    D0 rises and is concave. So m lies in [D/2, D], M between the mean and the larger of D0(P0) and
+    D0(P1), both less D0(L1), and D in [0, run / (2 E* a(L1))]. Where these intervals are smaller
+    than those of the sums they replace them, which keeps the digits of fronts that hardly move.
     """
     if not pieces:
         return Ball.exact(np.zeros(0))
@@ -132,7 +133,7 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
 
 
 def _softest(level: Level) -> float:
-    """At most 2 E* a of the largest asperity: D0 is concave, and rises no faster than 1 / that."""
+    """A lower bound on 2 E* a of the largest contact; the slope of D0 is at most 1 / (2 E* a)."""
     k = level.problem.exact.coefficients.upper
     softness = 1.5 * np.cbrt(np.maximum(level.loads.lower, 0.0)) / k
     return float(softness.max(initial=0.0)) * (1 - SAFETY)
@@ -148,24 +149,24 @@ def _hull(a: Ball, b: Ball) -> Ball:
 
 
 def _sharper(a: Ball, b: Ball) -> Ball:
-    """Of two enclosures of the same numbers, that with the smaller radius."""
+    """The enclosure with the smaller radius, of two of the same numbers."""
     return where(a.radius <= b.radius, a, b)
 
 
 def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple[Ball, Ball]:
-    """(N,) what pieces cost at each asperity in partial slip and in sliding [force length].
+    """(N,) [force length] losses at each asperity from partial slip and from sliding.
 
-    With n = n_i(L), N = n_i(P) and p the local law P_i = p(n), the rates along a front are
+    With n = n_i(L), N = n_i(P) and the local law P_i = p(n), the rates along a front are
 
-        p(N) - p(n) - p'(n) (N - n)  and, where open at L,  p(N),    times  dn/dL,
+        p(N) - p(n) - p'(n) (N - n)  and, where open at L,  p(N),    times  dn/dL.
 
-    and neither falls with P where order holds. So a piece on which the load varies is cut into
-    cells, by its part of what all fronts run through, and of each the losses at the load of either
-    end enclose that between: the middle has an error of about cells^-2, and the bound is about
-    1 / cells.
+    Neither falls as P rises, if no indentation does. So pieces on which the load varies are cut
+    into cells, as many in all as given, and the losses of a cell at the loads of its two ends
+    enclose its true loss. The returned means have relative errors of about cells^-2; the bounds are
+    about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
-    parts = list[tuple[Fraction, Pair, Pair]]()  # weight, loads and fronts at both ends
+    parts = list[tuple[Fraction, Pair, Pair]]()  # weight; loads at both ends; fronts at both ends
     for piece in pieces:
         cut = (
             1

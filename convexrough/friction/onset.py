@@ -1,8 +1,8 @@
 """The load at which an asperity first touches, and the shear force at which it starts to slide.
 
-On first loading asperity i slides once the level P - Q / f is below its onset, the root of its
-indentation n_i(L). It is found by Newton's method, with dn_i/dL = S - (A q)_i, and enclosed by two
-proofs: that it is open just below, and that it touches just above.
+On first loading asperity i slides once the level P - Q / f is below its onset: the load L at which
+its indentation n_i(L) is 0. Newton's method finds the onset, and two proofs enclose it: that the
+asperity is open at a slightly smaller load, and that it touches at a slightly larger one.
 """
 
 from __future__ import annotations
@@ -20,35 +20,35 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.levels import FrictionLevels
 
-#: Of more loaded asperities than this, coupled by an operator, the onset of some only is found.
+#: The largest number of onsets in one call where no influence matrix is stored.
 MOST_ONSETS = 256
 
-#: Distances from the root, relative to it, at which proofs are tried, the closest first.
+#: Relative distances from the root at which proofs are tried, the closest first.
 TRIED = tuple(10.0**-k for k in range(13, 3, -1))
 
-#: Levels known already are taken up to this one of those distances.
+#: Index of the distance in TRIED up to which levels that are known already are used.
 ENOUGH = 2
 
-#: Newton steps at most, and the change of L, in parts of P, that ends them.
+#: The largest number of Newton steps, and the change of L, relative to P, that ends them.
 STEPS, SETTLED = 60, 2.0**-54
 
 
 class Onset(NamedTuple):
-    """A load [force], proved to be between two others where order holds."""
+    """The load of an onset [force], proved to be between two others if indentations never fall."""
 
     load: Fraction
-    lower: Fraction  # the asperity is proved open there
-    upper: Fraction  # and to touch there
+    lower: Fraction  # the asperity is proved open at this load
+    upper: Fraction  # the asperity is proved to touch at this load
 
 
 def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Array:
     """(n,) [force] the shear force at which each asperity starts to slide on first loading.
 
-    The same as the amplitude (maximum - minimum) / 2 of a steady cycle below which its sliding has
-    shaken down to partial slip. nan where the asperity carries no load.
+    In a steady cycle the asperity slides if the amplitude (maximum - minimum) / 2 exceeds the same
+    force. The result is nan for an asperity without load.
 
-    which : indices of the asperities to look at, in this order; default all. Each takes some normal
-        solutions, so of many loaded asperities some must be named.
+    which : indices of the asperities, in the order of the result; default all. Each needs some
+        normal solutions. Required for more than 256 loaded asperities without a stored matrix
 
     >>> onsets = cr.onset_of_sliding(contact, which=[0, 36])
     >>> print((onsets / contact.load).round(3))
@@ -74,13 +74,13 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
 
 def enclosed(levels: FrictionLevels, which: Sequence[int]) -> dict[int, Onset]:
-    """The onsets of asperities that touch at P; a side without a proof is 0 or P."""
+    """The onsets of asperities that touch at P; a bound without a proof is 0 or P."""
     depths = levels.top.indentation.value[np.searchsorted(levels.candidates, which)]
     return {which[k]: _enclosed(levels, which[k]) for k in np.argsort(depths).tolist()}
 
 
 def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
-    """By the levels on the way to the root, and where these are far from it by levels close by."""
+    """The onset of one asperity, enclosed by known levels near the root or else by new ones."""
     place = int(np.searchsorted(levels.candidates, asperity))
     found = root(levels, place)
     around = [Fraction(part) * (found or levels.load) for part in TRIED]
@@ -93,12 +93,12 @@ def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
 
 
 def root(levels: FrictionLevels, place: int) -> Fraction:
-    """The load at which n_i is 0, of a candidate; 0 of the highest."""
+    """The load at which n_i of a candidate, given by its position, is 0."""
 
     def depth(load: Fraction) -> float:
         return float(levels.at(load).indentation.value[place])
 
-    if depth(Fraction(0)) >= 0.0:  # one of those that are as high as the highest
+    if depth(Fraction(0)) >= 0.0:  # no asperity is higher
         return Fraction(0)
     known = [load for load in levels.known if depth(load) > 0]
     low, high = max((s for s in levels.known if depth(s) <= 0), default=Fraction(0)), min(known)
@@ -121,13 +121,13 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
 
 def _short(load: Fraction) -> Fraction:
-    """As a sum of two float64 numbers: a rational number of few digits."""
+    """The load rounded to a sum of two float64 numbers, a fraction with few digits."""
     high = Fraction(float(load))
     return high + Fraction(float(load - high))
 
 
 def last_to_touch(levels: FrictionLevels) -> tuple[int, Onset]:
-    """The asperity with the highest onset of those that touch at P."""
+    """The asperity with the highest onset among those that touch at P, and this onset."""
     touching: Indices = np.flatnonzero(levels.top.loads.value > 0)
     depths = levels.top.indentation.value[touching]
     last = int(touching[np.argmin(depths)])
@@ -141,7 +141,7 @@ def last_to_touch(levels: FrictionLevels) -> tuple[int, Onset]:
 
 
 def indices(what: str, which: ArrayLike | None, n: int) -> Indices:
-    """Indices of asperities of a scene of n, checked; default all."""
+    """The given indices of asperities of a scene of n, checked; by default all."""
     if which is None:
         return np.arange(n)
     asked = np.atleast_1d(np.asarray(which))

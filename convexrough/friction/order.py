@@ -1,41 +1,42 @@
-r"""Order: no indentation falls as the load rises. Where it holds, levels are all of friction.
+r"""Order: no indentation falls as the load rises, so friction states are sums of normal solutions.
 
-Let n_i(L) be the indentation at the load L, minus the gap where open, and C = diag(dP_i / dn_i),
-0 where open. As n = D0 + d - A P, the rates y = dn / dD0 solve (I + A C) y = 1. A path down to the
-load L0 from that of P has order where y_i >= 0 on it for every i that may touch at P, and all
-others stay open. One level with the load L1 proves this from L1 down to L0, as follows.
+Let n_i(L) be the indentation of asperity i at the load L, or minus its gap where open; D0 the
+approach, d the offsets, A the influence matrix, and C = diag(dP_i / dn_i), 0 where open. As
+n = D0 + d - A P, the rates y = dn / dD0 solve (I + A C) y = 1. Levels from P down to the load L0
+have order if y_i >= 0 for every i that may touch at P, and all others stay open. The level at one
+load L1 proves this from L1 down to L0, as follows.
 
-Let C~ >= C(L1) be diagonal, W = C~^(1/2) on its support, the asperities not proved open at L1, and
-B = I + W A W >= mu I > 0 there; so I + A C is regular for all 0 <= C <= C~. Let y = (I + A C~)^-1 1
-and G = (I + A C~)^-1 A. For C = C~ - D with 0 <= D <= delta <= C~ we have
-(I + A C~) y(C) = 1 + A D y(C), that is
+The *support* are the asperities not proved open at L1. Let C~ >= C(L1) be diagonal and 0 off the
+support, W = C~^(1/2), and B = I + W A W >= mu I > 0 on it; so I + A C is regular for all
+0 <= C <= C~. Let y = (I + A C~)^-1 1 and G = (I + A C~)^-1 A. For C = C~ - D with
+0 <= D <= delta <= C~ we have (I + A C~) y(C) = 1 + A D y(C), that is
 
     y_i(C) (1 - G_ii D_i) = y_i + sum over k != i of G_ik D_k y_k(C).                          (1)
 
 On the support G = W^-1 (I - B^-1) W^-1 and G_ii <= 0, as (B^-1)_ii >= 1 / B_ii = 1.
 
-(a) Let m be 1, or improved: m <- min(m, y + G+ (delta m)), G+ the positive entries of G off its
-diagonal. If on the support
+(a) Start with m = 1; m <- min(m, y + G+ (delta m)) improves it, where G+ are the positive entries
+of G off its diagonal. If on the support
 
     y_i > sum over k != i of max(-G_ik, 0) delta_k m_k,   or   m = 1 and 1 > sum over k of A_ik C~_k
 
-for all i, then 0 < y_i(C) <= m_i there for all C from C~ - delta to C~. In the first case follow
-y(C~ - s D) from s = 0, where it is positive: as long as it is not negative, y(C) = 1 - A C y(C) is
-at most 1, hence at most m by (1), and at least a positive constant by (1), as 1 - G_ii D_i is
+for all i, then 0 < y_i(C) <= m_i on the support for all C from C~ - delta to C~. In the first case
+follow y(C~ - s D) from s = 0, where it is positive. While it is not negative, y(C) = 1 - A C y(C)
+is at most 1, hence at most m by (1), and at least a positive constant by (1), as 1 - G_ii D_i is
 bounded; by continuity it stays so. In the second case follow y(s C) from y(0) = 1 up to s = 1.
 
-(b) Let delta_k >= C~_k - c_k(n_k(L1) - m_k (D0(L1) - D0(L0))), c_k(n) = dP_k / dn_k. Let the others
-be open at L1, with y_i >= -s_i by (1) with D_i = 0, and gaps g_i > s_i (D0(L1) - D0(L0)) there.
-Then y > 0 on the support all the way down to L0, and the others stay open. For the solution is
-continued downwards by dn / dD0 = y(C(n)) (the implicit function theorem), and C stays between
-C~ - delta and C~: n falls, so that C <= C~, by less than m_k (D0(L1) - D0(L0)) before L0 is
-reached; and the gaps stay open by the same count. The load falls strictly with D0, and the
-solution stays in the box where it is the only one. For L0 = 0 all this holds down to every L > 0.
+(b) Let delta_k >= C~_k - c_k(n_k(L1) - m_k (D0(L1) - D0(L0))), c_k(n) = dP_k / dn_k. Let each
+asperity outside the support have y_i >= -s_i by (1) with D_i = 0, and a gap
+g_i > s_i (D0(L1) - D0(L0)) at L1. Then y > 0 on the support down to L0, and the others stay open.
+Proof: dn / dD0 = y(C(n)) continues the solution downwards (implicit function theorem). C stays
+between C~ - delta and C~, as n_k falls, by less than m_k (D0(L1) - D0(L0)) before L0 is reached;
+and no gap closes, by the bounds on y_i. The load falls strictly with D0, and the solution stays in
+the box where it is the only one. For L0 = 0 all this holds down to every L > 0.
 
-Of those that touch at P but are open at L1, where a path is proved in pieces, s_i <= 0 is asked.
-The second case of (a) needs no inverse. For the first B^-1 is computed, and bounded: with
-R = I - B X, column k of B^-1 - X is at most || R_k || / mu in the 2-norm. Where too many touch for
-an inverse, weights of near neighbours prove the same: `friction.sweeping`.
+If a range of loads is proved in parts, asperities that touch at P but are open at L1 need s_i <= 0.
+The second case of (a) needs no inverse. The first computes an approximation X of B^-1: with
+R = I - B X, column k of B^-1 - X is at most || R_k || / mu in the 2-norm. If too many asperities
+touch for an inverse, weights of near neighbours prove the same: `friction.sweeping`.
 """
 
 from __future__ import annotations
@@ -59,33 +60,32 @@ from convexrough.normal.stack import Stack
 from convexrough.normal.together import Rows
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: "proved" for all loads between the levels in use; "proved for one step", where no load falls
-#: between them, and no rate is seen to be negative at them and at some levels between: a state is
-#: then the solution of the program with one step; "fails" where an indentation is seen to fall, or
-#: nothing is proved.
+#: "proved": for all loads between the levels in use. "proved for one step": no load P_i falls from
+#: a level in use to the next, and no rate is negative there or at some levels between; states are
+#: then solutions of one general step. "fails": some indentation falls, or nothing is proved.
 Order = Literal["proved", "proved for one step", "fails"]
 
-#: A rate dn_i / dD0 below minus this is no rounding; what a linear solve may leave.
+#: Rates dn_i / dD0 below -RATE_ROUNDING are negative; SOLVED is the tolerance of the linear solve.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: Up to so many that touch the inverse costs no more than the levels themselves; for so many
-#: weights of least total are sought where more touch.
+#: For at most so many touching asperities the inverse costs no more than the levels themselves. If
+#: more touch, weights of least total are computed for at most MOST asperities.
 INVERTED, MOST = 800, 1000
 
-#: Levels between that are tried: where an inverse is made; and where none is, to see rates alone.
+#: Numbers of levels between that are tried: with an inverse, and without one.
 BETWEEN, FEW_BETWEEN = 7, 1
 
-#: Improvements of the bounds m; and the least c of the largest that is counted. Heuristics.
+#: Number of improvements of m, and the least entry of C~ relative to the largest. Heuristics.
 IMPROVEMENTS, LEAST = 4, 2.0**-30
 
 
 def order_between(
     at: Callable[[Fraction], Level], loads: Iterable[Fraction], most: int = MOST
 ) -> Order:
-    """Whether order holds between the highest and the lowest of some loads, by bisection.
+    """What is proved of the order between the lowest and the highest of some loads, by bisection.
 
-    at   : the level of a load
-    most : as of `swept_rates`
+    at   : returns the level at a load
+    most : as in `swept_rates`
     """
     used = sorted(set(loads), reverse=True)
     top = at(used[0])
@@ -104,7 +104,7 @@ def order_between(
         middle = (high + low) / 2
         try:
             level = at(middle)
-        except SolverError:  # too crowded to be solved: nothing is proved between
+        except SolverError:  # nothing is proved between
             return "proved for one step"
         if _falls(at(high), level, rising) or _falls(level, at(low), rising):
             return "fails"
@@ -119,9 +119,9 @@ def order_between(
 
 
 def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: int = MOST) -> bool:
-    """Whether no indentation falls from one level to a lower one, as above, from the upper alone.
+    """Whether the upper level proves order down to the lower one, by (a) and (b) above.
 
-    rising : (n,) all that may touch at the highest load of the path
+    rising : (n,) true for asperities that may touch at the highest load of the path
     """
     found = upper.solution
     if found is None or (found.box.fixed_open & ~upper.open).any():
@@ -159,7 +159,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
 
 @np.errstate(all="ignore")
 def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.bool_]:
-    """(m,) `proved_between` of rows of levels of which the upper are the highest of a path."""
+    """(m,) `proved_between` for rows of levels, the upper ones at the highest load of a path."""
     k, support = rows.exact.coefficients, ~high.open
     c = np.where(support, 1.5 * np.cbrt(high.loads.upper) / k.lower * (1 + SAFETY), 0.0)
     least = np.minimum(LEAST * c.max(axis=1, keepdims=True), 1.0 / box.stiffness)
@@ -200,7 +200,7 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
 
 
 def _columns(rows: Stack, which: Indices) -> Array:
-    """(m, n, s) columns (m, s) of the coupling of each row."""
+    """(m, n, s) columns of the influence matrix of each row, at the indices (m, s)."""
     entries = np.empty((*which.shape, len(rows.coupled[0][1])))
     for some, problem in rows.coupled:
         entries[some] = problem.influence.matrix[which[some]]
@@ -208,16 +208,15 @@ def _columns(rows: Stack, which: Indices) -> Array:
 
 
 def _delta(c: Array, depth: Array, steep: Array, fallen: Array) -> Array:
-    """At least C~ - c(n) of indentations that have fallen by so much, from `depth` at least."""
+    """Upper bounds on C~ - c(n) for indentations n >= depth - fallen."""
     slopes = 1.5 * np.sqrt(np.maximum(depth - fallen * (1 + SAFETY), 0.0)) / steep
     return np.asarray(np.clip(c - slopes * (1 - SAFETY) + SAFETY * c, 0.0, c))
 
 
 class _Span(NamedTuple):
-    """An upper level, and how far down from it.
+    """The quantities of the proof for one upper level.
 
-    support : those not proved open;  c : (n,) C~, 0 elsewhere;  drop : D0(L1) - D0(L0)
-    mu      : B >= mu I
+    support : indices;  c : (n,) C~, 0 off the support;  drop : D0(L1) - D0(L0);  mu : B >= mu I
     """
 
     upper: Level
@@ -251,13 +250,13 @@ class _Span(NamedTuple):
         )
 
     def delta(self, m: Array) -> Array:
-        """Of the support."""
+        """(s,) delta on the support, for these m."""
         k = np.broadcast_to(self.upper.problem.exact.coefficients.upper, self.c.shape)
         depth, c = self.upper.indentation.lower[self.support], self.c[self.support]
         return _delta(c, depth, k[self.support] ** 1.5, m * self.drop)
 
     def inverse(self) -> _Inverse:
-        """Of the support: one row."""
+        """The inverse for the support, as one row."""
         influence = self.upper.problem.influence
         entries, c = influence.submatrix(self.support)[None], self.c[self.support][None]
         return _Inverse.of(
@@ -265,22 +264,22 @@ class _Span(NamedTuple):
         )
 
     def unsettled(self, rates: Array, rising: NDArray[np.bool_]) -> Indices:
-        """Those with a rate that may be negative, and that must rise or might not stay open."""
+        """Indices with a rate that may be negative, of asperities not sure to stay open."""
         return np.flatnonzero(~((rates > 0) | (~rising & (rates > -self.spare))))
 
     @property
     def spare(self) -> Array:
-        """(n,) what the rates of open ones may be less than 0, so that they stay open."""
+        """(n,) s of (b): open asperities with rates above -s stay open."""
         gaps = np.maximum(-self.upper.indentation.upper, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.nan_to_num(gaps / self.drop, posinf=np.inf) * (1 - SAFETY))
 
 
 class _Inverse(NamedTuple):
-    """B^-1 and v = B^-1 w of supports in rows, as computed, with bounds on their errors.
+    """Computed B^-1 and v = B^-1 w for m supports of s asperities, w the diagonal of W.
 
-    errors : (m, s) of the columns, in the 2-norm;  error : (m, 1) of v, in the 2-norm
-    lost   : (m, 1) what a product with A loses, relative to the sizes of its rows
+    errors : (m, s) bounds on the errors of columns of B^-1 in the 2-norm;  error : (m, 1) of v
+    lost   : (m, 1) bound on the relative rounding of a product with A
     """
 
     w: Array
@@ -292,7 +291,7 @@ class _Inverse(NamedTuple):
 
     @classmethod
     def of(cls, entries: Array, c: Array, mu: Array, entry_error: Array) -> _Inverse:
-        """entries : (m, s, s) of A, written into;  c : (m, s) C~;  mu, entry_error : (m, 1)."""
+        """The inverses from the entries (m, s, s) of A, which are overwritten, and C~ (m, s)."""
         w, diagonal = np.sqrt(c), np.arange(c.shape[1])
         B = entries
         B *= w[:, :, None] * w[:, None, :]
@@ -310,13 +309,13 @@ class _Inverse(NamedTuple):
         return cls(w, X, errors, v[:, :, 0], error(w[:, :, None] - B @ v, v), lost)
 
     def at(self, which: Indices) -> _Inverse:
-        """Of some of the rows."""
+        """The inverses of some of the rows."""
         return _Inverse._make(each[which] for each in self)
 
     def bounds(self, delta: Callable[[Array], Array]) -> tuple[Array, Array]:
-        """(m, s) lower bounds on the rates of the supports, and m, upper ones; by (1).
+        """(m, s) lower bounds on the rates on the supports, and upper bounds m, by (1).
 
-        delta : of m
+        delta : as a function of m
         """
         high = np.maximum(self.matrix + self.errors[:, None, :], 0.0)
         low = np.maximum(self.errors[:, None, :] - self.matrix, 0.0)
@@ -332,9 +331,9 @@ class _Inverse(NamedTuple):
         return (self.v - falls) / w - SAFETY * np.abs(self.v / w), m
 
     def elsewhere(self, entries: Array, change: Array) -> Array:
-        """(m, e) lower bounds on the rates of others, that are open; by (1).
+        """(m, e) lower bounds on the rates of open asperities outside the supports, by (1).
 
-        entries : (m, e, s) of A from the supports to the others;  change : (m, s) delta m
+        entries : (m, e, s) of A, from the supports to these;  change : (m, s) delta m
         """
         weighted, change = entries * self.w[:, None, :], change / np.where(self.w > 0, self.w, 1.0)
         sizes = np.linalg.norm(weighted, axis=2)
@@ -347,7 +346,7 @@ class _Inverse(NamedTuple):
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
-    """Whether a load may be less than at a lower level, or what is open at the top may touch."""
+    """False if each asperity is proved open at the lower level, or is rising and proved to rise."""
     if upper.solution is None:
         return True
     if lower.solution is None:
@@ -357,7 +356,7 @@ def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
 
 
 def _least_rate(level: Level, rising: NDArray[np.bool_]) -> float:
-    """The least of y = (I + A C)^-1 1 of some: how fast each indentation grows."""
+    """The least rate y = (I + A C)^-1 1 of the rising asperities, at most 0."""
     problem, touching = level.problem, level.loads.value > 0
     if not touching.any():
         return 0.0

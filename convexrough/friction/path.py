@@ -1,6 +1,6 @@
-"""Any sequence of normal and shear loads, by the memory curve: docs/theory/paths.md.
+"""Friction along sequences of load P and shear force Q, by the memory curve: docs/theory/paths.md.
 
-`load_path` follows any (P, Q), `history` shear forces at constant P.
+`load_path` follows any sequence of (P, Q), `history` any sequence of Q at constant P.
 """
 
 from __future__ import annotations
@@ -33,24 +33,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoadPath(Table, Plottable):
-    """A sequence of m points (P, Q), with straight segments between. Errors are proved bounds.
+    """The friction states at m points of a path (P, Q) with straight segments between them.
 
-    loads, forces  : (m,) P and Q [force]
-    displacements  : (m,) X [length], both bodies;  displacement_errors : (m,) [length]
-    approaches     : (m,) D0 [length]; before the first contact that of the first touch
-    losses         : (m,) energy lost since the beginning [force length];  loss_errors : (m,)
-    asperity_forces : (m, n) Q_i [force];  asperity_force_errors : (m, n)
-    asperity_loads : (m, n) P_i [force]
-    asperity_displacements : (m, n) own deflection and drift, without the others' influence [length]
-    drifts         : (m, n) position of each asperity against its partner, also while open [length]
+    loads, forces  : (m,) [force] load P and shear force Q
+    displacements  : (m,) [length] relative tangential displacement X of distant points
+    approaches     : (m,) [length] approach D0; that of the first touch at a load of 0
+    losses         : (m,) [force length] energy lost since the start, both bodies
+    asperity_forces, asperity_loads : (m, n) [force] shear force Q_i and load P_i of each asperity
+    asperity_displacements : (m, n) [length] own deflection plus drift
+    drifts         : (m, n) [length] slip of each asperity on its partner, also while open
+    displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
+        without a proof
     fronts         : (m,) [force] level down to which the contact slips; nan where all sticks
     status         : (m, n) "stuck", "partial", "sliding", "open" or "undecided"
-    curves         : the memory curve after each point; it and the fronts rest on order
-    order          : "proved" that no indentation falls with the load, as far as the path asks;
-        "proved for one step": statuses and bounds of states are those of the program with one step
-        for each segment, and no loss is proved; "fails": general steps answer, without a proof
-    presses        : how many normal problems were solved
-    start          : [force] the load of the pressed contact that it starts from; 0 of none
+    curves         : the memory curve after each point. Curves and fronts need `order` not to fail
+    order          : "proved": no indentation falls with the load between the levels in use;
+        "proved for one step": statuses and bounds hold for the results of one general step per
+        segment, and no loss is proved; "fails": results of general steps, without a proof
+    presses        : number of normal problems that were solved
+    start          : [force] load of the pressed contact at the start; 0 without one
 
     >>> path = cr.load_path(scene, loads=[contact.load], forces=[0.1 * contact.load])
     >>> path.order, path.status.shape, path.presses
@@ -90,17 +91,17 @@ class LoadPath(Table, Plottable):
 
     @property
     def scene(self) -> Scene:
-        """What is pressed."""
+        """The scene of the contact."""
         return self.contact.scene
 
     @property
     def load_constant(self) -> bool:
-        """The load is that of the pressed contact all the way, as in a history."""
+        """True if the load stays that of the pressed contact at the start, as in a history."""
         return bool((self.loads == self.start).all())
 
     @property
     def slips(self) -> Array:
-        """(m, n) gross slip [length] of those that touch; 0 of others."""
+        """(m, n) [length] gross slip of the asperities that touch; 0 for others."""
         return frozen(np.where(self.asperity_loads > 0, self.drifts, 0.0))
 
     def gradient(
@@ -110,12 +111,12 @@ class LoadPath(Table, Plottable):
         displacements: ArrayLike | None = None,
         holding: Holding | None = None,
     ) -> Gradient:
-        """Derivatives of a weighted sum over the points with respect to the scene and all loads.
+        """Derivatives of a weighted sum over the points with respect to the scene, P and Q.
 
-        losses, displacements : (m,) weights on them; default the loss up to the last point
-        holding : as in `Contact.gradient`, where the load is held; the forces of all points are
+        losses, displacements : (m,) their weights; default: 1 for the last loss
+        holding : quantity kept constant, as in `Contact.gradient`. The forces Q are constant, too
 
-        Raises InputError where there is no derivative, as of a history in gross sliding.
+        Raises InputError where there is no derivative, as for a history in gross sliding.
 
         >>> past = cr.history(contact, forces=contact.load * np.array([0.3, -0.3]))
         >>> print([f"{each:.3g}" for each in past.gradient().forces])
@@ -135,16 +136,17 @@ def load_path(
     influence: Kind | None = None,
     steps: int | None = None,
 ) -> LoadPath:
-    """Any path of the total load P and the shear force Q, |Q| <= f P, straight between its points.
+    """The friction states along a path of load and shear force, straight between its points.
 
-    loads, forces : (m,) P and Q at its points [force]; a load of 0 is pulled off
-    start     : a pressed contact of this scene, without shear; else the path starts from no contact
-    influence : how to couple the asperities; None for the cheapest that is exact
-    steps     : take the general step, which assumes no order, so many times per segment; None for
-        the memory curve, and as many as are needed where order fails. Nothing is proved of them.
+    loads, forces : (m,) [force] load P and shear force Q at the points, |Q| <= f P; P = 0 is
+        separation
+    start     : a pressed contact of this scene, without shear; default: the bodies are separate
+    influence : compliance operator; None for the cheapest that is exact
+    steps     : number of general steps per segment, whose results have no proof; None uses the
+        memory curve, or as many general steps as needed if an indentation falls with the load
 
-    Raises InputError for an empty path, loads that are negative, shear beyond f P (where, and by
-    how much) or left at a load of 0; SolverError where a normal problem is not solved.
+    Raises InputError for an empty path, negative loads, or shear forces that exceed f P;
+    SolverError if a normal problem is not solved.
 
     >>> P = contact.load
     >>> path = cr.load_path(scene, loads=[P / 2, P, P / 2], forces=[0.0, 0.3 * P, 0.1 * P])
@@ -155,7 +157,9 @@ def load_path(
 
 
 def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
-    """Any sequence of shear forces (m,) [force], |Q| <= f P, from the freshly pressed contact.
+    """The friction states along a sequence of shear forces at constant load P.
+
+    forces : (m,) [force] shear forces Q, |Q| <= f P, starting from the contact without shear
 
     >>> past = cr.history(contact, forces=contact.load * np.array([0.4, 0.0]))
     >>> print([f"{moved:.3g}" for moved in past.displacements])  # the way back is not the way there
@@ -180,7 +184,7 @@ def walk(
     steps: int | None = None,
     stepper: type[Stepper] = Stepper,
 ) -> LoadPath:
-    """`load_path`, with a choice of how a general step is solved."""
+    """`load_path` with a choice of the solver of general steps."""
     points = points_of(scene, loads, forces)
     if steps is not None and (not isinstance(steps, int) or steps < 1):
         raise InputError("steps", found=steps, expected="a whole number, at least 1")
@@ -199,24 +203,24 @@ def walk(
 
 
 def pressed_for(scene: Scene, loads: Iterable[Fraction], influence: Kind | None) -> Contact:
-    """The scene at the highest of these loads; at the first touch where that is 0."""
+    """The contact at the highest of these loads; at the first touch if this load is 0."""
     if highest := float(max(loads)):
         return press(scene, load=highest, influence=influence)
     return press(scene, approach=-float(scene.offsets.max()))
 
 
 def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
-    """(P, T = Q / f) of each point, exactly; each checked."""
+    """(P, T = Q / f) of each point, checked and exact."""
     f = checks.friction(scene.friction)
     P = checks.array("loads", loads, sign="not negative")
     Q = checks.array("forces", forces)
     if len(P) == 0 or len(P) != len(Q):
         found = f"{len(P)} loads and {len(Q)} forces"
-        raise InputError("loads, forces", found=found, expected="as many of both, at least one")
+        raise InputError("loads, forces", found=found, expected="equal numbers, at least one")
     bare = (P == 0) & (Q != 0)
     if bare.any():
         k = int(np.argmax(bare))
-        expected = "0, as the load is 0 there: shear must be gone before contact is lost"
+        expected = "0 at a load of 0: shear must end before contact is lost"
         raise InputError(f"forces[{k}]", found=Q[k], expected=expected)
     for k in np.flatnonzero(np.abs(Q) > f * P).tolist():
         checks.bearable(f"forces[{k}]", float(Q[k]), float(f * P[k]))

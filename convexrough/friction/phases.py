@@ -1,4 +1,4 @@
-"""What a cycle costs where normal load and shear swing out of step: loss against phase and size."""
+"""Energy losses of cycles with oscillating load and shear force, by phase and amplitude."""
 
 from __future__ import annotations
 
@@ -23,22 +23,25 @@ from convexrough.scene.asperities import Asperities
 from convexrough.scene.scene import Scene
 from convexrough.sphere.smooth import smooth_reference
 
-#: The orders of the cycles, the least sure first.
+#: The values of `Cycle.order`, the weakest first.
 UNSURE_FIRST: tuple[Order, ...] = ("fails", "proved for one step", "proved")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhaseLosses(Table, Plottable):
-    """Losses of ellipses  P = load + factor load_amplitude cos t,  Q alike with sin(t + phase).
+    """Losses of elliptic paths.
 
-    A row for each ellipse, c of them: all phases of the first factor, then of the next.
+        P = load + factor load_amplitude cos t,    Q = force + factor force_amplitude sin(t + phase)
 
-    phases, factors : (c,) [rad] and of both amplitudes
-    losses  : (c,) per later cycle, both bodies [force length], on chords; loss_errors are proved
-    smooth  : (c,) the same of the smooth sphere; nan where the base has no smooth reference
-    levels  : (c,) [force] L*, below which nothing slips again
-    sliding : (c,) how many asperities slide in every cycle, or lose contact in it
-    order   : the least sure of those of all cycles
+    Arrays have one value for each of c ellipses: all phases of the first factor, then of the next.
+
+    phases, factors : (c,) phase [rad], and factor of both amplitudes
+    losses  : (c,) [force length] energy lost per steady cycle by both bodies, on a path of chords
+    loss_errors : (c,) [force length] proved bounds on the errors of the losses on this path
+    smooth  : (c,) [force length] losses of the smooth sphere; nan without a smooth reference
+    levels  : (c,) [force] the load L* below which nothing slips in the steady cycle
+    sliding : (c,) number of asperities that slide or lose contact in every cycle
+    order   : the weakest `Cycle.order` of all cycles
 
     >>> losses = cr.phase_losses(
     ...     scene, load=contact.load, load_amplitude=0.3 * contact.load,
@@ -81,10 +84,12 @@ def phase_losses(
     chords: int = 24,
     influence: Kind | None = None,
 ) -> PhaseLosses:
-    """The loss of an elliptic path at several phases and sizes; symbols as in `elliptic_path`.
+    """The losses of elliptic paths with several phases and factors of the amplitudes.
 
+    load, load_amplitude, force, force_amplitude : [force] as in `elliptic_path`
+    phases, factors : (m,) [rad] and (k,); each factor multiplies both amplitudes
     chords : number per ellipse; the relative error of the loss is about chords^-2
-    influence : as in `load_path`
+    influence : compliance operator, as in `load_path`
 
     Raises what `elliptic_path` and `steady` raise.
 
@@ -139,7 +144,7 @@ def phase_losses(
 
 
 def _smooth_alone(scene: Scene, load: float) -> Scene | None:
-    """The smooth base on a plane, as one asperity of the same relative radius; None without one."""
+    """The smooth base, as a scene of one asperity with its relative radius; None without one."""
     if (reference := smooth_reference(scene, load)) is None:
         return None
     twice = 2.0 * reference.radius

@@ -1,4 +1,4 @@
-"""Smooth paths by chords, with corners where the front of slip starts, stops or turns."""
+"""Smooth paths as chords, with corners where the slip front starts, stops or turns."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def elliptic_path(
     friction: float,
     chords: int = 96,
 ) -> tuple[Array, Array]:
-    """(m,) P and (m,) Q around an ellipse.
+    """(m,) loads P and (m,) shear forces Q [force] at points of an ellipse.
 
         P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
 
-    phase : [rad] 0 for a full ellipse, pi/2 for loads in phase on a straight line
-    friction : f of the scene, which says where P + Q/f and P - Q/f are extreme
-    chords : approximate number; those extremes and the extremes of P are always corners, so the
-        relative error of the loss is about chords^-2, and the permanently stuck level is exact
+    phase : [rad] 0 for a full ellipse, pi/2 for a straight line (P and Q in phase)
+    friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
+        points of the path, so that L* of `Cycle.level` is exact
+    chords : approximate number of chords; the relative error of the loss is about chords^-2
 
     >>> loads, forces = cr.elliptic_path(
     ...     load=1.0, load_amplitude=0.5, force_amplitude=0.1, friction=0.5, chords=8

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: An asperity whose given force is less than the friction limit f P by less than this part of it is
-#: taken to slide.
+#: An asperity is taken to slide if the bound on the error of its given force is smaller than this
+#: fraction of its friction limit f P.
 NEAR_SLIDING = 1e-2
 
 
@@ -207,7 +207,7 @@ def _state(
     force: float | None,
     displacement: float | None,
 ) -> ShearState:
-    """The state at T = Q / f, from normal solutions; by general steps where order fails."""
+    """The state at T = Q / f, from normal solutions; by general steps if an indentation falls."""
     start, loaded = MemoryCurve.pressed(levels.load), contact.loads > 0
     walk = Walk(levels, start, [(levels.load, height)])
     if walk.general is not None and displacement is not None:
@@ -254,7 +254,7 @@ def _state(
 
 
 def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
-    """The T = Q / f at which general steps give this displacement."""
+    """The value of T = Q / f at which general steps give this displacement."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
     start = MemoryCurve.pressed(levels.load)
@@ -274,13 +274,13 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
     forces : (n,) [force] along the shear force, in the order of the scene's asperities
     force  : [force] their prescribed sum
 
-    `force_errors` bound the distance of the given forces to the solution. An asperity keeps the
-    status of the solution where its force is close enough: where it slides, within a hundredth of
-    its friction limit; where it sticks, within what the solution leaves to that limit. Everything
-    else in the certificate is that of the solution.
+    `force_errors` bound the differences of the given forces from the solution. An asperity keeps
+    the status of the solution if its bound is small enough: if it slides, smaller than 1 % of its
+    friction limit f P_i; if it sticks, smaller than f P_i - |Q_i| of the solution. Otherwise its
+    status is "undecided". The rest of the certificate is that of the solution.
 
     Raises InputError if the scene has no friction, the force exceeds the friction limit f P, or
-    forces are not numbers.
+    the forces are not finite numbers.
 
     >>> force = 0.25 * contact.load
     >>> state = cr.shear(contact, force=force)

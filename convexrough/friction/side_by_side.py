@@ -34,14 +34,15 @@ Way = Literal["general step", "memory curve", "conic step"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathEntry(Record):
-    """What one way made of a path of m points.
+    """The result of one method for a path of m points.
 
-    outcome : "answered"; "refused": the scene is not one for this way; or "failed"
-    message : why, where it did not answer; else ""
-    path    : its answer; None without one
-    force_disagreement : of all Q_i with the first that answered, over f times the largest P_i
-    displacement_disagreement : of X, over the largest |X|
-    seconds : [s] with the normal solutions
+    way     : the method
+    outcome : "answered"; "refused": the method does not apply to the scene; or "failed"
+    message : the reason why there is no result; else ""
+    path    : the result; None without one
+    force_disagreement : largest difference of any Q_i from the first method that answered, over f
+        times the largest P_i;  displacement_disagreement : the same of X, over the largest |X|
+    seconds : [s] time, including the normal solutions that were not cached
 
     >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
     >>> found.entries[0].way, found.entries[0].outcome
@@ -59,9 +60,9 @@ class PathEntry(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathComparison(Table, Plottable):
-    """All entries, the general step first.
+    """A load path by several methods, the general step first.
 
-    order : of the indentations at the levels used, on which the memory curve rests
+    order : as in `LoadPath.order`; the memory curve needs it not to fail
 
     >>> found = cr.compare_paths(scene, loads=[contact.load], forces=[0.2 * contact.load])
     >>> max(each.displacement_disagreement for each in found.entries) < 1e-4
@@ -77,13 +78,13 @@ class PathComparison(Table, Plottable):
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "order", self.order
         for each in self.entries:
-            apart = f"Q_i {each.force_disagreement:.1e}, X {each.displacement_disagreement:.1e} off"
-            answered = f"{apart}; {each.seconds:.2g} s"
+            Q, X = each.force_disagreement, each.displacement_disagreement
+            answered = f"differs by {Q:.1e} in Q_i, {X:.1e} in X; {each.seconds:.2g} s"
             found = answered if each.outcome == "answered" else f"{each.outcome}: {each.message}"
             yield each.way, found[:LINE]
 
     def _variables(self) -> Variables:
-        """A row for each entry."""
+        """The columns, with a row for each entry."""
         names = (
             *("way", "outcome", "message", "seconds"),
             *("force_disagreement", "displacement_disagreement"),
@@ -109,11 +110,11 @@ def compare_paths(
     start: Contact | None = None,
     influence: Kind | None = None,
 ) -> PathComparison:
-    """Follow a path by the general step, the memory curve and the conic step.
+    """Comparison of the general step, the memory curve and the conic step on one path.
 
     loads, forces, start, influence : as in `load_path`
 
-    Raises InputError as `load_path`, and SolverError where none of them answers.
+    Raises InputError as `load_path`, and SolverError if no method answers.
 
     >>> P = contact.load
     >>> found = cr.compare_paths(scene, loads=[P, P / 2], forces=[0.3 * P, 0.0])

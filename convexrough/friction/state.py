@@ -1,11 +1,13 @@
-"""Friction states: sums of normal solutions, by the bends of the memory curve.
+"""Friction states as sums of normal solutions, by the bends of the memory curve.
 
-With bends c_k of the curve at the levels s_k (`MemoryCurve.bends`),
+With the bends b_k of the curve at the levels s_k (`MemoryCurve.bends`) and Mindlin's ratio c_t,
 
-    Q_i = f sum c_k P_i(s_k),   X = c_t f sum c_k D0(s_k),   own + drift = c_t f sum c_k n_i(s_k),
+    Q_i = f sum b_k P_i(s_k),   X = c_t f sum b_k D0(s_k),   own + drift = c_t f sum b_k n_i(s_k),
 
-n_i the indentation, or minus the gap (docs/theory/states.md). First loading to Q at the load P has
-two bends: Q_i = f (P_i(P) - P_i(L)), X = c_t f (D0(P) - D0(L)), slip_i = c_t f g_i(L), L = P - Q/f.
+where n_i is the indentation, or minus the gap (docs/theory/states.md). First loading to Q at the
+load P has two bends. With L = P - Q/f and the gaps g_i it gives
+
+    Q_i = f (P_i(P) - P_i(L)),   X = c_t f (D0(P) - D0(L)),   slip_i = c_t f g_i(L).
 """
 
 from __future__ import annotations
@@ -29,8 +31,8 @@ from convexrough.numbers.pairs import Pair
 class States(NamedTuple):
     """m states of N asperities in the scene's units, and proved bounds on their errors.
 
-    displacements (m,), forces (m, N) : X and Q_i;  drifts (m, N) : of each asperity against its
-    partner;  asperity_displacements (m, N) : own deflection and drift
+    displacements (m,), forces (m, N) : X and Q_i;  drifts (m, N) : slip of each asperity on its
+    partner, also while open;  asperity_displacements (m, N) : own deflection plus drift
     """
 
     displacements: Array
@@ -43,7 +45,7 @@ class States(NamedTuple):
     drift_errors: Array
 
     def unproved(self) -> States:
-        """The same, with nothing known of the errors."""
+        """The same states with infinite error bounds."""
         names = [name for name in self._fields if name.endswith("errors")]
         return self._replace(
             **{name: frozen(np.full(getattr(self, name).shape, np.inf)) for name in names}
@@ -51,15 +53,15 @@ class States(NamedTuple):
 
 
 def used_by(curves: Sequence[MemoryCurve]) -> set[Fraction]:
-    """The loads of the levels that states and their statuses need."""
+    """The loads of the levels that the states of these curves and their statuses need."""
     bent = {load for curve in curves for load, bend in curve.bends if bend}
     return bent | {curve.front for curve in curves if curve.front is not None}
 
 
 class LevelSums(NamedTuple):
-    """Sums over levels, each times its bends, of m curves: some of `places` for each of them.
+    """Sums over the levels of each of m curves, weighted with their bends.
 
-    used : (k,) loads of the levels;  places : (m, j) which of them;  weights : (m, j) bends
+    used : (k,) loads of all levels;  places : (m, j) indices into `used`;  weights : (m, j) bends
     """
 
     used: list[Fraction]
@@ -68,7 +70,7 @@ class LevelSums(NamedTuple):
 
     @classmethod
     def of(cls, curves: Sequence[MemoryCurve]) -> LevelSums:
-        """Those that states of these curves are made of."""
+        """The sums that give the states of these curves."""
         bends = [[(load, bend) for load, bend in curve.bends if bend] for curve in curves]
         used = sorted({load for each in bends for load, _ in each} or {curves[0].load})
         place = {load: k for k, load in enumerate(used)}
@@ -82,7 +84,7 @@ class LevelSums(NamedTuple):
         return cls(used, places, Ball.around(Pair(high, low), 2.0**-98 * np.abs(high)))
 
     def total(self, values: Ball) -> Ball:
-        """(m, ...) from (k, ...)."""
+        """(m, ...) sums of values (k, ...) at the levels."""
         wide = (slice(None),) + (None,) * (len(values.shape) - 1)
         total = Ball.exact(np.zeros((len(self.places), *values.shape[1:])))
         for j in range(self.places.shape[1]):
@@ -91,7 +93,7 @@ class LevelSums(NamedTuple):
 
 
 def displacements_of(levels: FrictionLevels, curves: Sequence[MemoryCurve]) -> Ball:
-    """(m,) X of these curves [length]."""
+    """(m,) [length] the displacement X of each curve."""
     sums = LevelSums.of(curves)
     approaches = Ball.stacked([levels.at(load).approach for load in sums.used])
     return sums.total(approaches) * levels.travel_unit
@@ -100,7 +102,7 @@ def displacements_of(levels: FrictionLevels, curves: Sequence[MemoryCurve]) -> B
 def states_of(
     levels: FrictionLevels, curves: Sequence[MemoryCurve], which: Indices | None = None
 ) -> States:
-    """The states of these curves; of some asperities alone, in this order, or of all."""
+    """The states of these curves, for the asperities `which`, in this order, or for all."""
     sums, some = LevelSums.of(curves), slice(None) if which is None else which
     levels.prepare(sums.used)
     solved = [levels.at(load) for load in sums.used]
@@ -117,7 +119,7 @@ def states_of(
 
 
 def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDArray[np.str_]:
-    """(N,) "open", "sliding", "partial", "stuck" or "undecided", from the proofs at P and at L."""
+    """(N,) "open", "sliding", "partial", "stuck" or "undecided", from the proofs at P and L."""
     here = levels.at(curve.load)
     if order == "fails":
         return by_status(levels, here)
@@ -129,7 +131,7 @@ def statuses_of(levels: FrictionLevels, curve: MemoryCurve, order: Order) -> NDA
 
 
 def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) -> NDArray[np.str_]:
-    """(N,) "open" where open here, each of the given statuses where proved; else "undecided"."""
+    """(N,) "open" where the level proves it, the given statuses where true, else "undecided"."""
     found = np.full(len(levels.scene), "open", dtype="<U12")
     some = np.full(len(levels.candidates), "undecided", dtype="<U12")
     some[here.open] = "open"
@@ -140,7 +142,7 @@ def by_status(levels: FrictionLevels, here: Level, **proved: NDArray[np.bool_]) 
 
 
 def stick_radii(levels: FrictionLevels, level: Level) -> tuple[Array, Array]:
-    """(N,) contact radii at a level, 3 P^(1/3) / (4 k E*) [length], and bounds on their errors."""
+    """(N,) [length] contact radii 3 P^(1/3) / (4 k E*) at a level, and bounds on their errors."""
     modulus = Ball.exact(levels.scene.material.contact_modulus)
     root = 2.0 ** round(np.log2(levels.units.force) / 3)  # the force unit is a power of eight
     radii = level.loads.cbrt() / level.problem.exact.coefficients / modulus

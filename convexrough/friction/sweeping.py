@@ -306,7 +306,7 @@ class _Swept:
         return reach, np.where(spared < expanded, 1.0 + spare, 1.0)
 
     def _least_along(self, directions: NDArray[np.complex128]) -> Array:
-        """(...) lower bounds on Re(conj(p) z) over the support, by the two directions next to each p."""
+        """(...) lower bounds on Re(conj(p) z) over the support, from two directions near p."""
         step = 2 * np.pi / DIRECTIONS
         around = np.exp(1j * step * np.arange(DIRECTIONS + 1))
         least = np.array([(side.conj() * self.places[self.support]).real.min() for side in around])

@@ -17,7 +17,7 @@ from convexrough.friction.shear import ShearCertificate, ShearState, against, sh
 from convexrough.normal.claims import Claim
 from convexrough.record import Record
 
-#: A shear force is claimed to slide if it falls short of f P by no more than this part of it.
+#: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i.
 CLAIMS_SLIDING = 1e-4
 
 
@@ -25,12 +25,12 @@ CLAIMS_SLIDING = 1e-4
 class ShearVerdict(Claim, Record):
     """Comparison of claimed shear forces of first loading with the proof. Arrays are (n,).
 
-    contact : pressed;  forces : (n,) [force] as given
+    forces  : (n,) [force] the claimed shear forces
     total_prescribed : [force] their prescribed sum Q
     claimed : (n,) true where the asperity is claimed to slide
     within  : largest error allowed, as a fraction of the largest force; None: as accurate as needed
         to prove every status from the forces alone
-    certificate : of the forces as given
+    certificate : certificate of the claimed forces
     solution : the friction state, with its own certificate
     """
 
@@ -53,26 +53,26 @@ class ShearVerdict(Claim, Record):
 
     @property
     def values(self) -> Array:
-        """(n,) [force] the shear forces."""
+        """(n,) [force] the claimed shear forces."""
         return self.forces
 
     @cached_property
     def wrongly_sliding(self) -> Indices:
-        """(m,) claimed to slide, and proved to stick in part or to be open."""
+        """(m,) indices of asperities claimed to slide, but proved to stick in part or be open."""
         return frozen(np.flatnonzero(self.claimed & np.isin(self.status, ("partial", "open"))))
 
     @cached_property
     def wrongly_sticking(self) -> Indices:
-        """(m,) not claimed to slide, and proved to."""
+        """(m,) indices of asperities not claimed to slide, but proved to slide."""
         return frozen(np.flatnonzero(~self.claimed & (self.status == "sliding")))
 
     @property
     def errors_alone(self) -> Array:
-        """(n,) [force] the certificate's."""
+        """(n,) [force] the error bounds of the certificate."""
         return self.certificate.force_errors
 
     def nearby(self) -> tuple[Array, Array]:
-        """The solution's forces and bounds."""
+        """The shear forces of the solution, and bounds on their errors."""
         return self.solution.forces, self.solution.certificate.force_errors
 
 
@@ -84,12 +84,13 @@ def verify_shear(
     within: float | None = None,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
-    """Compare shear forces of first loading from any source with the solution.
+    """Comparison of shear forces of first loading from any source with the solution.
 
     forces  : (n,) [force] along the shear force, in the order of the scene's asperities
     force   : [force] their prescribed sum Q
     within  : largest error allowed, as a fraction of the largest force
-    sliding : (n,) bool, the claim; default: asperities whose force is at least (1 - 1e-4) f P
+    sliding : (n,) true where an asperity is claimed to slide; default: where the size of its force
+        is at least (1 - 1e-4) f P_i
 
     Raises InputError as `certify_shear`.
     """
@@ -103,6 +104,6 @@ def verify_shear(
 
 
 def claims_sliding(contact: Contact, forces: Array) -> NDArray[np.bool_]:
-    """(n,) whose force is f P, or short of it by no more than 1e-4 of that."""
+    """(n,) true where the size of the force is at least (1 - 1e-4) f P_i."""
     limits = checks.friction(contact.scene.friction) * contact.loads
     return np.asarray((limits > 0) & (np.abs(forces) >= (1.0 - CLAIMS_SLIDING) * limits))

@@ -1,7 +1,8 @@
-"""A path of (P, T = Q / f) through the levels of a contact: all of friction are views of it.
+"""A path of (P, T = Q / f) through the levels of a contact, from which all friction results come.
 
-The memory curve names the levels, states are sums over them, and each piece of the front costs what
-it costs. Where order is seen to fail general steps answer, of which nothing is proved.
+The memory curve gives the levels; states are sums over them, and losses are integrals over the
+pieces of the curve. If an indentation falls as the load rises, general steps give the results,
+without proofs.
 """
 
 from __future__ import annotations
@@ -32,9 +33,10 @@ Point: TypeAlias = tuple[Fraction, Fraction]
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """From a memory curve straight through m points.
+    """A path from a memory curve through m points, with straight segments between them.
 
-    steps, stepper : take general steps, so many per segment; None where order fails alone
+    steps   : number of general steps per segment; None takes general steps only if order fails
+    stepper : solver of the general steps
     """
 
     levels: FrictionLevels
@@ -54,35 +56,35 @@ class Walk:
 
     @property
     def pieces(self) -> list[list[Piece]]:
-        """What each segment costs."""
+        """The pieces of the loss on each segment."""
         return self._followed[1]
 
     @cached_property
     def needed(self) -> set[Fraction]:
-        """The loads of all levels that states and losses rest on."""
+        """The loads of all levels that the states and losses need."""
         return levels_needed(self.curves, self.pieces)
 
     @cached_property
     def order(self) -> Order:
-        """Between these levels and that of P."""
+        """The order between these levels and P."""
         return self.levels.order(self.needed)
 
     @cached_property
     def general(self) -> SteppedPath | None:
-        """What general steps find, where they are asked for or order fails."""
+        """Results of general steps, if these are requested or order fails; else None."""
         if self.steps is None and (self.order != "fails" or not self.levels.proved):
             return None
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)
 
     def states(self) -> States:
-        """After each point."""
+        """The states after each point."""
         if self.general is not None:
             return self.general.states
         found = states_of(self.levels, self.curves)
         return found.unproved() if self.order == "fails" else found
 
     def status(self) -> NDArray[np.str_]:
-        """(m, N)"""
+        """(m, N) the statuses after each point."""
         if self.general is not None:
             return self.general.status
         return frozen(
@@ -90,7 +92,7 @@ class Walk:
         )
 
     def losses(self) -> tuple[Array, Array]:
-        """(m,) energy lost since the beginning [force length], and proved bounds."""
+        """(m,) [force length] energy lost since the start, and proved bounds on its errors."""
         unknown = frozen(np.full(len(self.points), np.inf))
         if self.general is not None:
             return self.general.losses, unknown
@@ -102,7 +104,7 @@ class Walk:
 def follow(
     curve: MemoryCurve, points: Iterable[Point]
 ) -> tuple[list[MemoryCurve], list[list[Piece]]]:
-    """The memory curve after each point, and the pieces that each segment costs."""
+    """The memory curve after each point, and the pieces of the loss on each segment."""
     curves: list[MemoryCurve] = []
     costs: list[list[Piece]] = []
     for load, height in points:
@@ -113,12 +115,12 @@ def follow(
 
 
 def levels_needed(curves: Sequence[MemoryCurve], costs: Iterable[Iterable[Piece]]) -> set[Fraction]:
-    """The loads of all levels that these states and losses rest on."""
+    """The loads of all levels that the states and losses of these curves and pieces need."""
     return used_by(curves) | {load for pieces in costs for piece in pieces for load in piece[2:]}
 
 
 def _cumulated(each: Ball) -> Ball:
-    """(m,) the sums of the first, the first two, ..."""
+    """(m,) the cumulative sums."""
     total, error, sums = Pair(0.0, 0.0), 0.0, []
     for high, low, radius in zip(
         *(part.tolist() for part in (*each.mid, each.radius)), strict=True

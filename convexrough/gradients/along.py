@@ -1,14 +1,15 @@
-"""Gradients along load paths: sums of V and D0 at the levels that the memory curve names.
+"""Gradients along load paths, from weighted sums of the energy V and approach D0 at load levels.
 
-Levels and weights are rational functions of the loads P_k and of T_k = Q_k / f, and other ones on
-each side of a tie: where an inner loop just closes, or a front just meets the bend of a layer. So
-a derivative by a force or load is taken from the path itself with that number moved by 2^-6000 of
-the largest load, up and down, in exact arithmetic: nothing that float64 numbers can make is as
-small, so every tie is broken as an infinitely small change would. To first order in the shift,
+Levels L and weights are rational functions of the loads P_k and of T_k = Q_k / f. At a tie, where
+an inner loop just closes or a front just meets a bend, these functions differ on both sides. So the
+derivative by a load or force compares the path with a path on which this number is moved up or down
+by 2^-6000 of the largest load, in exact arithmetic. No difference of float64 numbers is as small:
+each tie breaks as under an infinitely small change. With the level l of the original path that
+corresponds to L, and S = dD0/dL, to first order in the shift
 
-    V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l),
+    V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l)
 
-l the level of the path itself that L belongs to (docs/theory/gradients.md, "Along a path").
+(docs/theory/gradients.md, "Along a path").
 """
 
 from __future__ import annotations
@@ -30,35 +31,34 @@ from convexrough.gradients.pulled import ZERO, Moves, Part
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 
-#: A shift of loads and forces, over the largest load; levels nearer than the second are one.
+#: The shift of loads and forces, over the largest load. Levels nearer than NEAR correspond.
 SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 
 #: Weights on V, D0 and S at a level.
 Weights: TypeAlias = tuple[Fraction, ...]
 NOTHING: Weights = (Fraction(0),) * 3
 
-#: Of each straight segment the point that it goes to, the weight on its loss, and that on the
-#: displacement at its end.
+#: For each segment: index of its end point, weight of its loss, weight of the displacement there.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
-#: A change of P and of T at all points.
+#: Changes of P and of T at all points.
 Direction: TypeAlias = tuple[Sequence[Fraction], Sequence[Fraction]]
 
-#: A derivative that there is none of, or that is infinite.
+#: The value of a derivative that does not exist or is infinite.
 NONE = Ball(Pair.exact(np.nan), np.asarray(np.inf))
 
 
 class LevelWeights(NamedTuple):
-    """Losses over c_t f^2, and displacements over c_t f, as weights on V and D0 by levels."""
+    """Weights of V, D0 and S by level, of losses over c_t f^2 and displacements over c_t f."""
 
     losses: dict[Fraction, Weights]
     displacements: dict[Fraction, Weights]
 
     def lose(self, piece: Piece, share: Fraction) -> None:
-        """What a piece costs, (1 - c th) I, times a share.
+        """Add the loss (1 - c th) I on a piece, times a share.
 
         I = (P0 - L0) D0(L0) - (P1 - L1) D0(L1) + (2 - b) (V(L0) - V(L1)) - (L0 - L1) M, with
-        b = (P0 - P1) / (L0 - L1) and M the mean of D0 from P1 to P0.
+        b = (P0 - P1) / (L0 - L1) and the mean M of D0 from P1 to P0.
         """
         share *= 1 - piece.sign * piece.slope
         high, low, before, after = piece[2:]
@@ -73,7 +73,7 @@ class LevelWeights(NamedTuple):
             add(after, run / fall, Fraction(0))
 
     def move(self, curve: MemoryCurve, share: Fraction) -> None:
-        """The displacement of a state, times a share."""
+        """Add the displacement of a state, times a share."""
         add = self._adder(self.displacements, share)
         for level, bend in curve.bends:
             add(level, Fraction(0), bend)
@@ -91,9 +91,9 @@ class LevelWeights(NamedTuple):
 
 @dataclass(frozen=True)
 class Along:
-    """A path through numbered points, and what is asked of it, at the levels of a contact.
+    """A path through points, with the weights of its losses and displacements.
 
-    start : load [force] at which the path begins, without shear
+    start : load [force] at which the path begins, without shear;  steps : segments and weights
     loads, heights : P and T of the points
     """
 
@@ -107,7 +107,7 @@ class Along:
     def of(
         cls, known: FrictionLevels, start: Fraction, steps: Steps, loads: Array, forces: Array
     ) -> Along:
-        """At these P and Q."""
+        """The path through points with these P and Q."""
         pairs = list(zip(map(Fraction, loads.tolist()), forces.tolist(), strict=True))
         heights = [height_at(load, force, known.scene) for load, force in pairs]
         return cls(known, start, steps, [load for load, _ in pairs], heights)
@@ -125,9 +125,9 @@ class Along:
         return found
 
     def parts(self, moves: Moves) -> tuple[list[Part], Ball, Ball]:
-        """What each level adds; the losses; the displacements.
+        """The parts of each level, the weighted sum of losses, and that of displacements.
 
-        moves : of every level, at fixed T
+        moves : derivatives of the load of every level, at fixed T
         """
         spent, far, weights = ZERO, ZERO, dict[Fraction, tuple[Ball, Ball]]()
         lost, force = self.known.loss_unit, self.known.units.force
@@ -175,8 +175,8 @@ class Along:
     def slopes(self, directions: Sequence[Direction], factor: Ball) -> tuple[Ball, Array]:
         """(m,) derivatives along directions of P and T, and (m, 2) from below and from above.
 
-        Each times a factor. Sides that their bounds do not tell apart are one number, within the
-        bounds of both; where they differ, or one does not exist, there is none: nan.
+        All are multiplied by a factor. A derivative is the mean of both sides if these agree within
+        their bounds, and nan if they differ or one does not exist.
         """
         sides = [[self._one_side(*each, sign, factor) for sign in (-1, 1)] for each in directions]
         found = [_one(below, above) for below, above in sides]
@@ -193,9 +193,9 @@ def _one(below: Ball, above: Ball) -> Ball:
 def _slopes(
     base: dict[Fraction, Weights], moved: dict[Fraction, Weights], unit: Fraction, by: Fraction
 ) -> dict[Fraction, Weights]:
-    """(moved - base) / by, as weights on V, D0 and S at levels of the path itself.
+    """(moved - base) / by, as weights of V, D0 and S at levels of the original path.
 
-    unit : the largest load, by which weights on D0 and S are measured
+    unit : the largest load, the unit in which small weights of D0 and S are neglected
     """
     places, found = sorted(base), dict[Fraction, Weights]()
     for sign, weights in ((-1, base), (1, moved)):
@@ -203,7 +203,7 @@ def _slopes(
             near = bisect(places, level)
             around = [*places[max(near - 1, 0) : near + 1], level]
             at = next(each for each in around if abs(each - level) <= NEAR * unit)
-            if at is level:  # where the path itself has none
+            if at is level:  # no level of the original path corresponds
                 insort(places, at)
             off = level - at
             before = found.get(at, NOTHING)

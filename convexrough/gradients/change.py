@@ -1,6 +1,6 @@
-"""Forward derivatives: what changes when a scene and its load change a little, in one direction.
+"""Forward derivatives: first-order changes of results when a scene and its load change.
 
-One linear system at each level that a result hangs on: the same as of gradients, read the other way
+Each load level on which a result depends takes one linear solve, with the system of the gradients
 (docs/theory/gradients.md, "The change in one direction").
 """
 
@@ -28,7 +28,7 @@ from convexrough.numbers.balls import Ball
 from convexrough.record import Along, Record, Table
 from convexrough.scene.base import sphere_radius
 
-#: What a direction has one number of.
+#: The parameters of a direction that are single numbers.
 WHOLE = (
     *("sphere_radius", "contact_modulus", "poisson_ratio", "friction"),
     *("load", "approach", "force"),
@@ -37,11 +37,13 @@ WHOLE = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Direction(Record):
-    """A change of a scene and of what is prescribed: the parameters of `Gradient`.
+    """A change of the parameters of a scene and of its load. Each default is no change.
 
-    heights, tip_radii : (n,) or one number for all [length];  positions : (n, 2) [length]
-    load or approach   : of what is held; where neither is given what was prescribed is held as is
-    force              : of the shear force [force]; it and friction are of friction states alone
+    heights, tip_radii : [length] (n,), or one number for all;  positions : [length] (n, 2)
+    sphere_radius : [length];  contact_modulus : [force / length^2], at fixed Poisson's ratio
+    load, approach : [force], [length]; the change of one of them. Without either, the prescribed
+        quantity of the contact does not change
+    friction, force : coefficient of friction, shear force [force]; only for friction states
 
     >>> contact.change(cr.Direction(heights=1e-9)).load > 0
     True
@@ -66,9 +68,9 @@ class Direction(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ContactChange(Table):
-    """First-order change of a contact. Arrays are (n,), in the scene's order.
+    """First-order changes of a contact. Arrays are (n,), in the scene's order.
 
-    loads : [force];  gaps : [length];  approach : [length];  load : of the total [force]
+    loads : [force];  gaps : [length];  approach : [length];  load : [force] total load
 
     >>> print(f"{contact.change(cr.Direction(load=1e-9)).approach:.4g}")
     8.234e-08
@@ -86,9 +88,10 @@ class ContactChange(Table):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShearChange(Table):
-    """First-order change of a friction state. Arrays are (n,), in the scene's order.
+    """First-order changes of a friction state. Arrays are (n,), in the scene's order.
 
-    pressed : of the contact;  forces : [force];  slips : [length];  displacement : [length]
+    pressed : changes of the contact
+    forces : [force];  slips : [length];  displacement : [length]
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> print(f"{state.change(cr.Direction(force=1e-9)).displacement:.4g}")
@@ -106,11 +109,11 @@ class ShearChange(Table):
 
 
 def contact_change(contact: Contact, direction: Direction) -> ContactChange:
-    """As `Contact.change`: what friction and a shear force do is asked of a friction state."""
+    """The result of `Contact.change`. Raises InputError for a change of friction or shear force."""
     checks.instance("direction", direction, Direction)
     for name in ("friction", "force"):
         if (given := getattr(direction, name)) != 0.0:
-            expected = "0: a contact depends on neither friction nor force; states change by both"
+            expected = "0: a contact does not depend on it; use the change of a friction state"
             raise InputError(name, found=given, expected=expected)
     top = levels(contact).top
     return _pressed(contact, direction, _Bent.of(top, direction), top)[0]
@@ -119,9 +122,9 @@ def contact_change(contact: Contact, direction: Direction) -> ContactChange:
 def _pressed(
     contact: Contact, direction: Direction, bent: _Bent, top: Level
 ) -> tuple[ContactChange, _Moved]:
-    """Of the contact alone, and of its level."""
+    """The changes of the contact and of its level."""
     if direction.load is not None and direction.approach is not None:
-        found, expected = "both", "at most one of the two, as only one is held"
+        found, expected = "both", "at most one of the two"
         raise InputError("load, approach", found=found, expected=expected)
     by_load = control_held(contact, None) == "load"
     if direction.load is not None or direction.approach is not None:
@@ -148,7 +151,7 @@ def _pressed(
 
 
 def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -> Array:
-    """(n,) [length] of open asperities: dg = A dP + dA P - dd - dD0, in float64."""
+    """(n,) [length] changes dg = A dP + dA P - dd - dD0 of open gaps, in float64; 0 for others."""
     scene, open_ones = contact.scene, contact.loads == 0.0
     if not open_ones.any():
         return np.zeros(len(scene))
@@ -164,7 +167,7 @@ def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -
 
 
 def shear_change(state: ShearState, direction: Direction) -> ShearChange:
-    """As `ShearState.change`: the change at the level P less that at L = P - Q / f."""
+    """The result of `ShearState.change`, from the changes of the levels P and L = P - Q / f."""
     contact = state.contact
     checks.instance("direction", direction, Direction)
     sheared = Frictional.of(state)
@@ -197,7 +200,7 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
 
 
 class _Moved(NamedTuple):
-    """How a level changes, in own units: P, n, D0 and the total load."""
+    """The changes of a level in its own units: of P, n, D0 and the total load."""
 
     loads: Ball
     indentation: Ball
@@ -207,9 +210,9 @@ class _Moved(NamedTuple):
 
 @dataclass(frozen=True)
 class _Bent:
-    """What a direction does to a scene.
+    """The changes of a scene's geometry and modulus in one direction.
 
-    everywhere : all asperities;  here : the candidates;  modulus : dlog E*
+    everywhere : of all asperities;  here : of the candidates;  modulus : dlog E*
     """
 
     geometry: Geometry
@@ -239,7 +242,7 @@ class _Bent:
         return cls(Geometry.of(problem), bent, here, float(modulus.value))
 
     def of_level(self, level: Level, total: Ball) -> _Moved:
-        """dP / c + A dP = dd - C dlog k - dA P + dD0,  sum dP = total."""
+        """The solution of  dP / c + A dP = dd - C dlog k - dA P + dD0,  sum dP = total."""
         problem = level.problem
         raised = self.here.offsets / problem.units.length - self._felt(level)
         right = raised - level.indentation.positive_part() * self.here.local
@@ -259,7 +262,7 @@ class _Bent:
 
 
 def _moved(positions: ArrayLike, n: int) -> Array:
-    """(n, 2) checked; one number stands for all."""
+    """(n, 2) changes of positions, checked; one number counts for all."""
     expected = f"({n}, 2) finite numbers: x and y of each asperity"
     moved = checks.numbers("positions", positions, expected)
     if moved.shape not in ((), (n, 2)):

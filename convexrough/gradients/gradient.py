@@ -1,7 +1,7 @@
-"""The result: derivatives with respect to all parameters of a scene, each with a proved bound.
+"""`Gradient`: derivatives of a number by all parameters of a scene, with proved bounds.
 
-Every number that can be differentiated is a sum over load levels of weights on V, D0, loads and
-indentations there (`gradients.pulled`), whose levels follow the loads, the forces and friction.
+Such a number is a weighted sum of the energy V, the approach D0, the loads and the indentations at
+some load levels (`gradients.pulled`). The levels depend on the loads, the forces and friction.
 """
 
 from __future__ import annotations
@@ -29,18 +29,19 @@ from convexrough.sphere.smooth import smooth_reference
 
 Holding = Literal["load", "approach"]
 
-#: Derivatives by numbers of the whole, and by what there are several of, which need not be there.
+#: Parameters that not every gradient has: single numbers, and arrays.
 WHOLE = ("friction", "load", "approach", "force", "maximum", "minimum")
 SEVERAL = ("loads", "forces")
 
 
 class Number(NamedTuple):
-    """A number of a contact and its derivatives, forces and load held.
+    """A number J of a contact and its derivatives at constant forces and load.
 
-    value    : J;  scaled : the part of it that scales with forces where weights are held
-    pulled   : what each level has a part in;  problem : whose candidates they are of
-    slopes   : dJ by parameters that are no numbers of the scene's geometry
-    steep    : what those are infinite times: of numbers that hang on D0 at no load
+    value    : J;  scaled : the part of J that scales with forces at constant weights
+    pulled   : derivatives from each level, for the candidates of `problem`
+    slopes   : dJ by parameters outside the scene's geometry
+    steep    : coefficients of infinite derivatives, where J depends on D0 at the load 0
+    sides    : (m, 2) derivatives from below and from above
     """
 
     contact: Contact
@@ -51,11 +52,11 @@ class Number(NamedTuple):
     pulled: Sequence[Pulled]
     slopes: Mapping[str, Ball]
     steep: Mapping[str, Ball]
-    sides: Mapping[str, Array] = {}  # (m, 2) from below and from above
+    sides: Mapping[str, Array] = {}
 
     @classmethod
     def of(cls, contact: Contact, top: Level, parts: Sequence[Part], explicit: Moves) -> Number:
-        """The sum of these parts.
+        """The number that is the sum of these parts.
 
         explicit : derivatives by parameters at fixed levels
         """
@@ -71,7 +72,10 @@ class Number(NamedTuple):
         return cls(contact, top.problem, top, value, scaled, pulled, slopes, steep)
 
     def times(self, factor: Ball, slopes: Mapping[str, Ball]) -> Number:
-        """The number times another, of which these are the derivatives times this number."""
+        """The number times a factor.
+
+        slopes : the derivatives of the factor, times this number
+        """
         names = {*self.slopes, *slopes}
         pulled = [each.times(factor) for each in self.pulled]
         both = {
@@ -81,7 +85,7 @@ class Number(NamedTuple):
         return self._replace(value=value, scaled=scaled, pulled=pulled, slopes=both)
 
     def holding_the_approach(self) -> Number:
-        """The load follows: dJ|D0 = dJ|P - (J_P / S) dD0|P."""
+        """The number with derivatives at constant approach: dJ|D0 = dJ|P - (J_P / S) dD0|P."""
         slopes, units = dict(self.slopes), self.problem.units
         by_approach = slopes.pop("load", ZERO) * units.force / self.top.tangent.approach
         slopes["approach"] = by_approach / units.length
@@ -93,32 +97,32 @@ class Number(NamedTuple):
 class Gradient(Table, Plottable):
     """Derivatives of one number with respect to a scene and the prescribed quantities.
 
-    Units are those of the number over those of the parameter. Arrays are (n,), in the scene's
-    order; screened asperities, and open ones unless their gap is asked for, have 0 everywhere. Each
-    derivative is at fixed values of the other parameters named here: shear forces are held, not
-    their fractions of f P, nor a displacement by which a state or cycle was prescribed. At a held
-    displacement X a loss W changes by dW|X = dW|Q - (W_Q / X_Q) dX|Q, with X_Q the derivative by
-    the force of the state at the amplitude of the cycle, and W_Q that by `maximum`, twice.
+    The unit of a derivative is that of the number over that of the parameter. Each derivative is at
+    constant values of the other parameters listed here; shear forces are constant, not their
+    fractions of f P or a prescribed displacement. At constant displacement X a loss W changes by
+    dW|X = dW|Q - (W_Q / X_Q) dX|Q, with twice the derivative of W by `maximum` as W_Q, and the
+    derivative of X by `force`, for the state at the amplitude of the cycle, as X_Q.
 
-    What ends in `_error` or `_errors` is a proved bound on how far the derivative of that name is
-    from that of the true solution, for the scene whose data are the given float64 numbers: all
-    rounding is counted. Infinite where nothing is proved of the contact at a load that the number
-    depends on; and, where more than a thousand asperities touch that are not coupled by a matrix,
-    for positions and, in the geometry "closest", for all radii. An infinite derivative, in gross
-    sliding, has the error 0.
+    Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
+    including all rounding, for the given float64 data of the scene. They are infinite if the
+    contact is not proved at some load that the number depends on. With more than 1,000 loaded
+    asperities and no matrix they are also infinite for positions and, in the geometry "closest",
+    for radii. An infinite derivative, in gross sliding, has the error 0.
 
     value           : the number itself
-    holding         : "load" or "approach", the one that is kept constant
-    heights, tip_radii : (n,);  positions : (n, 2) of x and y of each summit
-    sphere_radius   : None of other bases than a sphere
-    contact_modulus : of E* at fixed Poisson's ratio;  poisson_ratio : at fixed E*
-    load, approach  : of the one that is held; None of the other
-    friction        : None where there is none
-    force           : the shear force of a friction state;  maximum, minimum : those of a cycle
-    forces, loads   : (m,) those of a history or path, nan where the two sides differ, as at a
-        point that is repeated;  force_sides, load_sides : (m, 2) from below and from above
-    balance_defect  : difference of two ways to the derivative with respect to the modulus, a sum
-        and a scaling law, over the largest term of both
+    holding         : "load" or "approach", the quantity that is kept constant
+    heights, tip_radii, positions : (n,), (n,) and (n, 2), in the scene's order; 0 for screened
+        asperities, and for open ones unless the number contains their gap
+    sphere_radius   : None unless the base is a sphere
+    contact_modulus : at constant Poisson's ratio;  poisson_ratio : at constant E*
+    load, approach  : derivative by the quantity `holding`; the other is None
+    friction        : None for a scene without friction
+    force           : by the shear force of a friction state
+    maximum, minimum : by the extreme shear forces of a cycle
+    forces, loads   : (m,) by those of a history or path; nan where the derivatives from below and
+        above differ, as at a repeated point;  force_sides, load_sides : (m, 2) both of these
+    balance_defect  : difference between the derivative by the modulus from a sum and from a scaling
+        law, over the largest term of both
 
     >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
     >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.maximum:.4g}")
@@ -167,7 +171,7 @@ class Gradient(Table, Plottable):
 
     @classmethod
     def of(cls, number: Number, holding: Holding) -> Gradient:
-        """All of it in the scene's units."""
+        """The gradient of a number, in the scene's units."""
         shown = number.holding_the_approach() if holding == "approach" else number
         slopes = shown.slopes
         found = Derivatives.of(shown.problem, shown.pulled)
@@ -213,14 +217,14 @@ class Gradient(Table, Plottable):
 
     @cached_property
     def normalised(self) -> Gradient:
-        """That of `Cycle.loss_normalised` = W / W0, for the gradient of a cycle's loss.
+        """The gradient of `Cycle.loss_normalised` = W / W0, from the gradient of a cycle's loss W.
 
-        W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) goes with c_t f^2 P^(5/3) E*^(-2/3) R^(-1/3), P the
-        total load, which follows where the approach is held. InputError for other bases than a
-        sphere.
+        W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) is proportional to c_t f^2 P^(5/3) E*^(-2/3) R^(-1/3).
+        At constant approach the total load P varies. Raises InputError for gradients of other
+        numbers, and for a base without a smooth reference.
         """
         if self.maximum is None:
-            expected = "the gradient of a cycle, whose loss a smooth sphere's stands beside"
+            expected = "the gradient of the loss of a cycle"
             raise InputError("normalised", found="another number", expected=expected)
         number, scene = self.number, self.contact.scene
         reference = smooth_reference(scene, self.contact.load)
@@ -236,7 +240,7 @@ class Gradient(Table, Plottable):
         P = number.top.load * number.problem.units.force
         radius = (P * R * 0.75 / E).cbrt()  # a_H
         factor = (1.0 - nu) * E * radius * 5.0 / ((2.0 - nu) * f * f * P * P * 9.0)  # 1 / W0
-        if named(scene.sphere_radius) != "a sphere":  # of which float64 knows W0
+        if named(scene.sphere_radius) != "a sphere":  # W0 of an ellipsoid is a float64 number
             whole = 1.0 / reference.energy_scale
             factor = Ball.around(whole, 1e-13 * whole)
         value = number.value * factor
@@ -250,13 +254,13 @@ class Gradient(Table, Plottable):
         return Gradient.of(number.times(factor, slopes), self.holding)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        """But for what it was made from, and for parameters that it has not."""
+        """The printed rows, without internal data and without parameters that are None."""
         hidden = ("number", "derivatives")
         return (row for row in super()._rows() if row[0] not in hidden and row[1] != "None")
 
 
 def _balance_defect(number: Number, found: Derivatives) -> float:
-    """E* J_E* + sum over levels of J_L L = the part of J that scales with forces; else a defect."""
+    """The relative defect of  E* J_E* + sum over levels of J_L L = `number.scaled`."""
     bent, by_coupling = found.local.sum() * -2.0 / 3.0, -found.coupled
     terms = [bent, by_coupling, -number.scaled, *(each.load * each.total for each in number.pulled)]
     defect = float(sum(terms, start=ZERO).value)
@@ -265,7 +269,7 @@ def _balance_defect(number: Number, found: Derivatives) -> float:
 
 
 def control_held(contact: Contact, holding: Holding | None) -> Holding:
-    """What is held, checked; default what was prescribed."""
+    """The quantity that is kept constant, checked; by default the prescribed one."""
     checks.instance("contact", contact, Contact)
     if holding is None:
         return "approach" if contact.prescribed_load is None else "load"
@@ -275,8 +279,8 @@ def control_held(contact: Contact, holding: Holding | None) -> Holding:
 
 
 def levels(contact: Contact) -> Levels:
-    """The normal solutions of a contact's scene, which must carry some load."""
+    """The levels of a contact. Raises InputError if its load is 0."""
     if contact.load == 0.0:
-        expected = "a contact that carries some load: without, nothing has a derivative"
+        expected = "a contact with a load: at the load 0 there is no derivative"
         raise InputError("contact", found="no load", expected=expected)
     return contact.cached(levels_of)

@@ -1,4 +1,4 @@
-"""Gradients of what cycles, histories and load paths cost, and of their displacements."""
+"""Gradients of the losses of cycles, histories and load paths, and of their displacements."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from convexrough.numbers.balls import Ball
 
 
 def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
-    """As `Cycle.gradient`.
+    """The result of `Cycle.gradient`.
 
     At constant load W = 8 c_t f^2 [V(P) - V(L) - T (D0(P) + D0(L)) / 2] with L = P - T and
-    T = (max - min) / (2 f); else what the second time around costs.
+    T = (max - min) / (2 f). Otherwise W is the loss of the second cycle on the path.
     """
     contact, sheared = cycle.contact, Frictional.of(cycle)
     holding = control_held(contact, holding)
@@ -61,7 +61,7 @@ def path_gradient(
     displacements: ArrayLike | None = None,
     holding: Holding | None = None,
 ) -> Gradient:
-    """As `LoadPath.gradient`."""
+    """The result of `LoadPath.gradient`."""
     sheared, m = Frictional.of(path), len(path.forces)
     holding = control_held(path.contact, holding)
     spent, far = (
@@ -70,18 +70,18 @@ def path_gradient(
     )
     if losses is None and displacements is None:
         spent = np.eye(m)[-1]
-    later = np.cumsum(spent[::-1])[::-1]  # what is lost at a step counts in all that follow
+    later = np.cumsum(spent[::-1])[::-1]  # the loss of a step is part of all later losses
     steps = [(k, Fraction(later[k]), Fraction(far[k])) for k in range(m)]
     along = Along.of(sheared.known, Fraction(path.start), steps, path.loads, path.forces)
     sliding = [load == abs(T) for load, T in zip(along.loads, along.heights, strict=True)]
     if path.load_constant and any(sliding):
-        expected = "forces below f P: where all slide, a history has no derivative"
+        expected = "forces below f P: in gross sliding a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
     return _gradient(sheared, along, holding, paths=not path.load_constant)
 
 
 def _gradient(sheared: Frictional, along: Along, holding: Holding, *, paths: bool) -> Gradient:
-    """Of what is asked along a path; of paths also by their loads."""
+    """The gradient of a weighted sum along a path; with derivatives by loads if `paths` is true."""
     if paths and holding == "approach":
         expected = '"load": the loads of all points are prescribed'
         raise InputError("holding", found='"approach"', expected=expected)

@@ -1,4 +1,4 @@
-"""A number of a scene as a function of its parameters, for optimisers and frameworks."""
+"""`Objective`: a result as a function of a scene's parameters, for optimisers and frameworks."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from convexrough.scene.asperities import Asperities
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.scene import Scene
 
-#: What it can be a number of, and what must be prescribed for it besides a load or an approach.
+#: The possible values of `of`, and the quantity that must be prescribed for each.
 NUMBERS = {"loss": "force", "displacement": "force", "approach": "load", "load": "approach"}
 
-#: What it can be a function of: of the asperities, of the scene, and what is prescribed.
+#: The possible parameters: of each asperity, of the scene, of the material, and prescribed ones.
 EACH, WHOLE = ("heights", "tip_radii", "positions"), ("sphere_radius", "friction")
 ELASTIC, PRESCRIBED = ("contact_modulus", "poisson_ratio"), ("load", "approach", "force")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Objective(Record):
-    """A number of a scene as a function of a vector of parameters, and its gradient.
+    """A result for a scene as a function of a vector of parameters, with its gradient.
 
     scene : values of all parameters that are not varied
     of    : "loss" of the symmetric cycle of this force, "displacement" under it, "approach" under
@@ -85,7 +85,7 @@ class Objective(Record):
                 raise InputError("by", found=repr(name), expected=expected)
 
     def _able(self) -> list[str]:
-        """What the number depends on; of friction only with a force, as contacts know none."""
+        """The parameters on which the number depends; `press` depends on no friction."""
         known = [*EACH, *WHOLE, *ELASTIC, *PRESCRIBED]
         if NUMBERS[self.of] != "force":
             known.remove("force")
@@ -94,7 +94,7 @@ class Objective(Record):
         return [name for name in known if getattr(self, name, 0.0) is not None]
 
     def _listed(self) -> tuple[str, ...]:
-        """What it is by, each once."""
+        """The names in `by`, checked for repetition."""
         try:
             by = tuple(self.by)
             once = 0 < len(by) == len(set(by))
@@ -107,13 +107,15 @@ class Objective(Record):
 
     @property
     def start(self) -> Array:
-        """The vector of the given scene and the prescribed quantities."""
+        """(m,) the parameters of the given scene and the prescribed quantities."""
         return np.concatenate([np.ravel(self._own(name)) for name in self.by]).astype(np.float64)
 
     def __call__(self, parameters: ArrayLike) -> tuple[float, Array]:
-        """The number and its gradient, (m,) as the parameters.
+        """The number and its gradient (m,).
 
-        Raises InputError for parameters that no scene has, or for which there is no gradient.
+        parameters : (m,) in the order of `by`, in the scene's units
+
+        Raises InputError for invalid parameters, or if there is no gradient.
         """
         gradient = self.gradient(parameters)
         slopes = [np.ravel(_slope(gradient, name)) for name in self.by]
@@ -139,25 +141,25 @@ class Objective(Record):
         return contact.gradient(load=1.0)
 
     def to_jax(self) -> Callable[[Any], Any]:
-        """A function of jax: `jax.grad`, `jax.jit` and `jax.vmap` take it. Raises ExtraError."""
+        """The number as a function for jax.grad, jax.jit and jax.vmap. Raises ExtraError."""
         from convexrough.gradients.with_jax import differentiable
 
         return differentiable(self)
 
     def to_torch(self) -> Callable[[Any], Any]:
-        """A function of torch: `backward` goes through it. Raises ExtraError."""
+        """The number as a function of torch that supports `backward`. Raises ExtraError."""
         from convexrough.gradients.with_torch import differentiable
 
         return differentiable(self)
 
     def to_autograd(self) -> Callable[[Any], Any]:
-        """A function of autograd: `autograd.grad` takes it. Raises ExtraError."""
+        """The number as a function for `autograd.grad`. Raises ExtraError."""
         from convexrough.gradients.with_autograd import differentiable
 
         return differentiable(self)
 
     def _own(self, name: str) -> Any:
-        """A parameter as the scene has it, or as prescribed."""
+        """The value of a parameter in the given scene, or the prescribed one."""
         if name in EACH:
             return getattr(self.scene.asperities, name)
         if name in ELASTIC:
@@ -194,7 +196,7 @@ class Objective(Record):
 
 
 def _loss(contact: Contact, force: float | None) -> Gradient:
-    """That of the cycle between -force and force, which errors call what the user does."""
+    """The gradient of the loss of the cycle between -force and force; errors name the force."""
     if force is not None:
         checks.non_negative("force", force)
     try:
@@ -206,7 +208,7 @@ def _loss(contact: Contact, force: float | None) -> Gradient:
 
 
 def _slope(gradient: Gradient, name: str) -> Any:
-    """dJ by one of the parameters; where the force is half the range of a cycle, both ends move."""
+    """The derivative by a parameter; a change of a cycle's force moves maximum and minimum."""
     if name == "force" and gradient.maximum is not None:
         return 2.0 * gradient.maximum
     return getattr(gradient, name)

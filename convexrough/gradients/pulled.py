@@ -1,13 +1,13 @@
-"""Derivatives of a number at one load level, and of sums over levels, as balls in own units.
+"""Derivatives of a number at one load level, as balls in the units of the level.
 
 A level is the normal solution at a total load L (`normal.level`): loads P, approach D0,
-indentations n (minus the gap where open), and the energy V. With C = k P^(2/3), q = dP/dL and
-S = dD0/dL,
+indentations n (minus the gap where open), and the energy V. It depends on the offsets d, the local
+coefficients k and the influence matrix A. With C = k P^(2/3), c = dP/dC, q = dP/dL and S = dD0/dL,
 
     dV  = -P'dd + (3/5) (P C)'d log k + P'dA P / 2 + D0 dL,
     dD0 = -q'dd + (q C)'d log k + q'dA P + S dL.
 
-Weights w on loads and v on indentations take one linear solve with that right side:
+A number with the weights w of loads and v of indentations takes one linear solve:
 lambda / c + A lambda = w - A v + mu, sum lambda = 0 gives
 
     w'dP + v'dn = (lambda + v)'dd - (lambda C)'d log k - (lambda + v)'dA P
@@ -30,17 +30,17 @@ from convexrough.numbers.balls import Ball, where
 
 ZERO = Ball.exact(0.0)
 
-#: Derivatives of a level's total load (own units) by parameters of the result, by their names.
+#: Derivatives of a level's total load (own units), by the names of the parameters.
 Moves: TypeAlias = Mapping[str, Ball]
 
 
 @dataclass(frozen=True)
 class Part:
-    """What a number takes from one level: weights, in its own units over the level's.
+    """The part of a number that comes from one level: a weighted sum of its results.
 
-    level    : where
-    energy, approach : () weights on V and on D0;  loads, indentations : (n,) on P and n
-    moves    : how the level's total load follows the parameters of the result
+    energy, approach : () weights of V and D0, in the unit of the number over that of the level
+    loads, indentations : (n,) weights of P and n
+    moves    : derivatives of the level's total load by parameters of the number
     """
 
     level: Level
@@ -52,7 +52,7 @@ class Part:
 
     @property
     def value(self) -> Ball:
-        """What it adds to the number."""
+        """The weighted sum."""
         level = self.level
         total = self.energy * level.energy + self.approach * level.approach
         if self.loads is not None:
@@ -63,7 +63,7 @@ class Part:
 
     @property
     def length(self) -> Ball:
-        """That of the value which is in proportion to lengths: it does not scale with forces."""
+        """The part of the value that is a sum of lengths and so does not scale with forces."""
         far = self.approach * self.level.approach
         if self.indentations is not None:
             far = far + self.indentations.dot(self.level.indentation)
@@ -71,10 +71,10 @@ class Part:
 
 
 class Pulled(NamedTuple):
-    """offsets'dd + local'd log k + left'dA P + load dL, of one part. Arrays are (n,).
+    """The derivative  offsets'dd + local'd log k + left'dA P + load dL  of a part.
 
-    loads, coupled : P and A P;  total : L
-    steep       : weight on D0 at no load, where it changes infinitely fast with L
+    Arrays are (n,). loads, coupled : P and A P;  total : L
+    steep : weight of D0 if the load is 0, where D0 changes infinitely fast with L
     """
 
     offsets: Ball
@@ -88,7 +88,7 @@ class Pulled(NamedTuple):
 
     @classmethod
     def of(cls, part: Part) -> Pulled:
-        """All derivatives that one level has a part in."""
+        """The derivative of one part."""
         level, v, w = part.level, part.indentations, part.loads
         weight = part.approach if v is None else part.approach + v.sum()
         P, zero = level.loads, Ball.exact(np.zeros(len(level.problem)))
@@ -114,7 +114,7 @@ class Pulled(NamedTuple):
         return cls(lifted - own, local, own * 0.5 - lifted, by_load, P, coupled, level.load)
 
     def times(self, factor: Ball) -> Pulled:
-        """Of the number times another."""
+        """The derivative times a factor."""
         return self._replace(
             offsets=factor * self.offsets,
             local=factor * self.local,
@@ -125,12 +125,11 @@ class Pulled(NamedTuple):
 
 
 def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball]:
-    """At no load D0 = -d of the highest asperity, which is the first to carry any."""
+    """Weights of dd and dL at the load 0, where D0 = -d of the first asperity to touch."""
     offsets = level.problem.exact.offsets
     first = offsets.upper >= offsets.lower.max()
     if np.count_nonzero(first) > 1:
-        expected = "a force below f P: there several asperities slide last, together, and which "
-        expected += "of them does depends on the direction of a change"
+        expected = "a force below f P: where several asperities slide last there is no derivative"
         raise InputError("force", found="gross sliding", expected=expected)
     zero = Ball.exact(np.zeros(len(offsets)))
     moved = where(first, zero - weight, zero)
@@ -138,7 +137,7 @@ def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball
 
 
 def product(level: Level, weights: Ball) -> Ball:
-    """A times balls: of their midpoints, and at most the largest entry times their radii."""
+    """A times weights; their radii are multiplied with the largest entry of A."""
     problem = level.problem
     coupled = problem.product(weights.mid)
     if weights.radius.any():
@@ -149,5 +148,5 @@ def product(level: Level, weights: Ball) -> Ball:
 
 
 def value_of(parts: Iterable[Part]) -> Ball:
-    """The number that these parts add up to."""
+    """The sum of these parts."""
     return sum((part.value for part in parts), start=ZERO)

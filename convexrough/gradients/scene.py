@@ -1,9 +1,13 @@
-"""From derivatives in own units to those by what a scene is made of, as balls.
+"""Derivatives by the parameters of a scene, as balls, from those by offsets, coefficients and A.
 
-With dJ = alpha'dd + kappa'd log k + sum over parts of left'dA P, d = z - (x^2 bx + y^2 by) / 2
-with curvatures b = 1/R along each axis, or 1/(R + rho) in the geometry "closest", whose contact
-points are c = r / (1 + rho/R); k^3 = (9/16) (1/R + 1/rho) / E*^2, 1/R the mean of both axes, and
-A_ij = 1 / (pi E* |c_i - c_j|)
+These are dJ = alpha'dd + kappa'd log k + sum over levels of left'dA P, and
+
+    d = z - (x^2 bx + y^2 by) / 2,    k^3 = (9/16) (1/R + 1/rho) / E*^2,
+    A_ij = 1 / (pi E* |c_i - c_j|).
+
+An asperity has the summit r = (x, y) at the height z and the tip radius rho. The base has the
+curvature 1/R along each axis; in k it is the mean of both. In the geometry "summit" b = 1/R and
+the contact points are c = r; in "closest" b = 1 / (R + rho) and c = r / (1 + rho/R)
 (docs/theory/gradients.md, "Derivatives by the data of a scene").
 """
 
@@ -25,15 +29,15 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along, named
 from convexrough.scene.scene import Scene
 
-#: Up to so many asperities that carry load, sums over pairs are made pair by pair on balls.
+#: For at most so many loaded asperities, sums over pairs are computed with balls.
 PAIRWISE = 1000
 
-#: Pairs on balls that are worked on together.
+#: Number of pairs whose balls are computed together.
 BLOCK = 2**16
 
 
 class Bending(NamedTuple):
-    """What a change does to asperities: (n,) dd [length] and dlog k, and (n, 2) dc [length]."""
+    """Changes (n,) dd [length], (n,) dlog k and (n, 2) dc [length] of asperities."""
 
     offsets: Ball
     local: Ball
@@ -42,11 +46,11 @@ class Bending(NamedTuple):
 
 @dataclass(frozen=True)
 class Geometry:
-    """The numbers of a problem's candidates in the scene's units, as balls.
+    """The geometry of a problem's candidates in the scene's units, as balls.
 
     points : (n, 2) r, of the summits;  contact_points : (n, 2) c
     tips   : (n,) rho;  curvature : (2,) 1/R along x and y;  bend : (n, 2) b
-    share  : (n, 2) c over r;  relative : (n,) 1 / (1/R + 1/rho)
+    share  : (n, 2) c / r;  relative : (n,) 1 / (1/R + 1/rho)
     """
 
     problem: NormalProblem
@@ -89,7 +93,7 @@ class Geometry:
 
     @cached_property
     def by_tip(self) -> Bending:
-        """Per change of rho."""
+        """Derivatives by rho."""
         r, local = self.points, -self.relative / (3.0 * self.tips * self.tips)
         if not self.closest:
             return Bending(0.0 * local, local, 0.0 * r)
@@ -98,7 +102,7 @@ class Geometry:
 
     @cached_property
     def by_radius(self) -> Bending:
-        """Per change of the radius of a sphere."""
+        """Derivatives by the radius of a sphere."""
         squared = self.curvature[0] * self.curvature[0]
         flatter = self.points * self.share * self.share * squared
         outwards = flatter * self.tips[:, None] if self.closest else 0.0 * flatter
@@ -106,7 +110,7 @@ class Geometry:
         return Bending((self.points * flatter).sum() * 0.5, local, outwards)
 
     def bent(self, heights: Ball, tips: Ball, moved: Ball, radius: Ball) -> Bending:
-        """By changes of heights (n,), rho (n,), summits (n, 2) and the radius of a sphere."""
+        """Changes due to those of heights (n,), rho (n,), summits (n, 2) and a sphere's radius."""
         a, b, sunk = self.by_tip, self.by_radius, (self.points * self.bend * moved).sum()
         return Bending(
             heights - sunk + tips * a.offsets + radius * b.offsets,
@@ -115,10 +119,10 @@ class Geometry:
         )
 
     def slopes(self, loads: Ball, which: Indices) -> Ball:
-        """(m, 2) [1 / length] -scale sum_j (c_i - c_j) P_j / r_ij^3 among some, loads (m,) P.
+        """(m, 2) [1 / length] -scale sum_j (c_i - c_j) P_j / r_ij^3 for the m asperities `which`.
 
-        Of many asperities in float64: the error of a sum of m terms of a stored matrix is about m
-        roundoffs of the sum of magnitudes; that of transforms is not known.
+        loads : (m,) P. For more than PAIRWISE asperities the sums are computed in float64. With a
+        matrix their error is about m roundoffs of the sum of magnitudes; else no bound is known
         """
         if len(which) <= PAIRWISE:
             return self._pair_by_pair(loads, which)
@@ -151,9 +155,9 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Of one number by a scene, as balls in the scene's units, over the candidates of a problem.
+    """Derivatives of one number by the parameters of the n candidates, in the scene's units.
 
-    offsets : (n,) by d [1 / length];  local : (n,) by log k;  pulled : what changes by A
+    offsets : (n,) by d [1 / length];  local : (n,) by log k;  pulled : derivatives of each level
     """
 
     geometry: Geometry
@@ -169,13 +173,13 @@ class Derivatives:
         return cls(Geometry.of(problem), offsets, local, tuple(pulled))
 
     def in_scene(self, values: Array) -> Array:
-        """(N, ...) values of the candidates, among zeros for all others of the scene."""
+        """(N, ...) values of the candidates, and 0 for all other asperities."""
         problem = self.geometry.problem
         return frozen(among_zeros(values, problem.candidates, len(problem.scene)))
 
     @cached_property
     def turning(self) -> Ball:
-        """(n, 2) by the contact points c, through the coupling: G."""
+        """(n, 2) derivatives by the contact points c, which change A."""
         geometry, n = self.geometry, len(self.offsets)
         carrying = np.zeros(n, dtype=bool)
         for each in self.pulled:
@@ -192,18 +196,18 @@ class Derivatives:
 
     @cached_property
     def coupled(self) -> Ball:
-        """sum of left'A P."""
+        """The sum of left'A P over levels."""
         return sum((each.left.dot(each.coupled) for each in self.pulled), start=ZERO)
 
     @cached_property
     def positions(self) -> Ball:
-        """(n, 2)"""
+        """(n, 2) derivatives by the positions of the summits."""
         geometry = self.geometry
         sinking = self.offsets[:, None] * geometry.bend * geometry.points
         return self.turning * geometry.share - sinking
 
     def along(self, by: Bending) -> Ball:
-        """(n,) by a parameter that bends the geometry so."""
+        """(n,) derivatives by parameters that change the geometry by these amounts."""
         found = self.offsets * by.offsets + self.local * by.local
         return found + (self.turning * by.points).sum() if self.geometry.closest else found
 
@@ -213,7 +217,7 @@ class Derivatives:
 
     @property
     def sphere_radius(self) -> Ball | None:
-        """None of other bases than a sphere."""
+        """The derivative by the radius of the sphere; None for other bases."""
         if named(self.geometry.problem.scene.sphere_radius) != "a sphere":
             return None
         return self.along(self.geometry.by_radius).sum()
@@ -225,7 +229,7 @@ class Derivatives:
 
 
 def curvatures(scene: Scene) -> Ball:
-    """(2,) [1 / length] of the base along x and y, 0 where it is straight."""
+    """(2,) [1 / length] curvatures of the base along x and y."""
     radii = np.array(along(scene.sphere_radius))
     bent = np.isfinite(radii)
     return where(bent, 1.0 / Ball.exact(np.where(bent, radii, 1.0)), Ball.exact(np.zeros(2)))

@@ -1,4 +1,4 @@
-"""Gradients of a pressed contact, of a friction state, and of an onset of sliding."""
+"""Gradients of a pressed contact, a friction state, and an onset of sliding."""
 
 from __future__ import annotations
 
@@ -27,22 +27,23 @@ from convexrough.normal.refine import refined_loads
 from convexrough.numbers import balls
 from convexrough.numbers.balls import Ball
 
-#: Newton steps to the level at which an asperity starts to slide, each of order 3/2 from 1e-15.
+#: Newton steps to the level at which an asperity starts to slide. The start has an error of about
+#: 1e-15; each step raises the error to the power 3/2.
 NEWTON = 3
 
 
 @dataclass(frozen=True)
 class Frictional:
-    """A contact with friction, and its levels by their names."""
+    """A contact with friction, and its levels by rational loads."""
 
     contact: Contact
     known: FrictionLevels
 
     @classmethod
     def of(cls, result: ShearState | Cycle | LoadPath) -> Frictional:
-        """Of a result that is a sum of levels; InputError for one of general steps."""
+        """The contact of a result. Raises InputError if general steps computed the result."""
         if result.order == "fails":
-            expected = "indentations that do not fall with the load: no sum of levels else"
+            expected = "a result whose indentations do not fall as the load rises"
             raise InputError("order", found='"fails"', expected=expected)
         return cls.pressed(result.contact)
 
@@ -63,19 +64,19 @@ class Frictional:
 
     @property
     def unit(self) -> float:
-        """[force] of levels."""
+        """[force] the unit of loads of the levels."""
         return self.known.units.force
 
     def below(self, what: str, force: float | Fraction, holding: Holding) -> Level:
         """The level L = P - |Q| / f."""
         height = abs(self.known.height(force))
         if height == self.known.load and holding == "approach":
-            expected = "a force below f P: with the approach held f P may fall below the force"
+            expected = "a force below f P: at constant approach f P may fall below the force"
             raise InputError(what, found=f"{float(force)}: gross sliding", expected=expected)
         return self.known.at(self.known.load - height)
 
     def moves(self, height: Ball, /, **shares: float) -> Moves:
-        """Of L = P - T by the load, by friction, and by forces of which Q has these shares."""
+        """Derivatives of L = P - T by load, friction, and forces; shares : dQ by these forces."""
         by_force = -1.0 / self.known.force_unit
         rates = {name: by_force * share for name, share in shares.items()}
         return {"load": self.top_moves["load"], "friction": height / self.f, **rates}
@@ -88,7 +89,7 @@ class Frictional:
 def contact_gradient(
     contact: Contact, holding: Holding | None = None, **weights: ArrayLike | None
 ) -> Gradient:
-    """As `Contact.gradient`."""
+    """The result of `Contact.gradient`."""
     holding = control_held(contact, holding)
     top, (on_loads, on_gaps, D, P) = levels(contact).top, _checked(contact, weights)
     on_loads, units = on_loads + P, top.problem.units
@@ -111,7 +112,7 @@ def contact_gradient(
 def state_gradient(
     state: ShearState, holding: Holding | None = None, **weights: ArrayLike | None
 ) -> Gradient:
-    """As `ShearState.gradient`."""
+    """The result of `ShearState.gradient`."""
     contact, sheared = state.contact, Frictional.of(state)
     holding = control_held(contact, holding)
     X, on_forces, on_slips = _checked(contact, weights)
@@ -135,12 +136,13 @@ def state_gradient(
 
 
 def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None = None) -> Gradient:
-    """Of the shear force at which one asperity starts to slide on first loading.
+    """Derivatives of the shear force at which one asperity starts to slide on first loading.
 
-    asperity : its index in the scene;  holding : as in `Contact.gradient`
+    asperity : its index in the scene;  holding : quantity kept constant, as in `Contact.gradient`
 
-    Raises InputError where the asperity carries no load, or slides last and not alone: then there
-    is no derivative; ProofError where it is not proved that its indentation rises with the load.
+    Raises InputError if the asperity carries no load, or if several asperities slide last and it is
+    one of them (there is no derivative); ProofError if it is not proved that its indentation rises
+    with the load.
 
     >>> gradient = cr.onset_gradient(contact, 36)
     >>> print(f"{gradient.value / contact.load:.3f}", f"{gradient.friction / contact.load:.3f}")
@@ -162,8 +164,8 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
         # n(L) = 0, so that -f dL = f dn / (dn/dL)
         parts = [Part(low, indentations=only * (f * unit / slope))]
         total = (top.load - low.load) * f * unit
-    elif np.count_nonzero(first) > 1:  # all slide at f P, the last one whatever the heights are
-        expected = "one that slides before others do, or last and alone"
+    elif np.count_nonzero(first) > 1:  # all of these slide at f P
+        expected = "one that slides before another, or last and alone"
         found = f"{asperity}, which slides last, together with others"
         raise InputError("asperity", found=found, expected=expected)
     number = Number.of(contact, top, parts, {"load": f, "friction": total / f})
@@ -171,9 +173,9 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
 
 
 def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
-    """The level at which a candidate touches and carries nothing, and dn/dL of it there.
+    """The level at which the indentation n of a candidate is 0, and dn/dL at this level.
 
-    As a ball of loads that holds the root of n: its indentation rises at all of them.
+    The load of the level is a ball that contains the root of n, and n rises on all of it.
     """
     known, named = levels(sheared.contact), sheared.known
 
@@ -191,12 +193,12 @@ def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
     reach = 2.0 * left / float(slope.lower) if slope.positive else np.inf
     level, slope = at(Ball.around(load.mid, reach))
     if not left <= float(slope.lower) * reach:
-        raise ProofError("where the asperity starts to slide is not proved: its order is in doubt")
+        raise ProofError("the onset is not proved: the indentation may fall as the load rises")
     return level, slope
 
 
 def _where_open(level: Level, weights: Array) -> Ball:
-    """Weights on gaps, of those of the candidates that are open; in doubt anything between."""
+    """Weights of gaps, 0 where not open; a ball that contains both where this is not proved."""
     if level.solution is None:
         shut = level.springs.touching if level.trial is not None else ~level.open
         return Ball.exact(np.where(shut, 0.0, weights))
@@ -207,7 +209,7 @@ def _where_open(level: Level, weights: Array) -> Ball:
 
 
 def _wider(level: Level, which: Indices) -> Level:
-    """The same level, with more asperities among its candidates: they are open."""
+    """The same level with more candidates, which are open."""
     problem = level.problem.widened(which)
     assert level.trial is not None
     places = np.searchsorted(which, level.problem.candidates)
@@ -219,9 +221,9 @@ def _wider(level: Level, which: Indices) -> Level:
 
 
 def _checked(contact: Contact, weights: Mapping[str, Any]) -> Iterator[Any]:
-    """Weights on numbers and (n,) on what there is of each asperity; 0 where none are given."""
+    """The given weights, checked: numbers, and (n,) of asperities; 0 for those not given."""
     if all(value is None for value in weights.values()):
-        expected = "at least one: weights on what is to be differentiated"
+        expected = "weights of at least one of these results"
         raise InputError(", ".join(weights), found="none", expected=expected)
     for name, value in weights.items():
         if name in ("load", "approach", "displacement"):

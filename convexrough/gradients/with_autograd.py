@@ -1,4 +1,4 @@
-"""Numbers of a scene as functions of autograd, which differentiates numpy."""
+"""An objective as a function of autograd, the package that differentiates numpy."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from convexrough.errors import ExtraError
 
 
 def differentiable(both: Callable[[Any], tuple[float, Array]]) -> Callable[[Any], Any]:
-    """f(x) -> number, from x -> (number, gradient): `autograd.grad` takes it.
+    """A function f(x) -> number for `autograd.grad`, from `both`: x -> (number, gradient).
 
-    There are no second derivatives. Raises ExtraError where autograd is not installed.
+    There are no second derivatives. Raises ExtraError if autograd is not installed.
     """
     try:
         from autograd.extend import defvjp, primitive
     except ImportError as error:
         raise ExtraError("autograd") from error
 
-    known: dict[bytes, Array] = {}  # the gradient at the last point, for the way back
+    known: dict[bytes, Array] = {}  # the gradient at the last point, for the backward pass
 
     def number(x: Any) -> float:
         value, slopes = both(np.asarray(x, dtype=np.float64))

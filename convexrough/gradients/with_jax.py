@@ -1,4 +1,4 @@
-"""Numbers of a scene as functions of jax, by its custom rules for derivatives."""
+"""An objective as a function of jax, with a custom rule for its derivatives."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from convexrough.errors import ExtraError
 
 
 def differentiable(both: Callable[[Any], tuple[float, Array]]) -> Callable[[Any], Any]:
-    """f(x) -> number, from x -> (number, gradient): jax.grad, jax.jit and jax.vmap take it.
+    """A function f(x) -> number for jax.grad, jax.jit and jax.vmap, from `both`.
 
-    It is computed outside of jax, in float64: without `jax_enable_x64` results are rounded. There
-    are no second derivatives. Raises ExtraError where jax is not installed.
+    both : x -> (number, gradient), computed outside of jax in float64; without `jax_enable_x64`
+        results are rounded to float32. There are no second derivatives
+
+    Raises ExtraError if jax is not installed.
     """
     try:
         import jax

@@ -1,4 +1,4 @@
-"""Numbers of a scene as functions of torch."""
+"""An objective as a function of torch."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from convexrough.errors import ExtraError
 
 
 def differentiable(both: Callable[[Any], tuple[float, Array]]) -> Callable[[Any], Any]:
-    """f(x) -> number, from x -> (number, gradient): `backward` goes through it.
+    """A function f(x) -> number that supports `backward`, from `both`: x -> (number, gradient).
 
-    It is computed outside of torch, in float64, on the processor; there are no second derivatives.
-    Raises ExtraError where torch is not installed.
+    It is computed outside of torch, in float64, on the CPU. There are no second derivatives.
+    Raises ExtraError if torch is not installed.
     """
     try:
         import torch

@@ -25,7 +25,7 @@ from convexrough.influence.coupling import Coupling, Kind, Rounding, Smoother, c
 from convexrough.influence.dense import DenseCoupling, dense_matrix, entry_error
 from convexrough.influence.lattice_smoother import block_smoother
 from convexrough.influence.lattice_symbol import least_symbol
-from convexrough.influence.sliced import SLICES, Distances, Sliced, each_loss
+from convexrough.influence.sliced import LARGE, SLICES, Distances, Sliced, each_loss
 from convexrough.influence.slopes import pulls
 from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair, two_product, two_sum
@@ -283,12 +283,13 @@ class LatticeInfluence(LatticeCoupling):
         least = self.lattice.cached(_least_symbol) - self._displaced
         return -least * radius * (1.0 + SAFETY) <= self.spacing
 
-    def sums(self, loads: Pair, slices: int = SLICES) -> Ball:
+    def sums(self, loads: Pair, slices: int | None = None) -> Ball:
         """(n,) sum_j P_j / r_ij [force / length], with many more digits than `apply`.
 
         slices : number of slices of loads and kernel, of 10 to 18 bits each: the method of
-            docs/theory/operators-lattice.md, "Slices"
+            docs/theory/operators-lattice.md, "Slices"; default 3, and 4 on a large box
         """
+        slices = slices or SLICES + int(math.prod(self.box.shape) > LARGE)
         off_sites = self._off_sites(np.asarray(loads.high))
         sliced = self._cached(slices, lambda: self._slice(slices))
         return sliced.sums(loads, self._padded[0], *off_sites)

@@ -1,1 +1,1 @@
-"""Shakedown: how far a load path may be scaled until asperities slide in every cycle."""
+"""Shakedown: the factor of a load path up to which sliding of asperities ceases."""

@@ -1,8 +1,9 @@
-"""How a shear force is shared where every asperity sticks, and how far that is proved.
+"""Elastic shares: the shear forces of asperities that all stick, per unit of the total force.
 
-Shares Y solve  (H + C) Y = the same displacement everywhere,  sum Y = 1,  with H = diag(1/(2 E* a))
-of the true loads. What is proved of computed shares is the theorem of `convex.theorem`:
-docs/theory/shakedown.md, "Elastic shares". Y is (n,), or (n, 2, 2) with the full kernel.
+The shares Y solve  (H + C) Y = the same displacement at every asperity,  sum Y = 1,  with
+H = diag(1/(2 E* a)), contact radii a of the true loads, and the influence matrix C. The theorem of
+`convex.theorem` bounds the errors of computed shares: docs/theory/shakedown.md, "Elastic shares".
+Y is (n,), or (n, 2, 2) with the full kernel.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ from convexrough.vector_shear.problem import VectorProblem
 
 
 class Shares(NamedTuple):
-    """Shares of the n loaded asperities, own units; errors are infinite where nothing is proved.
+    """Shares of the n loaded asperities. Errors are proved bounds, infinite without a proof.
 
-    values : (n,) or (n, 2, 2);  errors : (n,) or (n, 2), under a force along x and along y
-    loads, load_errors : (n,)
+    values : (n,) or (n, 2, 2);  errors : (n,), or (n, 2) for forces along x and along y
+    loads, load_errors : (n,) in units of the problem
     """
 
     values: Array
@@ -35,7 +36,7 @@ class Shares(NamedTuple):
 
 
 def scalar_shares(contact: Contact) -> Shares:
-    """With the scalar kernel: how a normal solution changes with its load."""
+    """The shares with the scalar kernel: derivatives of the normal loads by the total load."""
     known = Loaded.of(contact)
     shares = known.elastic
     if known.scope == "none":
@@ -44,7 +45,7 @@ def scalar_shares(contact: Contact) -> Shares:
 
 
 def vector_shares(contact: Contact) -> Shares:
-    """With the full tangential kernel."""
+    """The shares with the full tangential kernel."""
     problem = VectorProblem.of(contact)
     n, h = len(problem), problem.stiffness
     checks.fits_in_memory("loaded asperities", n, 3 * 4 * 8, power=2)
@@ -63,9 +64,9 @@ def vector_shares(contact: Contact) -> Shares:
 
 
 def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
-    """(n,) bounds on shares (n, 2), from how far (H + C) Y is from the same at every asperity.
+    """(n,) bounds on the errors of shares (n, 2), from the residual of the equations above.
 
-    What they miss of the total is put on the first one.
+    The difference of their sum from the total counts as an error of the first asperity.
     """
     exact = Ball.exact(np.ascontiguousarray(shares.T))
     stiffness = 1.0 / (problem.load_balls / problem.threshold_balls * 1.5)
@@ -82,7 +83,7 @@ def _errors(problem: VectorProblem, shares: Array, total: Array) -> Array:
 
 
 def _unproved(values: Array, problem: Loaded) -> Shares:
-    """Shares of loads of which nothing is problem."""
+    """The same shares with infinite errors."""
     nowhere = np.full(len(values), np.inf)
     errors = nowhere if values.ndim == 1 else np.full(values[:, 0].shape, np.inf)
     return Shares(values, errors, problem.loads, nowhere)

@@ -1,14 +1,15 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
-With elastic shares q_i(v) of the vertices v of a path, in units of f, and t0 its mean,
+Let q_i(v) be the shear force on asperity i at the vertex v of a path if all asperities stick, t0
+the mean shear force, both over f, and r_i shear forces at rest. Melan's program is
 
-    maximise lambda  with  |r_i + lambda q_i(v)| <= P_i  for all i and v,  sum r_i = t0,
+    maximise lambda  with  |r_i + lambda q_i(v)| <= P_i  for all i and v,  sum r_i = t0.
 
-and for slips s_iv with sum_v s_iv = x the same for all i, any such lambda is at most
+For slips s_iv with the same sum x over v at every asperity i, any such lambda is at most
 
     [sum P_i |s_iv| - x . t0] / sum s_iv . q_i(v).
 
-Both are evaluated here for the solver's result, which need not be correct, and with bounds on the
+This module evaluates both for the solver's result, which need not be correct, with bounds on the
 errors of shares and loads: docs/theory/shakedown.md, "Melan's program".
 """
 
@@ -27,30 +28,33 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers.programs import ConeProgram, run_clarabel
 from convexrough.vector_shear.loaded import Loaded
 
-#: What the solver is asked for, and how far its state is moved towards one that is surely safe.
+#: The solver's tolerance, and the part of the way by which its state moves to one within friction.
 TOLERANCE, MARGIN = 1e-10, 1e-9
 
-#: Slips are multiples of the largest over this: sums of such numbers are exact.
+#: Slips are rounded to multiples of the largest slip / STEPS, so that sums of them are exact.
 STEPS = 2.0**30
 
 
 class Melan(NamedTuple):
-    """Bounds on lambda, the state at rest [force over f] and the slips of each vertex.
+    """The largest lambda of Melan's program, with proved bounds.
 
-    lower, upper : proved; 0 and infinite where the shares or the loads are not
-    factor       : what the state admits, were shares and loads as computed
+    factor : lambda of the computed state, shares and loads
+    lower, upper : proved bounds; 0 and infinite if shares or loads are not proved
+    gross  : lambda at which the path reaches the friction limit of the whole contact
+    rest   : (N, 2) [force] shear forces at rest over f, less the shares of the mean force
+    slips  : (m, N, 2) slips at each vertex
     """
 
     factor: float
     lower: float
     upper: float
     gross: float
-    rest: Array  # (n, 2)
-    slips: Array  # (m, n, 2)
+    rest: Array
+    slips: Array
 
 
 def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
-    """The program with the full tangential kernel; mean (2,) and vertices (m, 2) are Q / f."""
+    """The solution with the full kernel; mean (2,) and vertices (m, 2) are values of Q / f."""
     problem = Loaded.of(contact)
     unit, n = problem.units.force, len(problem)
     shares, m = vector_shares(contact), len(vertices)
@@ -73,7 +77,7 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> Melan:
 
 
 def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
-    """Unknowns lambda and rho = r - steady; cones scaled by P_i."""
+    """The cone program in lambda and r - steady, with cones scaled by P_i."""
     from scipy.sparse import csc_matrix, hstack, identity, kron, vstack
 
     m, n, _ = elastic.shape
@@ -101,16 +105,16 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
 
 
 def _inwards(limits: Array, state: Array, mean: Array) -> Array:
-    """(n, 2) a state at rest that adds up, and is moved a little towards one within friction."""
+    """(n, 2) the state, corrected to the total and moved slightly to one within friction."""
     parts = limits[:, None] / limits.sum()
     state = state + parts * (mean - state.sum(axis=0))
     return np.asarray(state + MARGIN * (parts * mean - state))
 
 
 def _lower(shares: Shares, rest: Array, mean: Array, elastic: Array, errors: Array) -> float:
-    """The largest lambda that the state is sure to admit.
+    """A lower bound on the largest lambda that the state admits; 0 without a proof.
 
-    What it misses of the total is counted at every asperity, whichever of them gets it.
+    The difference of the state's sum from the total reduces the limit of every asperity.
     """
     missing = float(np.hypot(*(rest.sum(axis=0) - mean)))
     missing += 4 * len(rest) * ROUNDOFF * float(np.abs(rest).sum())
@@ -120,7 +124,7 @@ def _lower(shares: Shares, rest: Array, mean: Array, elastic: Array, errors: Arr
     least, most = _largest(rest, elastic, limits)
     if not least <= 0.0 <= most:
         return 0.0
-    limits = limits - most * errors  # more than any smaller lambda needs
+    limits = limits - most * errors  # errors grow with lambda
     if (limits <= 0).any():
         return 0.0
     least, most = _largest(rest, elastic, limits)
@@ -144,10 +148,10 @@ def _largest(fixed: Array, scaled: Array, limits: Array) -> tuple[float, float]:
 
 
 def _closed(slips: Array) -> Array:
-    """(m, n, 2) slips that add up to the same everywhere, exactly: they are whole numbers."""
+    """(m, n, 2) whole-number slips whose sum over vertices is the same at every asperity."""
     largest = float(np.abs(slips).max())
     if not largest > 0:
-        raise SolverError("the program was answered without a mechanism", solver="shakedown")
+        raise SolverError("the solver found no slips", solver="shakedown")
     slips = np.round(slips * (STEPS / largest))
     net = slips.sum(axis=0)
     together = np.round(net.mean(axis=0))
@@ -157,7 +161,7 @@ def _closed(slips: Array) -> Array:
 
 
 def _upper(shares: Shares, slips: Array, mean: Array, elastic: Array, errors: Array) -> float:
-    """What slips that close prove; infinite where they do no work."""
+    """The upper bound on lambda from these slips; infinite if they do no work."""
     sizes = np.hypot(slips[..., 0], slips[..., 1])
     done = slips * elastic
     uncertainty = float((sizes * errors).sum()) + 4 * done.size * ROUNDOFF * float(

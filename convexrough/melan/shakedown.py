@@ -1,8 +1,9 @@
-"""`shakedown`: how far a load path may be scaled until asperities slide in every cycle.
+"""`shakedown`: the factor of a load path up to which sliding of asperities ceases.
 
-The path is (P0, Q0) + factor (p, q). With T = Q / f, r+ and r- the largest -(p + t) and -(p - t) of
-its points, the permanently stuck level is  L* = P0 - factor (r+ + r-) / 2,  and asperity i slides
-for ever once L* falls below its onset sigma_i: docs/theory/shakedown.md, "The exact limit".
+The points of the path are (P0, Q0) + factor (p, q). With t = q / f and the largest values r+ of
+-(p + t) and r- of -(p - t), nothing slips in the steady cycle below the load
+L* = P0 - factor (r+ + r-) / 2. Asperity i slides in every cycle if L* is below its onset, the load
+at which it first touches: docs/theory/shakedown.md, "The exact limit".
 """
 
 from __future__ import annotations
@@ -34,27 +35,27 @@ from convexrough.vector_shear.loaded import Loaded
 
 Theory = Literal["exact", "elastic", "vector"]
 
-#: Shakedown with what is prescribed: to be called with what is found.
+#: `Shakedown` with the prescribed quantities filled in, to be called with the results.
 Limit: TypeAlias = "Callable[..., Shakedown]"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shakedown(Table, Plottable):
-    """The factor up to which sliding shakes down, from below by a state and above by slips.
+    """The largest factor of a load path that shakes down, with proved bounds.
 
-    kind    : "exact": partial slip, any path; sliding of whole asperities ceases. "elastic" and
-        "vector": Melan's theorem for asperities that stick until they slide, at constant load
-    factor  : least of `factors`, or of the program;  lower, upper : proved bounds on it; 0 and
-        infinite where the loads are not proved, or the order that "exact" rests on
-    factors : (n,) of each asperity that touches at the mean load, nan of others and where not
-        looked for; one number for all by "vector"
-    gross   : the factor at which all of them slide at once, beyond which there is no such path
-    witness : (n,) or (n, 2) [force] shear at rest that keeps all within friction up to `lower`,
-        with what the path adds elastically
-    mechanism : (n,) slips just beyond, the largest 1; (m, n, 2) of each vertex by "vector"
-    order   : of indentations, which "exact" rests on; None of the others
-    load, force : P0 and Q0 [force], Q0 (2,) by "vector"
-    load_amplitudes, force_amplitudes : (m,) p and q [force], q (m, 2) by "vector"
+    kind    : "exact": asperities slip partially; any path. "elastic" and "vector": Melan's theorem
+        for asperities that stick until they slide, with the scalar and the full kernel; P0 constant
+    factor  : the smallest of `factors`, or the solution of Melan's program
+    lower, upper : proved bounds on it; 0 and infinite without a proof
+    factors : (n,) the factor of each asperity that touches at the load P0; nan for others and for
+        those not computed; one number for all by "vector"
+    gross   : the factor at which the path reaches the friction limit of the whole contact
+    witness : (n,) or (n, 2) [force] shear forces of a state at rest in which no asperity slides on
+        the path times `lower`
+    mechanism : (n,) slips just beyond `upper`, the largest 1; (m, n, 2) at each point by "vector"
+    order   : "exact" needs "proved", as in `Cycle.order`, for its bounds; None for other kinds
+    load, force : [force] P0 and Q0;  Q0 (2,) for "vector"
+    load_amplitudes, force_amplitudes : (m,) [force] p and q;  q (m, 2) for "vector"
 
     >>> Q = 0.1 * contact.load
     >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
@@ -84,16 +85,16 @@ class Shakedown(Table, Plottable):
 
     @property
     def gap(self) -> float:
-        """(upper - lower) / factor."""
+        """(upper - lower) / factor; 0 if the factor is infinite."""
         return (self.upper - self.lower) / self.factor if np.isfinite(self.factor) else 0.0
 
     @property
     def proved(self) -> bool:
-        """The bounds enclose the factor."""
+        """True if bounds on the factor are proved."""
         return self.lower > 0 and bool(self.upper < np.inf or self.factor == np.inf)
 
     def _variables(self) -> Variables:
-        """Vectors by "vector", whose mechanism has slips for each vertex."""
+        """The variables; for "vector" with the dimensions of its vectors."""
         found = super()._variables()
         if self.kind == "vector":
             for name, along in (
@@ -115,16 +116,19 @@ def shakedown(
     kind: Theory = "exact",
     influence: Kind | None = None,
 ) -> Shakedown:
-    """The largest factor of a closed path around (loads, forces) that shakes down.
+    """The largest factor of a closed path for which sliding of asperities ceases.
 
-    loads, forces : P0 and Q0 [force]; Q0 is (2,) for "vector"
-    load_amplitudes, force_amplitudes : (m,) p and q of the points of the path [force], a number
-        for all; q is (m, 2) for "vector". Only "exact" allows p that is not 0
-    influence : as in `load_path`
+    The points of the path are (loads, forces) + factor (load_amplitudes, force_amplitudes).
 
-    Raises InputError for bad values, |Q0| >= f P0, or a path on which nothing moves.
+    loads, forces : [force] load P0 and shear force Q0; Q0 is (2,) for "vector"
+    load_amplitudes, force_amplitudes : [force] (m,) p and q, or one number p for all points; q is
+        (m, 2) for "vector". p must be 0 unless the kind is "exact"
+    kind      : "exact", "elastic" or "vector", as in `Shakedown`
+    influence : compliance operator, as in `load_path`
 
-    The rings of the paper's example: sliding ceases up to 0.3517 of f P.
+    Raises InputError for invalid values, |Q0| >= f P0, or a path of equal points.
+
+    Example: in the paper's scene sliding ceases up to amplitudes of 0.3517 f P.
 
     >>> Q = 0.05 * contact.load
     >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
@@ -149,7 +153,7 @@ def shakedown(
         given = "one point" if len(q) else "none"
         raise InputError("force_amplitudes", found=given, expected=expected)
     if kind != "exact" and np.any(p):
-        expected = 'none: only "exact" holds where the normal load varies'
+        expected = 'none, as the kind is not "exact": the normal load must be constant'
         raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)
     contact = press(scene, load=P0, influence=influence)
     limit = partial(
@@ -203,14 +207,14 @@ def _exact(limit: Limit, contact: Contact, t0: float, p: Array, t: Array) -> Sha
 
 
 def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
-    """The scalar program in closed form: alternating slip of one asperity, or gross sliding."""
+    """The solution of the scalar program: alternating slip of one asperity, or gross sliding."""
     f = checks.friction(contact.scene.friction)
     problem, shares = Loaded.of(contact), scalar_shares(contact)
     high, low = float(t.max()), float(t.min())
     q, P, load_errors, off = shares.values, shares.loads, shares.load_errors, shares.errors
 
     def limits(loads: Array, sizes: Array) -> Array:
-        """Of each asperity: it slides to and fro where the range of its share is 2 P_i."""
+        """The factor at which the range of each asperity's share reaches 2 P_i."""
         reach = np.maximum(sizes, 0.0) * ((high - low) / problem.units.force)
         return np.divide(2.0 * loads, reach, out=np.full_like(loads, np.inf), where=reach > 0)
 
@@ -222,10 +226,10 @@ def _elastic(limit: Limit, contact: Contact, t0: float, t: Array) -> Shakedown:
     factor = min(float(each.min()), sliding)
     lower = min(float(limits(np.maximum(P - load_errors, 0.0), np.abs(q) + off).min()), sliding)
     upper = min(float(limits(P + load_errors, np.abs(q) - off).min()), sliding)
-    # A share that might be negative would be loaded while the others are unloaded.
+    # The solution holds for positive shares only.
     proved = bool((q >= off).all())
     critical = np.arange(len(P)) == int(np.argmin(each)) if factor < sliding else np.ones(len(P))
-    # At rest each asperity has room from -P_i - factor q_i low to P_i - factor q_i high.
+    # The force at rest may lie from -P_i - factor q_i low to P_i - factor q_i high.
     travelled = np.outer(factor * q / problem.units.force, (low, high))
     room_low, room_high = -P - travelled.min(axis=1), P - travelled.max(axis=1)
     width = room_high - room_low
@@ -259,7 +263,7 @@ def _vector(limit: Limit, contact: Contact, t0: Array, t: Array) -> Shakedown:
 
 
 def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
-    """(m, 2) of forces in the plane; one of them, or a number along x, if one is expected."""
+    """(m, 2) forces in the plane, checked; if one is expected, a number is one along x."""
     given = checks.numbers(what, values)
     if given.ndim == 0 and dimensions == 1:
         given = np.array([float(given), 0.0])
@@ -270,11 +274,11 @@ def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
 
 
 def _alike(what: str, values: ArrayLike, count: int) -> Array:
-    """(count,) of amplitudes; a number stands for as many of it."""
+    """(count,) amplitudes, checked; one number counts for all."""
     given = checks.array(what, np.atleast_1d(np.asarray(values)))
     if np.ndim(values) == 0:
         return frozen(np.full(count, float(given[0])))
     if len(given) != count:
-        expected = f"{count}, as many as of force_amplitudes"
+        expected = f"{count}, one for each of force_amplitudes"
         raise InputError(what, found=f"{len(given)} values", expected=expected)
     return given

@@ -27,7 +27,7 @@ from convexrough.errors import ProofError, SolverError
 from convexrough.normal.boxes import Box
 from convexrough.normal.problem import REDUCTION, NormalProblem
 from convexrough.normal.proved import Obstacle, Proved, proved
-from convexrough.normal.refine import CORRECTIONS, Trial, refined_loads
+from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial, refined_loads
 from convexrough.normal.stack import Stack
 from convexrough.normal.together import NUMBERS, solved
 from convexrough.numbers.balls import Ball, where
@@ -216,7 +216,7 @@ class Level:
                 np.sqrt(c),
                 defect / unit,
                 balanced=True,
-                tolerance=REDUCTION,
+                tolerance=max(REDUCTION, ENOUGH * min(rounding / size, 1.0)),
             )
             following = completed(x + Pair.exact(c * step * unit))
             better, risen = residual(following, problem.product(following))

@@ -30,6 +30,9 @@ from convexrough.sphere import hertz
 #: Corrections at most: each squares the error, or takes what conjugate gradients leave of it.
 CORRECTIONS = 12
 
+#: Corrections leave this part of the rounding of the residual: less would not sharpen the proof.
+ENOUGH = 0.1
+
 #: Up to so many candidates coupled by a matrix, refinement costs no more than the press.
 FEW = 700
 
@@ -122,15 +125,15 @@ def refines(problem: NormalProblem) -> bool:
     return not problem.influence.stored or len(problem) <= FEW
 
 
-def refined(problem: Problem, start: Trial) -> Trial:
+def refined(problem: Problem, best: Trial) -> Trial:
     """The trial whose residual further corrections do not halve."""
-    best, size = start, defect_of(start)
-    todo = size > rounding_of(start)
+    size, rounding = defect_of(best), rounding_of(best)
+    todo = size > rounding
     for _ in range(CORRECTIONS):
         if not todo.any():
             break
         try:
-            following = corrected(problem, best, todo)
+            following = corrected(problem, best, ENOUGH * rounding / size, todo)
         except SolverError:  # the energy is not known to be convex there
             break
         left = defect_of(following)
@@ -139,7 +142,8 @@ def refined(problem: Problem, start: Trial) -> Trial:
             break
         todo = better & (left < 0.5 * size)
         best, size = best.improved(following, better), np.where(better, left, size)
-        todo &= size > rounding_of(best)
+        rounding = rounding_of(best)
+        todo &= size > rounding
     return best
 
 
@@ -149,15 +153,24 @@ def refined_loads(problem: Problem, loads: Array) -> Trial:
     return refined(problem, trial(problem, pair, missing, problem.product(pair)))
 
 
-def corrected(problem: Problem, state: Trial, todo: NDArray[np.bool_]) -> Trial:
-    """One Newton step on the normal map, in the rows that are still to do."""
+def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Trial:
+    """One Newton step on the normal map, in the rows that are still to do.
+
+    enough : a reduction of the residual by this factor is enough: a number, or (m,) of rows
+    """
+    loads, missing = completed(problem, _after_step(problem, state, enough, todo))
+    return trial(problem, loads, missing, problem.moved(state.loads, state.product, loads))
+
+
+def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Pair:
+    """(n,) the loads of `corrected`, before they are scaled to a prescribed total."""
     loads, inside = state.loads, state.inside
     gap = state.gap.value
     local, change = state.local, np.zeros(gap.shape)
     slopes = np.divide(1.5 * loads.high, local, out=np.zeros(gap.shape), where=inside)
     defect = np.where(inside, gap, np.minimum(gap, 0.0))
     size = largest(np.abs(defect))
-    step = size * problem.correct(slopes, defect / np.where(size > 0, size, 1.0), todo)
+    step = size * problem.correct(slopes, defect / np.where(size > 0, size, 1.0), enough, todo)
     # P ((1 + step / n)^(3/2) - 1) of those that touch, and all of those that begin to
     ratio = np.divide(step, local, out=np.zeros(gap.shape), where=inside)
     change[inside] = loads.high[inside] * np.expm1(1.5 * np.log1p(np.maximum(ratio[inside], -0.5)))
@@ -170,10 +183,8 @@ def corrected(problem: Problem, state: Trial, todo: NDArray[np.bool_]) -> Trial:
     following = loads + Pair.exact(change)
     gone = left & ~entering
     if gone.any():
-        following = Pair(np.where(gone, 0.0, following.high), np.where(gone, 0.0, following.low))
-    following, missing = completed(problem, following)
-    product = problem.moved(state.loads, state.product, following)
-    return trial(problem, following, missing, product)
+        return Pair(np.where(gone, 0.0, following.high), np.where(gone, 0.0, following.low))
+    return following
 
 
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:

@@ -121,10 +121,11 @@ class Stack:
         """(m, n) h = (2/3) k P^(-1/3)."""
         return np.asarray((2.0 / 3.0) * self.coefficients / np.cbrt(loads))
 
-    def correct(self, slopes: Array, defect: Array, todo: NDArray[np.bool_]) -> Array:
+    def correct(self, slopes: Array, defect: Array, enough: Any, todo: NDArray[np.bool_]) -> Array:
         """(m, n) a step of Newton's method as `convex.newton_step.correct`; nan where indefinite.
 
         slopes : (m, n) c = dP/dn;  todo : (m,) rows that need one; 0 of others
+        enough : not used, because a factor leaves nothing but rounding
         """
         from scipy.linalg.lapack import dposv  # 0.2 s to import: only when solving
 

@@ -130,7 +130,7 @@ def pressed(stack: Stack, guess: Array) -> Array:
         todo = expected > NEGLIGIBLE * np.linalg.norm(state.own, axis=1)
         if not todo.any():
             break
-        step = stack.correct(state.slopes, state.defect, todo)
+        step = stack.correct(state.slopes, state.defect, 0.0, todo)
         state, before = _pressed(stack, state.unknown + step), size
     return np.where(np.isfinite(size)[:, None], state.loads, np.nan)
 

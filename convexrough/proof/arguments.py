@@ -1,7 +1,7 @@
-"""Boxes of contact radii, and why the energy is convex on them: chosen in floating point.
+"""Candidates for the convexity argument of a proof: boxes of contact radii, and spheres (shells).
 
-Nothing here has to be right. The checker recomputes what it needs and refuses what does not hold;
-then the next one is tried.
+They are computed in floating point and need not be valid. The checker verifies each in exact
+arithmetic; if it refuses one, the next is tried.
 """
 
 from __future__ import annotations
@@ -18,37 +18,36 @@ from scipy.spatial.distance import cdist
 from convexrough.arrays import Array
 from convexrough.scene.scene import Scene
 
-#: How far, relatively, boxes end beyond what a solution can reach, and their least radius in parts
-#: of the largest: room for the bounds. First for radii to all digits, then for rough ones.
+#: Relative distance of the ends of a box from the radii of any solution, and smallest end relative
+#: to the largest: room for the bounds. First for accurate radii, then for rough ones.
 ROOM = ((1e-6, 1e-2), (5e-2, 3e-1))
 
-#: Relative room for rounding in what is computed here.
+#: Relative room for rounding in this module.
 ROUNDING = 1e-9
 
-#: Convexity numbers to try by shells that overlap, and by Cholesky factorisation.
+#: Convexity numbers tried with overlapping shells, and with Cholesky factorisation.
 CROWDED = (0.9, 0.99, 0.999, 0.9999)
 
-#: The part of the room between neighbours that fitted shells share out by size.
+#: Weight of the contact radii in the sizes of fitted shells; the rest is half the distances.
 FITTED = 0.9
 
-
-#: Radii of shells that may overlap over the least that would do without overlap.
+#: Radii of overlapping shells over the smallest radii that suffice without overlap.
 WIDTHS = (2.0, 4.0, 8.0)
 
-#: How far beyond their radii boxes of those that touch end, all others fixed open: relatively,
-#: for radii to thirty digits, to all digits, and for rough ones.
+#: Relative distance of the ends of a box from the radii, if all asperities that do not touch are
+#: fixed open: for radii to thirty digits, for float64 numbers, and for rough ones.
 LEEWAY = (1e-12, 1e-6, 1e-2)
 
-#: Box, convexity number and shells of an argument.
+#: The box, the convexity number and the shells of an argument.
 Reason = tuple[Array, float, Array | None]
 
 
 class Argument(NamedTuple):
-    """On the box 0 <= a <= box the Hessian is at least 1 - convexity_number of its local part.
+    """Claim: for 0 <= a <= box the Hessian is at least 1 - convexity_number of its local part.
 
-    box     : (n,) [length] 0 of those that are fixed open
-    shells  : (n,) [length] radii of spheres that overlap little, or None: by Cholesky
-    ceiling : above all (A P)_i [length], for a bound on the approach; None where it is prescribed
+    box     : (n,) [length] 0 for asperities that are fixed open
+    shells  : (n,) [length] radii of spheres that overlap little; None for a Cholesky factorisation
+    ceiling : [length] a number above all (A P)_i, for a bound on the approach; None if prescribed
     """
 
     box: Array
@@ -59,7 +58,7 @@ class Argument(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrialState:
-    """Contact radii (n,) [length] near a solution, and the approach or the load over E*."""
+    """Contact radii (n,) [length] near a solution, and the prescribed approach or load over E*."""
 
     scene: Scene
     radii: Array
@@ -75,7 +74,7 @@ class TrialState:
 
     @cached_property
     def loads(self) -> Array:
-        """(n,) loads over E*, of the right total."""
+        """(n,) loads over E*, scaled to the prescribed total."""
         loads: Array = 4 * self.radii**3 / (3 * self.scene.relative_radii)
         return loads if self.load is None else loads * (self.load / loads.sum())
 
@@ -85,12 +84,12 @@ class TrialState:
 
     @cached_property
     def pushed(self) -> Array:
-        """(n,) [length] A P."""
+        """(n,) [length] displacements A P by the loads on other asperities."""
         return (1 / self.apart) @ self.loads / np.pi
 
     @cached_property
     def best_approach(self) -> float:
-        """Prescribed, or the one that fits the touching asperities best."""
+        """[length] the prescribed approach, or that which fits the touching asperities best."""
         if self.approach is not None:
             return self.approach
         wanted = self.local + self.pushed - self.scene.offsets
@@ -98,7 +97,7 @@ class TrialState:
 
     @cached_property
     def ceiling(self) -> tuple[float | None, float]:
-        """What `Argument.ceiling` is, and the bound on the approach of every solution from it."""
+        """`Argument.ceiling`, and the bound on the approach of every solution that follows."""
         if self.approach is not None:
             return None, self.approach
         loaded = self.loads > 0
@@ -112,7 +111,7 @@ class TrialState:
         return float(best), bound - drop + ROUNDING * (bound + abs(drop))
 
     def arguments(self) -> Iterator[Argument]:
-        """The most general first; those that fail already in floating point are left out."""
+        """The arguments that hold in floating point, the most general first."""
         top = self.ceiling[0]
         for argument in self._tried():
             yield Argument(*argument, top)
@@ -131,13 +130,13 @@ class TrialState:
             yield from self._crowded(box)
 
     def _room(self, box: Array) -> Array:
-        """(n,) [length] half the distances to the nearest of the box, 0 outside it."""
+        """(n,) [length] half the distances to the nearest asperity in the box; 0 for others."""
         able = box > 0
         nearest = self.apart[able].min(axis=0, initial=4 * box.max(initial=0.0))
         return np.where(able, nearest / 2, 0.0)
 
     def _box(self, beyond: float, least: float) -> Array:
-        """(n,) [length] radii that hold every solution; 0 where none can touch."""
+        """(n,) [length] upper bounds on the radii of every solution; 0 where none can touch."""
         R, offsets = self.scene.relative_radii, self.scene.offsets
         deepest = self.ceiling[1] + offsets
         size = np.abs(offsets) + abs(self.ceiling[1])
@@ -147,7 +146,7 @@ class TrialState:
         return box
 
     def _crowded(self, box: Array) -> Iterator[Reason]:
-        """By shells that overlap, or else by Cholesky."""
+        """Arguments by overlapping shells, or else by Cholesky factorisation."""
         able = np.flatnonzero(box)
         apart = self.apart[np.ix_(able, able)]
         for number in CROWDED:
@@ -173,7 +172,7 @@ class TrialState:
             return
 
     def _fitted(self, room: Array) -> Array:
-        """Shells by size: s = 0.9 a / c + 0.1 room, with c the largest (a_i + a_j) / r_ij."""
+        """(n,) shells s = 0.9 a / c + 0.1 room, with the largest (a_i + a_j) / r_ij as c."""
         able = np.flatnonzero(room)
         a = self.radii[able]
         crowding = float(((a[:, None] + a) / self.apart[np.ix_(able, able)]).max(initial=0.0))
@@ -182,7 +181,7 @@ class TrialState:
         return np.where(room > 0, FITTED * self.radii / crowding + (1 - FITTED) * room, 0.0)
 
     def _local(self, box: Array, shells: Array) -> Iterator[Reason]:
-        """A box that ends half-way between these radii and where convexity ends."""
+        """Arguments on a box that ends half-way between these radii and the end of convexity."""
         end = np.pi / 2 * shells
         number = float((self.radii[box > 0] / end[box > 0]).max(initial=0.0))
         if number < 1:

@@ -1,4 +1,4 @@
-"""Write down which asperities touch and slide, and why, for a checker that believes nothing."""
+"""`prove`: proofs of contacts and friction states, for a checker that trusts no computed number."""
 
 from __future__ import annotations
 
@@ -28,16 +28,17 @@ from convexrough.sphere import hertz
 
 
 class ShearedState(Protocol):
-    """A friction state on first loading, such as `convexrough.shear` returns."""
+    """A friction state after first loading, such as `convexrough.shear` returns."""
 
     @property
     def force(self) -> float: ...
 
 
 class NearState(NamedTuple):
-    """Loads near a solution, to any number of digits, in the order of the scene's asperities.
+    """Loads near a solution, with any number of digits.
 
-    loads : n of them [force];  approach : [length], None where it is not known better than loads
+    loads : (n,) [force] in the order of the scene's asperities
+    approach : [length]; None to compute it from the loads
     """
 
     loads: Sequence[Fraction]
@@ -45,12 +46,12 @@ class NearState(NamedTuple):
 
     @classmethod
     def given(cls, loads: Array) -> NearState:
-        """Loads (n,) [force] as they are."""
+        """The state with these loads (n,) [force]."""
         return cls(list(map(Fraction, loads.tolist())), None)
 
     @classmethod
     def of(cls, level: Level, n: int) -> NearState:
-        """Those of a level, in a scene of n asperities."""
+        """The state of a level, for a scene of n asperities."""
         found, units = [Fraction(0)] * n, level.problem.units
         if level.trial is None:
             return cls(found, None)
@@ -63,17 +64,20 @@ class NearState(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Proof(Record):
-    """Words for all asperities, with bounds on every load, gap, shear force, slip and loss.
+    """A checked proof: statuses of all asperities, and bounds on loads, gaps, forces and losses.
 
-    document : what the file holds (docs/theory/proof-file.md)
-    proved   : the same in words, as the checker says it
+    document : contents of the proof file (docs/theory/proof-file.md)
+    proved   : summary in words, as the checker prints it
     """
 
     document: dict[str, Any]
     proved: str
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the file that `convexrough check` and `python checker.py` read, or none."""
+        """Write the file that `convexrough check` and `python checker.py` read.
+
+        path : file name; if writing fails an existing file remains unchanged
+        """
         with replacing(Path(path)) as temporary:
             temporary.write_text(json.dumps(self.document, indent=0) + "\n", encoding="utf-8")
 
@@ -86,18 +90,18 @@ def prove(
     load: float | None = None,
     sheared: Sequence[tuple[float, NearState]] = (),
 ) -> Proof:
-    """A proof of the solution near these loads, wherever they came from.
+    """A proof of the solution near given loads, which may come from any source.
 
-    loads : (n,) [force] not negative, in the order of the scene's asperities, or to more digits
-    approach [length] or load [force] : what is prescribed, exactly one
-    sheared : shear forces Q [force] of states to prove, too, with the loss of the cycle from -Q to
-        Q; and what is near the solution at the load P - Q / f
+    loads : (n,) [force] not negative, in the order of the scene's asperities; or a `NearState`
+    approach, load : [length], [force]; exactly one is prescribed
+    sheared : friction states to prove with the loss of their cycles from -Q to Q, as pairs of the
+        shear force Q [force] and loads near the solution at the load P - Q / f
 
-    The bounds are those that the checker computes in exact arithmetic, so proving takes as long as
-    checking does: a minute for 3,000 asperities.
+    The checker computes the bounds in exact arithmetic, so proving takes as long as checking:
+    about a minute for 3,000 asperities.
 
-    Raises InputError for bad values and for scenes too large for the checker; ProofError where no
-    solution is proved near these loads: they are too inaccurate, or too crowded.
+    Raises InputError for invalid values and for scenes too large for the checker; ProofError if no
+    solution is proved, because the loads are too inaccurate or the contacts overlap too much.
     """
     checks.exactly_one("approach", approach, "load", load)
     refuse_many(scene)
@@ -138,7 +142,7 @@ def refuse_many(scene: Scene) -> None:
 
 
 def _document(trial: TrialState, prescribed: dict[str, Any]) -> dict[str, Any]:
-    """The file, without what is said of the solution as yet."""
+    """The contents of the file, with the scene only."""
     scene = trial.scene
     x, y = scene.asperities.positions.T
     given = {
@@ -167,7 +171,7 @@ def _document(trial: TrialState, prescribed: dict[str, Any]) -> dict[str, Any]:
 def _place(
     trial: TrialState, document: dict[str, Any], near: NearState, approach: float | None
 ) -> dict[str, Any]:
-    """Contact radii to thirty digits, and the approach."""
+    """The entry of the file for a state: contact radii to thirty digits, and the approach."""
     scene = checker.read_scene(document["scene"])
     radii = [
         _cube_root(load * R * Fraction(3, 4) / scene.modulus)
@@ -180,19 +184,19 @@ def _place(
 
 
 def _cube_root(x: Fraction) -> Fraction:
-    """To some thirty digits."""
+    """The cube root to about thirty digits."""
     near = Fraction(math.cbrt(x))
     return near + (x - near**3) / (3 * near**2) if near else near
 
 
 def _digits(x: Fraction) -> list[str]:
-    """As a sum of float64 numbers, two or one."""
+    """A number as a list of one or two float64 numbers in hexadecimal, which are its sum."""
     high, low = Pair.nearest(x)
     return [high.hex(), low.hex()] if low else [high.hex()]
 
 
 def _written(value: Any) -> Any:
-    """As JSON: float64 in hexadecimal, intervals as two of them, rounded outwards."""
+    """A value as JSON: float64 in hexadecimal, intervals as pairs rounded outwards."""
     if value is None or isinstance(value, str):
         return value
     if isinstance(value, dict):
@@ -205,7 +209,7 @@ def _written(value: Any) -> Any:
 
 
 def _beyond(bound: Fraction, end: float) -> str:
-    """The nearest float64 on the side of `end`."""
+    """The nearest float64 on the side of `end`, in hexadecimal."""
     value = float(bound)
     if (Fraction(value) - bound) * int(math.copysign(1, end)) < 0:
         value = math.nextafter(value, end)

@@ -26,11 +26,11 @@ from convexrough.scene.patterns import (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Asperities(Record):
-    """Spherical asperities on the half-space, in the caller's order.
+    """Spherical asperities on a half-space, in the order of the given positions.
 
-    positions : (n, 2) [length]  summits; the axis of the sphere is the origin
-    tip_radii : (n,) [length]    one number stands for all
-    heights   : (n,) [length]    offset of each summit, positive is taller; one number for all
+    positions : (n, 2) [length] x and y of the summits; the axis of the sphere is at (0, 0)
+    tip_radii : (n,) [length] radii of the tips, or one number for all
+    heights   : (n,) [length] heights of the summits, or one number for all; positive is taller
 
     >>> asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     >>> len(asperities)
@@ -47,7 +47,7 @@ class Asperities(Record):
         points = _points(positions)
         object.__setattr__(self, "positions", points)
         self._wear(tip_radii, heights)
-        self.layout  # noqa: B018, which refuses two at one place
+        self.layout  # noqa: B018, refuses two asperities at one place
 
     def _wear(self, tip_radii: ArrayLike, heights: ArrayLike) -> None:
         n, least = len(self), checks.SMALLEST
@@ -59,8 +59,7 @@ class Asperities(Record):
     def with_tips(self, tip_radii: ArrayLike, heights: ArrayLike = 0.0) -> Asperities:
         """Asperities with other tips at the same positions; arguments as for `Asperities`.
 
-        Data that depend only on the positions, such as lattice and distances, are computed once and
-        shared by many scenes.
+        Both share data that depend only on the positions, such as lattice and distances.
 
         >>> array = scene.asperities
         >>> rougher = array.with_tips(0.02, heights=1e-6 * np.sin(np.arange(61)))
@@ -72,9 +71,9 @@ class Asperities(Record):
     def roughened(
         self, *, height_std: float = 0.0, tip_radius_cv: float = 0.0, seed: int | None = None
     ) -> Asperities:
-        """These asperities with random heights and tip radii, distributed as in `hexagonal`.
+        """These asperities with random heights and tip radii; arguments as for `hexagonal`.
 
-        Many random surfaces share the data of their positions, as with `with_tips`.
+        Both share data that depend only on the positions, as with `with_tips`.
 
         >>> regular = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
         >>> rough = [regular.roughened(height_std=1e-6, seed=seed) for seed in range(3)]
@@ -111,7 +110,7 @@ class Asperities(Record):
 
     @property
     def lattice(self) -> Lattice | None:
-        """The lattice of the summits, each on a different site, or None."""
+        """The lattice on which all summits lie; None without one."""
         return self.layout.lattice
 
     @property
@@ -130,17 +129,18 @@ class Asperities(Record):
         tip_radius_cv: float = 0.0,
         seed: int | None = None,
     ) -> Asperities:
-        """A triangular lattice of six nearest neighbours, one asperity on the axis.
+        """Asperities on a hexagonal lattice (six nearest neighbours), with one on the axis.
 
-        spacing       : distance of nearest neighbours [length]
-        tip_radius    : a number, or one per asperity in the order of the result [length]
-        within        : keep the asperities at most this far from the axis [length]
-        height_std    : standard deviation of normal random heights [length]
-        tip_radius_cv : coefficient of variation of lognormal tip radii of mean `tip_radius`
-        seed          : required when heights or radii are random
+        spacing       : [length] distance of nearest neighbours
+        tip_radius    : [length] a number, or one per asperity in the order of the result
+        within        : [length] largest distance of asperities from the axis
+        height_std    : [length] standard deviation of heights, which are normal random numbers
+        tip_radius_cv : coefficient of variation of tip radii, which are lognormal random numbers
+            with the mean `tip_radius`
+        seed          : of the random numbers; required with height_std or tip_radius_cv
 
-        Asperities are ordered by distance from the axis, then by angle. A larger `within`
-        appends asperities and does not change the others, nor their random heights and radii.
+        Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
+        asperities and does not change the others, nor their random heights and radii.
         """
         rough = (height_std, tip_radius_cv, seed)
         return cls._lattice(HEXAGONAL, spacing, tip_radius, within, *rough)
@@ -156,7 +156,7 @@ class Asperities(Record):
         tip_radius_cv: float = 0.0,
         seed: int | None = None,
     ) -> Asperities:
-        """A square lattice, one asperity on the axis; arguments as for `hexagonal`."""
+        """Asperities on a square lattice, with one on the axis; arguments as for `hexagonal`."""
         rough = (height_std, tip_radius_cv, seed)
         return cls._lattice(SQUARE, spacing, tip_radius, within, *rough)
 
@@ -183,7 +183,7 @@ class Asperities(Record):
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
-    """The largest tip radius that `hexagonal` and `square` can draw [length]."""
+    """[length] the largest random tip radius that `hexagonal` and `square` can produce."""
     width = np.sqrt(np.log1p(tip_radius_cv**2))
     return float(np.max(tip_radius) * np.exp(CUT_DEVIATIONS * width - width**2 / 2))
 

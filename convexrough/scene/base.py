@@ -1,7 +1,7 @@
 """The shape of the body that is pressed on asperities: sphere, ellipsoid, cylinder or flat.
 
-It is the paraboloid x^2 / (2 Rx) + y^2 / (2 Ry) about the axis. A sphere has one radius R, of which
-inf is a flat; an ellipsoid the pair (Rx, Ry), of which one is inf for a cylinder.
+It is the paraboloid x^2 / (2 Rx) + y^2 / (2 Ry) about the axis. A sphere has one radius R, a flat
+base R = inf. An ellipsoid has a pair (Rx, Ry); for a cylinder one of them is inf.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from typing import Any, TypeAlias
 from convexrough import checks
 from convexrough.errors import InputError
 
-#: R of a sphere, or (Rx, Ry) where they differ.
+#: R of a sphere or flat, or (Rx, Ry) of another base.
 Radius: TypeAlias = float | tuple[float, float]
 
 
 def checked(radius: Any) -> Radius:
-    """The radius of a sphere, or of a flat, inf; the pair of any other."""
+    """The radius, checked; a pair of equal radii becomes one number."""
     if not isinstance(radius, (tuple, list)):
         return _length("sphere_radius", radius)
     if len(radius) != 2:
@@ -28,14 +28,14 @@ def checked(radius: Any) -> Radius:
 
 
 def along(radius: Radius) -> tuple[float, float]:
-    """Rx and Ry."""
+    """The radii Rx and Ry."""
     return radius if isinstance(radius, tuple) else (radius, radius)
 
 
 def curved(radius: Radius) -> list[tuple[float, slice]]:
-    """Each finite radius, and the axes (0 is x, 1 is y) along which the base has it.
+    """The finite radii R, each with the axes (0 is x, 1 is y) along which the base has it.
 
-    So its height is the sum of |the part of r along these axes|^2 / (2 R) over them.
+    The drop of the base at r is the sum of |part of r along these axes|^2 / (2 R) over them.
     """
     parts = [(R, slice(i, i + 1)) for i, R in enumerate(along(radius))]
     if not isinstance(radius, tuple):
@@ -53,12 +53,12 @@ def named(radius: Radius) -> str:
 
 
 def sphere_radius(radius: Radius, what: str) -> float:
-    """R of a sphere; raises InputError for other bases."""
+    """The radius of a sphere. Raises InputError for other bases."""
     if isinstance(radius, tuple) or not curved(radius):
         raise InputError(what, found=named(radius), expected="a scene whose base is a sphere")
     return radius
 
 
 def _length(what: str, value: Any) -> float:
-    """A positive number, or inf."""
+    """A radius, checked to be positive; it may be inf."""
     return math.inf if value == math.inf else checks.positive(what, value)

@@ -1,4 +1,4 @@
-"""Points on a lattice: found from the points alone, whatever made them."""
+"""The lattice of points, found from their coordinates."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from convexrough.checks import SMALLEST
 
 Sites = NDArray[Any]  # of whole numbers
 
-#: Points may differ from a lattice by this many roundoffs of the largest coordinate: a few more
-#: than computing them in float64 loses.
+#: Points may differ from the sites of a lattice by this part of the largest coordinate, a little
+#: more than rounding of coordinates computed in float64.
 SITE_ERROR = 32 * 2.0**-53
 
-#: ... and of the shortest distance between sites by this part: the bounds on products count it.
+#: They may also differ by at most this part of the spacing; error bounds of products include it.
 CLOSEST = 1e-7
 
-#: Sites closer to each other than this part of the largest coordinate are not counted in integers.
+#: Lattices with a spacing below this part of the largest coordinate are not used.
 FINEST = 1e-12
 
-#: A lattice is of use where its sites are at most so many times the points: a heuristic, for speed.
+#: Lattices with more than so many sites per point are not used: a heuristic, for speed.
 SPARSEST = 50
 
 
 @dataclass(frozen=True, eq=False)
 class Lattice(Cached):
-    """The points origin + i b1 + j b2, i and j whole numbers.
+    """The sites origin + i b1 + j b2 with whole numbers i and j.
 
-    basis   : (2, 2) [length] rows b1 and b2, reduced to rounding
-    site_error : [length] bound on the distance of each coordinate of the points from its site
-    shrink  : by which it is smaller than one whose basis float64 holds exactly, `unshrunk`
+    origin  : (2,) [length];  basis : (2, 2) [length] rows b1 and b2, reduced up to rounding
+    site_error : [length] bound on the difference of each coordinate of the points from its site
+    shrink, unshrunk : the exact basis is shrink * unshrunk; None without `shrunk`
     """
 
     origin: Array
@@ -45,7 +45,7 @@ class Lattice(Cached):
     unshrunk: Array | None = None
 
     def shrunk(self, factor: Fraction) -> Lattice:
-        """Of points nearer to 0 by a factor, also where they are rounded a few times."""
+        """The lattice of the points times a factor, rounded up to a few times."""
         assert self.unshrunk is None
         times = float(factor)
         site_error = 2.0 * times * self.site_error
@@ -53,33 +53,33 @@ class Lattice(Cached):
 
     @property
     def exactly(self) -> list[list[Fraction]]:
-        """`basis`, not rounded."""
+        """The basis without rounding."""
         given = self.basis if self.unshrunk is None else self.unshrunk
         return [[self.shrink * Fraction(x) for x in row] for row in given.tolist()]
 
     @property
     def spacing(self) -> float:
-        """[length] the shortest distance between two sites: on a reduced basis, one of these."""
+        """[length] the shortest distance between two sites."""
         a, b = self.basis
         return float(min(np.hypot(*vector) for vector in (a, b, a + b, a - b)))
 
     @classmethod
     def through(cls, points: Array) -> Lattice | None:
-        """The lattice that these points (n, 2) lie on to rounding, each on a site of its own.
+        """The lattice on which these points (n, 2) lie, up to rounding, each on a different site.
 
-        None also where sites are too near to each other for float64 to hold their interaction.
+        The result is None without such a lattice, or if its spacing is too small for float64.
         """
         anchor = points[np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1))]
         basis, reach = _shortest(points - anchor), float(np.abs(points).max())
         if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):
             return None
         sites = _nearest_sites(points - anchor, basis)
-        # Fit origin and basis to all points; around the middle, where they do not disturb another.
+        # Fit origin and basis to all points, relative to their middle: this decouples both.
         middle = np.rint(sites.mean(axis=0))
         away = np.column_stack((np.ones(len(points)), sites - middle))
         fitted = np.zeros((3, 2))
         try:
-            for _ in range(2):  # the second time for what rounding left
+            for _ in range(2):  # the second time reduces rounding errors
                 missing = points - anchor - away @ fitted
                 fitted += np.linalg.solve(away.T @ away, away.T @ missing)
         except np.linalg.LinAlgError:
@@ -92,7 +92,7 @@ class Lattice(Cached):
         return found
 
     def sites(self, points: Array) -> Sites | None:
-        """(n, 2) i and j of points on the lattice; None if one is not."""
+        """(n, 2) i and j of the points; None if one of them is not on the lattice."""
         sites = _nearest_sites(points - self.origin, self.basis)
         off = np.abs(points - self.origin - sites @ self.basis).max(initial=0.0)
         reach = np.abs(points).max(initial=0.0)
@@ -106,7 +106,8 @@ def _nearest_sites(points: Array, basis: Array) -> Sites:
 def _shortest(points: Array) -> Array | None:
     """The two shortest vectors (2, 2) between points near the origin; None if all are on a line.
 
-    Of points on a lattice, of which not too many are missing, its reduced basis (Lagrange, Gauss).
+    For points on a lattice with not too many sites missing this is its reduced basis (Lagrange and
+    Gauss).
     """
     squares = (points**2).sum(axis=1)
     few = min(len(points), 64)
@@ -132,7 +133,7 @@ def _shortest(points: Array) -> Array | None:
 
 
 def _crowded(sites: Sites) -> bool:
-    """Two points on one site, or far too many sites for the points."""
+    """True if two points are on one site, or if there are far more sites than points."""
     low = sites.min(axis=0)
     rows, columns = (sites.max(axis=0) - low + 1).tolist()
     if rows * columns > SPARSEST * len(sites) + 1000:

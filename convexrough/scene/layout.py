@@ -14,20 +14,20 @@ from convexrough.scene.lattice import Lattice, Sites
 from convexrough.scene.neighbours import refuse_coincident
 from convexrough.scene.patterns import Pattern
 
-#: Of more asperities than this, a lattice is looked for before the nearest neighbours of all.
+#: For more asperities than this a lattice is searched before nearest neighbours are computed.
 MANY = 5000
 
 
-#: Coordinates of points made on a lattice may differ from sites by this part of the largest: three
-#: roundoffs in making them, and what `Lattice.sites` loses and allows for when it looks.
+#: Coordinates of points made on a lattice may differ from its sites by this part of the largest:
+#: three roundoffs of making them, and the rounding in `Lattice.sites`.
 MADE_SITE_ERROR = 16 * 2.0**-53
 
 
 @dataclass(frozen=True, eq=False)
 class Layout(Cached):
-    """Distinct points (n, 2) [length] in the plane; asperities of one layout share all of this.
+    """Distinct points (n, 2) [length] in the plane, with data that depend only on them.
 
-    made : the lattice that they were made on, and i and j (n, 2) of each; None to look for one
+    made : the lattice on which they were made, and their i and j (n, 2); None to search for one
     """
 
     points: Array
@@ -39,7 +39,7 @@ class Layout(Cached):
 
     @classmethod
     def of(cls, pattern: Pattern, spacing: float, limit: float) -> Layout:
-        """All sites of a pattern whose norm is at most the limit, made this far apart [length]."""
+        """The sites of a pattern with norms up to a limit, scaled to a spacing [length]."""
         sites, order = pattern.within(limit)
         points = spacing * np.stack(pattern.coordinates(*sites.T), axis=1)
         if len(points) < 3:
@@ -53,26 +53,26 @@ class Layout(Cached):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """The lattice of the points, each on a different site, or None."""
+        """The lattice on which all points lie, each on a different site; None without one."""
         return Lattice.through(self.points) if self.made is None else self.made[0]
 
     @cached_property
     def sites(self) -> Sites | None:
-        """(n, 2) i and j of each point on the lattice."""
+        """(n, 2) i and j of each point on the lattice; None without one."""
         if self.made is not None:
             return self.made[1]
         return None if self.lattice is None else self.lattice.sites(self.points)
 
     @cached_property
     def order(self) -> Indices | None:
-        """(n,) that sorts the points by i and then by j: as transforms go through them."""
+        """(n,) indices that sort the points by i and then by j, the order of Fourier transforms."""
         if self.sites is None:
             return None
         i, j = (self.sites - self.sites.min(axis=0)).T
         return np.argsort(i * (int(j.max()) + np.int64(1)) + j)
 
     def sorted(self, wanted: NDArray[np.bool_]) -> Indices:
-        """The points that are wanted (n,): of many on a lattice in the `order` of its sites."""
+        """The indices where `wanted` (n,) is true; of many points on a lattice, in its `order`."""
         if len(self.points) <= MANY or self.order is None:
             return wanted.nonzero()[0]
         return self.order[wanted[self.order]]

@@ -12,12 +12,12 @@ from convexrough.errors import InputError
 class Material:
     """The material of both bodies; `pair` combines two different materials.
 
-    contact_modulus : E*, 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2  [force / length^2]
-    poisson_ratio   : nu, from 0 to 0.5; of a pair the mean, weighted with 1 / G
-    hardness        : mean pressure at which asperities yield [force / length^2], if known; used
-        for a warning only
-    mismatch        : Dundurs' beta of a pair, 0 for one material: the coupling of normal and
-        tangential displacements, which is neglected
+    contact_modulus : [force / length^2] E*, 1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2
+    poisson_ratio   : nu, from 0 to 0.5; for a pair the mean weighted with 1 / G
+    hardness        : [force / length^2] mean pressure at which asperities yield, if known; only
+        used for a warning
+    mismatch        : Dundurs' beta of a pair, 0 for equal materials. It measures the coupling of
+        normal and tangential displacements, which is neglected
 
     >>> steel = cr.Material.from_youngs(210e9, 0.3)
     >>> print(f"{steel.contact_modulus:.4g}")
@@ -53,18 +53,23 @@ class Material:
     def from_youngs(
         cls, modulus: float, poisson_ratio: float, hardness: float | None = None
     ) -> Material:
-        """Both bodies of Young's modulus E: E* = E / (2 (1 - nu^2))."""
+        """The material if both bodies have the same elastic constants: E* = E / (2 (1 - nu^2)).
+
+        modulus : [force / length^2] Young's modulus E;  hardness : as in `Material`
+        """
         modulus = checks.positive("youngs_modulus", modulus)
         ratio = checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5)
         return cls(modulus / (2.0 * (1.0 - ratio**2)), ratio, hardness)
 
     @classmethod
     def pair(cls, sphere: Material, base: Material) -> Material:
-        """Two bodies, each given as for two of its kind; the hardness is that of the softer.
+        """The material of two bodies of different materials.
 
-        Normal and tangential compliances, of asperities and between them, are those of two like
-        bodies with 2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, but for the
-        coupling of the two by Dundurs' beta (docs/theory/bodies.md).
+        sphere, base : material of each body, as `from_youngs` returns it
+
+        Normal and tangential compliances are those of two equal bodies with
+        2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, without the coupling by
+        Dundurs' beta (docs/theory/bodies.md). The hardness is that of the softer body.
 
         >>> steel = cr.Material.from_youngs(210e9, 0.3)
         >>> both = cr.Material.pair(steel, base=cr.Material.from_youngs(70e9, 0.33))
@@ -78,7 +83,7 @@ class Material:
         (G, nu), (H, mu) = ((each.shear_modulus, each.poisson_ratio) for each in (sphere, base))
         softer = [body.hardness for body in (sphere, base) if body.hardness is not None]
         modulus, other = sphere.contact_modulus, base.contact_modulus
-        part = G / (G + H)  # of 1 / H in 1 / G + 1 / H
+        part = G / (G + H)  # (1 / H) / (1 / G + 1 / H)
         coupled = ((1.0 - part) * (1.0 - 2.0 * nu) - part * (1.0 - 2.0 * mu)) / 2.0
         return cls(
             modulus * (2.0 * other / (modulus + other)),  # exact where both are the same
@@ -89,10 +94,10 @@ class Material:
 
     @property
     def youngs_modulus(self) -> float:
-        """E = 2 (1 - nu^2) E*, of two like bodies in its place  [force / length^2]."""
+        """[force / length^2] E = 2 (1 - nu^2) E*, of two equal bodies with this E* and nu."""
         return 2.0 * (1.0 - self.poisson_ratio**2) * self.contact_modulus
 
     @property
     def shear_modulus(self) -> float:
-        """G = E / (2 (1 + nu)) = (1 - nu) E*, 2 / G = 1 / G_1 + 1 / G_2  [force / length^2]."""
+        """[force / length^2] G = E / (2 (1 + nu)) = (1 - nu) E*; 2 / G = 1 / G_1 + 1 / G_2."""
         return (1.0 - self.poisson_ratio) * self.contact_modulus

@@ -1,4 +1,4 @@
-"""Nearest neighbours of points anywhere, by a k-d tree."""
+"""Nearest neighbours of points, by a k-d tree."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from convexrough.arrays import Array
 from convexrough.checks import SIZED, SMALLEST
 from convexrough.errors import InputError
 
-#: Asperities looked at together: between two batches fewer pairs come to be worth a look. A
-#: heuristic, for speed only.
+#: Number of asperities per batch in `crowding`; each batch may reduce the pairs of the next. A
+#: heuristic, for speed.
 BATCH = 256
 
 
 def separations(points: Array, point_error: float = 0.0) -> Array:
-    """(n,) [length] distances to the nearest neighbour, less what errors of the points can hide."""
+    """(n,) [length] lower bounds on the distances to the nearest neighbour.
+
+    point_error : [length] bound on the error of each coordinate
+    """
     if len(points) < 2:
         return np.full(len(points), np.inf)
     return np.maximum(nearest_distances(points) - 3.0 * point_error, 0.0)
@@ -23,7 +26,7 @@ def separations(points: Array, point_error: float = 0.0) -> Array:
 def crowding(points: Array, radii: Array) -> float:
     """The largest (a_i + a_j) / r_ij over all pairs.
 
-    Each asperity with those smaller and near enough to beat the nearest neighbours.
+    The search takes neighbours j with a_j <= a_i that are near enough to exceed the value so far.
     """
     from scipy.spatial import cKDTree
 
@@ -48,7 +51,7 @@ def crowding(points: Array, radii: Array) -> float:
 
 
 def refuse_coincident(points: Array) -> None:
-    """Two asperities at one place have no finite interaction; of two too near, none in float64."""
+    """Raise InputError if two asperities coincide, or are too near to each other for float64."""
     if len(points) < 2:
         return
     distances = nearest_distances(points)
@@ -65,7 +68,7 @@ def refuse_coincident(points: Array) -> None:
 
 
 def nearest_distances(points: Array) -> Array:
-    """(n,) [length] distance of each point to its nearest neighbour; by a k-d tree."""
+    """(n,) [length] distance of each point to its nearest neighbour."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     return np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]

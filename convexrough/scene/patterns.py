@@ -1,4 +1,4 @@
-"""Sites of regular patterns, and random numbers that more sites leave as they were."""
+"""Sites of regular patterns, and random numbers that do not change when sites are added."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 
-#: Random heights and log radii are normal, cut at this many standard deviations (a chance of
-#: 2e-9 per asperity), so that "every asperity that could touch" is a finite set.
+#: Random heights and log radii are normal, clipped at this many standard deviations (with a
+#: probability of 2e-9 per asperity), so that only a finite set of asperities can touch.
 CUT_DEVIATIONS = 6.0
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """Sites i b1 + j b2 of a lattice whose shortest distance is 1: the norm is |i b1 + j b2|^2.
+    """The sites i b1 + j b2 of a lattice with the spacing 1.
 
-    skew   : the norm is i^2 + skew i j + j^2
+    skew   : the norm |i b1 + j b2|^2 is i^2 + skew i j + j^2
     second : b2; b1 is (1, 0)
     """
 
@@ -33,12 +33,12 @@ class Pattern:
 
     @property
     def density(self) -> float:
-        """Sites in a unit of area."""
+        """The number of sites per unit area."""
         return 1.0 / self.second[1]
 
     def within(self, limit: float) -> tuple[NDArray[np.int32], Indices]:
-        """(n, 2) i and j of the sites of norms up to a limit, by norm and then by angle; and the
-        order (n,) that sorts them by i and then by j."""
+        """(n, 2) i and j of the sites with norms up to a limit, ordered by norm and then by angle;
+        and (n,) indices that sort them by i and then by j."""
         top = int(np.sqrt(limit / (1.0 - self.skew**2 / 4.0))) + 1
         steps = np.arange(-top, top + 1)
         norms = np.add.outer(steps * steps, steps * steps)
@@ -47,18 +47,18 @@ class Pattern:
         taken = norms <= limit
         i, j = (each - top for each in np.nonzero(taken))
         x, y = self.coordinates(i, j)
-        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # below 1, which is between two norms
+        turns = np.arctan2(y, x) % (2 * np.pi) / 7.0  # below 1, the least difference of norms
         order = np.argsort(norms[taken] + turns)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         return np.stack((i[order], j[order]), axis=1).astype(np.int32), back
 
     def coordinates(self, i: NDArray[Any], j: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """x and y of i b1 + j b2."""
+        """The coordinates x and y of i b1 + j b2."""
         return i + self.second[0] * j, self.second[1] * j
 
 
-#: Six nearest neighbours, and four.
+#: The patterns with six and with four nearest neighbours.
 HEXAGONAL = Pattern(1, (0.5, float(np.sqrt(0.75))))
 SQUARE = Pattern(0, (0.0, 1.0))
 
@@ -71,6 +71,6 @@ def checked_seed(seed: int | None) -> int:
 
 
 def cut_normal(count: int, seed: int, *, stream: int) -> Array:
-    """Standard normal numbers; heights and radii have a stream each, so one leaves the other."""
+    """Standard normal numbers, clipped. Heights and radii use independent streams."""
     numbers = np.random.default_rng([seed, stream]).standard_normal(count)
     return np.clip(numbers, -CUT_DEVIATIONS, CUT_DEVIATIONS)

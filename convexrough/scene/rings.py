@@ -1,4 +1,4 @@
-"""Asperities in rings about the axis of the sphere, and how a few of many are chosen."""
+"""Rings of asperities about the axis of the sphere, and evenly chosen items of a sequence."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices
 
-#: Distances that differ by less than this, relative to the largest, are one.
+#: Distances that differ by less than this, relative to the largest, count as equal.
 SAME = 1e-9
 
 Item = TypeVar("Item")
 
 
 def rings(distances: Array, loads: Array) -> list[Indices]:
-    """The loaded asperities, in groups at the same distance from the axis; outwards."""
+    """The loaded asperities, grouped by distance from the axis, the innermost group first."""
     touching = np.flatnonzero(loads)
     order = np.argsort(distances[touching], kind="stable")
     outwards = distances[touching[order]]
@@ -25,11 +25,11 @@ def rings(distances: Array, loads: Array) -> list[Indices]:
 
 
 def one_of_each_ring(distances: Array, loads: Array, most: int) -> list[int]:
-    """The first asperity of each ring, of at most so many rings."""
+    """The first asperity of each ring, for at most `most` evenly chosen rings."""
     return [int(ring[0]) for ring in evenly_chosen(rings(distances, loads), most)]
 
 
 def evenly_chosen(items: Sequence[Item], most: int) -> list[Item]:
-    """All the items, or of more than `most` so many; the first and the last are kept."""
+    """At most `most` of the items, evenly chosen, with the first and the last."""
     places = np.linspace(0, len(items) - 1, min(most, len(items))).astype(int)
     return [items[i] for i in places]

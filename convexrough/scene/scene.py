@@ -28,11 +28,11 @@ Geometry = Literal["summit", "closest"]
 class Scene(Record):
     """A sphere, the asperities on which it is pressed, and the material of both.
 
-    sphere_radius : R [length]; inf of a flat base, a pair (Rx, Ry) of an ellipsoid whose axes are
-                    those of x and y, of which one is inf for a cylinder
-    friction      : Coulomb's coefficient f; only the shear stages need it
-    geometry      : "closest" (an asperity meets the sphere where the two undeformed paraboloids
-                    are closest) or "summit" (at its summit, as in the source paper)
+    sphere_radius : [length] R of a sphere; inf for a flat base; a pair (Rx, Ry) for an ellipsoid
+        with axes along x and y, one of them inf for a cylinder
+    friction      : Coulomb's coefficient f; required only for shear
+    geometry      : position of each contact: "closest" (where the two undeformed paraboloids are
+        closest) or "summit" (at the summit of the asperity, as in the source paper)
 
     >>> asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     >>> material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
@@ -65,12 +65,12 @@ class Scene(Record):
 
     @property
     def curved(self) -> list[tuple[float, slice]]:
-        """Each finite radius of the base [length], and the axes (0 is x) along which it is that."""
+        """Each finite radius [length] of the base, with the axes (0 is x, 1 is y) that have it."""
         return base.curved(self.sphere_radius)
 
     @property
     def curvature(self) -> float:
-        """[1 / length] of the base: 1/R, or the mean (1/Rx + 1/Ry) / 2."""
+        """[1 / length] curvature of the base: 1/R, or the mean (1/Rx + 1/Ry) / 2."""
         Rx, Ry = base.along(self.sphere_radius)
         return (1.0 / Rx + 1.0 / Ry) / 2.0
 
@@ -82,7 +82,7 @@ class Scene(Record):
 
     @cached_property
     def relative_radii(self) -> Array:
-        """(n,) [length]  1/R_i = 1/R + 1/rho_i, with the mean `curvature` for 1/R."""
+        """(n,) [length] R_i with 1/R_i = 1/R + 1/rho_i, tip radii rho_i and the `curvature` 1/R."""
 
         def relative(rho: Array) -> Array:
             return frozen(1.0 / (self.curvature + 1.0 / rho))
@@ -91,9 +91,9 @@ class Scene(Record):
 
     @cached_property
     def contact_points(self) -> Array:
-        """(n, 2) [length] where each asperity would first touch.
+        """(n, 2) [length] the point at which each asperity first touches.
 
-        The summit itself, or in the "closest" geometry r_i R / (R + rho_i), along each axis.
+        It is the summit r_i, or r_i R / (R + rho_i) along each axis in the geometry "closest".
         """
         if self.geometry == "summit" or not self.curved:
             return self.asperities.positions
@@ -103,17 +103,14 @@ class Scene(Record):
         return frozen(points)
 
     def far_radii(self, radius: float) -> Array:
-        """(n,) [length] for a radius of the base: R, or R + rho_i in the "closest" geometry."""
+        """(n,) [length] R, or R + rho_i in the geometry "closest", for a radius R of the base."""
         if self.geometry == "summit":
             return even(radius, len(self))
         return frozen(radius + self.asperities.tip_radii)
 
     @cached_property
     def contact_tails(self) -> Array | None:
-        """(n, 2) [length] what `contact_points` lack; with it they are known as pairs, to 2^-96.
-
-        None where they lack nothing.
-        """
+        """(n, 2) [length] rounding errors of `contact_points`, to 2^-96 of these; None if exact."""
         points = self.asperities.positions
         if self.contact_points is points:
             return None
@@ -127,7 +124,7 @@ class Scene(Record):
 
     @cached_property
     def lattice(self) -> Lattice | None:
-        """The lattice of the contact points, if it is that of the summits, scaled; or None."""
+        """The lattice of the contact points if it is that of the summits, scaled; else None."""
         lattice, radii = self.asperities.lattice, self.asperities.tip_radii
         if self.contact_points is self.asperities.positions or lattice is None:
             return lattice
@@ -147,8 +144,8 @@ class Scene(Record):
     def drops(self) -> Array:
         """(n,) [length] drop of the base below its height on the axis.
 
-        r_i^2 / (2 R), or in the "closest" geometry r_i^2 / (2 (R + rho_i)); x and y with a radius
-        each where the base has two.
+        It is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in the geometry "closest". For a base with
+        two radii it is the sum of such terms in x and y.
         """
         squares, drops = self.asperities.positions**2, np.zeros(len(self))
         for R, axes in self.curved:
@@ -157,7 +154,7 @@ class Scene(Record):
 
     @property
     def offsets(self) -> Array:
-        """(n,) [length]  d_i = z_i - drop_i: prescribed approach of each asperity, less D0."""
+        """(n,) [length] offsets d_i = z_i - drop_i, the approach of each asperity less D0."""
         return frozen(self.asperities.heights - self.drops)
 
     @property
@@ -166,10 +163,9 @@ class Scene(Record):
         return frozen(6 * 2.0**-53 * (np.abs(self.asperities.heights) + self.drops))
 
     def reach(self, approach: float) -> float:
-        """Distance from the axis beyond which none of these asperities' kind could touch [length].
+        """[length] distance from the axis beyond which no such asperity can touch.
 
-        Where even the tallest height and the largest tip radius give a prescribed approach of 0;
-        infinite on a flat base and on a cylinder.
+        It is computed for the largest height and tip radius; inf on a flat base or a cylinder.
         """
         return reach(
             approach,
@@ -188,9 +184,9 @@ def reach(
     height: float,
     geometry: Geometry,
 ) -> float:
-    """Distance r at which D0 + z = r^2 / (2 R)  (closest: r^2 / (2 (R + rho)))  [length].
+    """[length] distance r at which D0 + z = r^2 / (2 R)  (closest: r^2 / (2 (R + rho))).
 
-    With the larger R where there are two.
+    If the base has two radii, R is the larger one.
     """
     radius = max(base.along(sphere_radius)) + (tip_radius if geometry == "closest" else 0.0)
     depth = approach + height

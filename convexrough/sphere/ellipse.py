@@ -1,8 +1,8 @@
 """A smooth ellipsoid on a half-space: Hertz's ellipse of contact, by Carlson's integrals.
 
 The pressure p0 sqrt(1 - x^2/a^2 - y^2/b^2) moves the surface under it by p0 a b / (2 E*) times the
-integral over w > 0 of (1 - x^2/(a^2 + w) - y^2/(b^2 + w)) / sqrt((a^2 + w)(b^2 + w) w). That has to
-be delta - x^2/(2 Rx) - y^2/(2 Ry); with p0 a b = 3 P / (2 pi) it is, if
+integral over w > 0 of (1 - x^2/(a^2 + w) - y^2/(b^2 + w)) / sqrt((a^2 + w)(b^2 + w) w). This must
+equal delta - x^2/(2 Rx) - y^2/(2 Ry). With p0 a b = 3 P / (2 pi) it does if
 
     1/Rx = (P / (pi E*)) R_D(0, b^2, a^2),     1/Ry = (P / (pi E*)) R_D(0, a^2, b^2),
     delta = (3 P / (2 pi E*)) R_F(0, a^2, b^2).
@@ -16,7 +16,7 @@ import math
 
 
 def slenderness(ratio: float) -> float:
-    """b / a <= 1 of the ellipse whose radii are in this ratio, Rx / Ry >= 1."""
+    """b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1."""
     from scipy.optimize import brentq
     from scipy.special import elliprd
 
@@ -31,7 +31,7 @@ def slenderness(ratio: float) -> float:
 def semi_axes(
     load: float, contact_modulus: float, radii: tuple[float, float]
 ) -> tuple[float, float]:
-    """a along x and b along y [length]."""
+    """[length] a along x and b along y."""
     from scipy.special import elliprd
 
     largest = max(radii)
@@ -41,7 +41,7 @@ def semi_axes(
 
 
 def approach(load: float, contact_modulus: float, axes: tuple[float, float]) -> float:
-    """delta [length], of two deep points, one in each body."""
+    """[length] delta, the approach of distant points of the two bodies."""
     from scipy.special import elliprf
 
     a, b = axes

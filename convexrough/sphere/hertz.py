@@ -1,7 +1,7 @@
 """One sphere on an elastically similar half-space: Hertz's law and its relatives.
 
-Scalars or arrays alike; any consistent units. E* is the contact modulus, R the relative radius.
-Displacements are those of two deep points, one in each body, towards each other.
+Arguments are scalars or arrays in consistent units. E* is the contact modulus, R the relative
+radius. Indentations are the approach of distant points of the two bodies.
 Source: Johnson, Contact Mechanics (1985), chapters 3 and 4.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from convexrough.arrays import Number
 
-#: Of the series (x - sin x) / x^3 in -x^2, the last first.
+#: Coefficients of the series of (x - sin x) / x^3 in -x^2, the last first.
 LESS_SINE = tuple(1.0 / factorial(m) for m in range(19, 1, -2))
 
 
@@ -28,7 +28,7 @@ def indentation(load: Number, coefficient: Number) -> Number:
 
 
 def load(indentation: Number, coefficient: Number) -> Number:
-    """P = (max(delta, 0) / k)^(3/2): a sphere that is pulled away carries nothing."""
+    """P = (max(delta, 0) / k)^(3/2); 0 for a separated sphere."""
     ratio = np.maximum(indentation, 0.0) / coefficient
     return ratio * np.sqrt(ratio)
 
@@ -39,7 +39,7 @@ def contact_radius(load: Number, contact_modulus: Number, radius: Number) -> Num
 
 
 def _cube_root(value: Number) -> Number:
-    """Of eight times a number it is twice as large to the last bit, on every machine."""
+    """The cube root; for eight times a number exactly twice as large, on every machine."""
     mantissa, exponent = np.frexp(value)
     thirds, rest = np.divmod(exponent, 3)
     return np.ldexp(np.cbrt(np.ldexp(mantissa, rest)), thirds)
@@ -57,10 +57,11 @@ def pressure(distance: Number, contact_radius: Number, peak_pressure: Number) ->
 
 
 def surface_displacement(distance: Number, contact_radius: Number, radius: Number) -> Number:
-    """Normal displacement of both surfaces at a distance r from the axis.
+    """Normal displacement of both surfaces at a distance r from the axis (Johnson, 3.42).
 
-    a^2/R - r^2/(2R) inside the contact and (1/(pi R)) [(2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)]
-    outside (Johnson, 3.42), which is r^2 (sin 2s / 2 - s cos 2s) / (pi R) with s = asin(a/r).
+    It is a^2/R - r^2/(2R) inside the contact. Outside it is
+    (1/(pi R)) [(2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)], which equals
+    r^2 (sin 2s / 2 - s cos 2s) / (pi R) with s = asin(a/r).
     """
     a, r = contact_radius, np.asarray(distance, dtype=np.float64)
     outer = np.maximum(r, a)
@@ -70,7 +71,7 @@ def surface_displacement(distance: Number, contact_radius: Number, radius: Numbe
 
 
 def less_sine(angle: Number) -> Number:
-    """x - sin(x), by its series for small x."""
+    """x - sin(x), from its series for x < 1."""
     small = np.square(np.minimum(angle, 1.0))
     series = LESS_SINE[0]
     for coefficient in LESS_SINE[1:]:

@@ -1,11 +1,11 @@
 """`smooth`: closed forms of the equivalent smooth sphere, for comparison with a rough contact.
 
-The sphere of a scene on the same material without asperities, under the same load: Hertz's contact,
-and Cattaneo, Mindlin and Deresiewicz's under shear. With t = Q / (f P), P the load, f the friction,
-c_t Mindlin's ratio and delta the approach, all displacements are c_t f delta times functions of t
-alone: those of `convexrough.sphere.mindlin`.
+The smooth sphere is the base of a scene without asperities, under the same load: Hertz's contact,
+with the theory of Cattaneo, Mindlin and Deresiewicz under shear. With the load P, friction f,
+t = Q / (f P), Mindlin's ratio c_t and the approach delta, tangential displacements are c_t f delta
+times the functions of t of `convexrough.sphere.mindlin`. All results are for both bodies.
 Source: Johnson, Contact Mechanics (1985), chapters 4 and 7; [12]-[16] of the source paper, which
-gives one body's displacements and losses, where these are both bodies'.
+gives displacements and losses of one body.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from convexrough.sphere import ellipse, hertz, mindlin, surface_shear
 
 
 def smooth(scene: Scene, *, load: float) -> SmoothSphere:
-    """The base of the scene, without asperities, under a normal load P [force].
+    """The base of a scene without asperities, a `SmoothSphere` or `SmoothEllipsoid`.
 
-    A `SmoothEllipsoid` where it is one. Raises InputError where it is flat or a cylinder, on which
-    no load makes a contact of finite size.
+    load : [force] normal load P
+
+    Raises InputError for a flat base or a cylinder, which have no smooth contact of finite size.
 
     >>> print(f"{cr.smooth(scene, load=contact.load).approach:.4g}")  # the rough one's is 5e-5
     4.184e-05
@@ -52,10 +53,10 @@ def smooth_reference(scene: Scene, load: float) -> SmoothSphere | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SmoothSphere(Record):
-    """A smooth sphere under a normal load, and under a shear force at that load.
+    """A smooth sphere under a normal load P, and under shear forces at this load.
 
-    Distances, forces and results are numbers or arrays alike. Whatever is tangential raises
-    InputError where the scene has no friction or a force exceeds f P in size (gross sliding).
+    Methods take numbers or arrays. Tangential results raise InputError if the scene has no friction
+    or a shear force exceeds f P.
 
     >>> whole = cr.smooth(scene, load=contact.load)
     >>> print(f"{whole.contact_radius:.4g}", f"{whole.displacement(0.25 * contact.load):.3g}")
@@ -69,46 +70,46 @@ class SmoothSphere(Record):
 
     @property
     def radius(self) -> float:
-        """R  [length]."""
+        """[length] radius R; for an ellipsoid base see `SmoothEllipsoid.radius`."""
         return self.scene.mean_radius
 
     @cached_property
     def contact_radius(self) -> float:
-        """a_H = (3 P R / (4 E*))^(1/3)  [length]."""
+        """[length] a_H = (3 P R / (4 E*))^(1/3)."""
         return float(hertz.contact_radius(self.load, self._modulus, self.radius))
 
     @cached_property
     def approach(self) -> float:
-        """delta = a_H^2 / R, of two deep points, one in each body [length]."""
+        """[length] delta = a_H^2 / R, the approach of distant points of the two bodies."""
         coefficient = hertz.local_coefficient(self._modulus, self.radius)
         return float(hertz.indentation(self.load, coefficient))
 
     @cached_property
     def peak_pressure(self) -> float:
-        """p0 = 2 E* a_H / (pi R)  [force / length^2]."""
+        """[force / length^2] p0 = 2 E* a_H / (pi R)."""
         return float(hertz.peak_pressure(self.contact_radius, self._modulus, self.radius))
 
     def pressure(self, distance: ArrayLike) -> Any:
-        """p(r) = p0 sqrt(1 - r^2 / a_H^2) at a distance from the axis [force / length^2]."""
+        """[force / length^2] p(r) = p0 sqrt(1 - r^2 / a_H^2) at a distance r from the axis."""
         return hertz.pressure(distance, self.contact_radius, self.peak_pressure)
 
     def normal_displacement(self, distance: ArrayLike) -> Any:
-        """Normal displacement of both surfaces at a distance from the axis [length]."""
+        """[length] normal displacement of both surfaces at a distance [length] from the axis."""
         return hertz.surface_displacement(distance, self.contact_radius, self.radius)
 
     @property
     def largest_force(self) -> float:
-        """f P, where gross sliding begins [force]."""
+        """[force] f P, at which gross sliding begins."""
         return self._friction * self.load
 
     def stick_radius(self, force: ArrayLike) -> Any:
-        """c = a_H (1 - |Q| / (f P))^(1/3)  [length]."""
+        """[length] c = a_H (1 - |Q| / (f P))^(1/3) under a shear force Q [force]."""
         return self.contact_radius * np.cbrt(1.0 - np.abs(self._share("force", force)))
 
     def traction(self, distance: ArrayLike, force: ArrayLike) -> Any:
-        """f p0 sqrt(1 - r^2/a^2) less f p0 (c/a) sqrt(1 - r^2/c^2)  [force / length^2].
+        """[force / length^2] shear traction on first loading, at a distance r from the axis.
 
-        At a distance from the axis, along the shear; on first loading.
+        It is f p0 [sqrt(1 - r^2/a_H^2) - (c/a_H) sqrt(1 - r^2/c^2)], the last root 0 for r > c.
         """
         peak = self._friction * self.peak_pressure
         return surface_shear.traction(
@@ -116,14 +117,15 @@ class SmoothSphere(Record):
         )
 
     def displacement(self, force: ArrayLike) -> Any:
-        """X = (3 (2-nu) f P / (8 G a_H)) [1 - (1 - Q/(f P))^(2/3)]  [length], on first loading."""
+        """[length] X = (3 (2-nu) f P / (8 G a_H)) [1 - (1 - Q/(f P))^(2/3)] on first loading."""
         return self._largest_displacement * mindlin.deflection(self._share("force", force))
 
     def branch(self, force: ArrayLike, turning_force: float) -> Any:
-        """X on the way back from a turning point of first loading, to its mirror image [length].
+        """[length] displacement after first loading to `turning_force` and back to `force`.
 
-        Masing's rule [14]-[15]: X1 - 2 X((Q1 - Q) / 2) for |Q| <= |Q1|, with Q1 the turning force
-        and X(Q) the `displacement` of first loading. A positive Q1 unloads, a negative one reloads.
+        Masing's rule [14]-[15]: X(Q1) - 2 X((Q1 - Q) / 2) for |Q| <= |Q1|, with the turning force
+        Q1 and the `displacement` X(Q) of first loading. A positive Q1 gives the unloading branch of
+        a cycle, a negative one the reloading branch.
         """
         turning = checks.finite("turning_force", turning_force)
         first = self.displacement(turning)
@@ -137,9 +139,10 @@ class SmoothSphere(Record):
         return first - 2.0 * self.displacement((turning - given) / 2.0)
 
     def energy(self, maximum: ArrayLike, minimum: ArrayLike | None = None) -> Any:
-        """Energy lost per steady cycle between two forces, [16] for both bodies [force length].
+        """[force length] energy lost per steady cycle between two shear forces, [16].
 
-        W0 e((maximum - minimum) / (2 f P)); the minimum defaults to the negative of the maximum.
+        It is W0 e((maximum - minimum) / (2 f P)), with the `energy_scale` W0 and the function e of
+        `mindlin.loss`. The minimum defaults to -maximum.
         """
         upper = self._share("maximum", maximum)
         lower = -upper if minimum is None else self._share("minimum", minimum)
@@ -150,12 +153,12 @@ class SmoothSphere(Record):
 
     @property
     def energy_scale(self) -> float:
-        """W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H)  [force length]."""
+        """[force length] W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H)."""
         return 4.8 * self._friction * self.load * self._largest_displacement
 
     @property
     def _largest_displacement(self) -> float:
-        """c_t f delta = 3 (2 - nu) f P / (8 G a_H), at Q = f P  [length]."""
+        """[length] c_t f delta = 3 (2 - nu) f P / (8 G a_H), the displacement at Q = f P."""
         ratio = mindlin.ratio(self.scene.material.poisson_ratio)
         return float(ratio * self._friction * self.approach)
 
@@ -168,19 +171,19 @@ class SmoothSphere(Record):
         return checks.friction(self.scene.friction)
 
     def _share(self, what: str, forces: ArrayLike) -> Array:
-        """t = Q / (f P), in [-1, 1]."""
+        """t = Q / (f P), checked to be in [-1, 1]."""
         forces = checks.bearable(what, forces, self.largest_force)
         return np.clip(forces / self.largest_force, -1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SmoothEllipsoid(SmoothSphere):
-    """A smooth ellipsoid: the same, where the circle of the ellipse's area stands for the ellipse.
+    """A smooth ellipsoid, with results like those of `SmoothSphere`.
 
-    A distance is s sqrt(a b) for a point at s^2 = x^2/a^2 + y^2/b^2, and the stick zone is an
-    ellipse of the same shape. Whatever is tangential rests on the papers' assumption, as that of a
-    rough contact does: c_t, the angular mean, for the ratio of compliances, exact at nu = 0.
-    The normal displacement outside is of spheres alone.
+    Its contact is an ellipse with the semi-axes a, b. The contact radius is sqrt(a b), the distance
+    of a point is s sqrt(a b) with s^2 = x^2/a^2 + y^2/b^2, and the stick zone is an ellipse of the
+    same shape. As in rough contacts, the ratio of tangential to normal compliance is approximated
+    by c_t, its mean over all directions; this is exact at nu = 0.
 
     >>> oval = cr.Scene((1.0, 2.0), scene.asperities, scene.material)
     >>> "{:.4g} {:.4g}".format(*cr.smooth(oval, load=contact.load).semi_axes)
@@ -191,29 +194,29 @@ class SmoothEllipsoid(SmoothSphere):
 
     @property
     def radius(self) -> float:
-        """Of the sphere with the same approach under every load, 9 P^2 / (16 E*^2 delta^3)."""
+        """[length] radius 9 P^2 / (16 E*^2 delta^3) of the sphere with the same approach."""
         return 9.0 * self.load**2 / (16.0 * self._modulus**2 * self.approach**3)
 
     @cached_property
     def semi_axes(self) -> tuple[float, float]:
-        """Of the ellipse of contact, along x and along y [length]."""
+        """[length] semi-axes of the contact ellipse along x and y."""
         return ellipse.semi_axes(self.load, self._modulus, base.along(self.scene.sphere_radius))
 
     @cached_property
     def contact_radius(self) -> float:
-        """sqrt(a b), of the circle of the same area [length]."""
+        """[length] sqrt(a b), the radius of the circle with the same area."""
         return math.sqrt(math.prod(self.semi_axes))
 
     @cached_property
     def approach(self) -> float:
-        """Of two deep points, one in each body [length]."""
+        """[length] approach of distant points of the two bodies."""
         return ellipse.approach(self.load, self._modulus, self.semi_axes)
 
     @cached_property
     def peak_pressure(self) -> float:
-        """p0 = 3 P / (2 pi a b)  [force / length^2]."""
+        """[force / length^2] p0 = 3 P / (2 pi a b)."""
         return 1.5 * self.load / (math.pi * math.prod(self.semi_axes))
 
     def normal_displacement(self, distance: ArrayLike) -> Any:
-        """Not of an ellipsoid: raises InputError."""
+        """Raises InputError: not available for an ellipsoid."""
         base.sphere_radius(self.scene.sphere_radius, "normal_displacement")

@@ -1,13 +1,12 @@
-"""One sphere under a shear force along x: traction and displacement of the surface, anywhere.
+"""One sphere under a shear force along x: traction and tangential displacement of the surface.
 
-Cattaneo and Mindlin: a traction in the shape of Hertz's pressure on the contact disc, less the same
-on the stick disc of radius c = a (1 - |t|)^(1/3), where t = Q / (f P) is the share of friction that
-is used,
+In the theory of Cattaneo and Mindlin, with t = Q / (f P), the contact radius a and the stick radius
+c = a (1 - |t|)^(1/3), the traction is
 
-    q(r) = f p0 [sqrt(1 - r^2/a^2) - (c/a) sqrt(1 - r^2/c^2)].
+    q(r) = f p0 [sqrt(1 - r^2/a^2) - (c/a) sqrt(1 - r^2/c^2)],    the last root 0 for r > c.
 
-Both terms tend to each other as t -> 0. So neither function below subtracts them: each is built on
-1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), which is `mindlin.deflection`, and keeps its relative accuracy.
+Both terms become equal as t -> 0. The functions below do not subtract them, but use
+1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), from `mindlin.deflection`, and so keep their relative accuracy.
 Source: Johnson, Contact Mechanics (1985), chapters 3 and 7.
 """
 
@@ -20,12 +19,12 @@ from convexrough.sphere import hertz, mindlin
 
 
 def traction(distance: Number, contact_radius: Number, share: Number, peak: Number) -> Number:
-    """q(r) on a circle about the centre of the contact, 0 outside; signed as the share.
+    """[force / length^2] q at a distance r from the centre, with the sign of t; 0 for r > a.
 
     share : t, from -1 to 1;  peak : f p0 [force / length^2]
 
-    With A = sqrt(1 - r^2/a^2) and C = sqrt(c^2/a^2 - r^2/a^2), or 0 in the slip annulus:
-    A - C = (A^2 - C^2) / (A + C).
+    It is computed as A - C = (A^2 - C^2) / (A + C), with A = sqrt(1 - r^2/a^2) and
+    C = sqrt(c^2/a^2 - r^2/a^2), or C = 0 in the slip annulus.
     """
     left_by_stick = np.abs(mindlin.deflection(share))  # 1 - c^2/a^2
     ratio = np.divide(distance, contact_radius)
@@ -44,23 +43,23 @@ def surface_displacement(
     shear_modulus: float,
     poisson_ratio: float,
 ) -> Number:
-    """Displacement along x of both surfaces (twice one body's) at (x, y) from the centre [length].
+    """[length] displacement of both surfaces along x, the sum of both bodies, at (x, y).
 
     share : t, from -1 to 1;  peak : f p0 [force / length^2];  shear_modulus : G
 
-    Of q0 sqrt(1 - r^2/a^2), by Johnson 3.91 ([A3] of the source paper, corrected, for both bodies),
+    The traction q0 sqrt(1 - r^2/a^2) moves the surfaces, inside and outside the contact, by
 
         (q0/(4 G a)) {(2 - nu) [pi (a^2 - b^2) + r^2 (sin(2 phi)/2 - phi cos(2 phi))]
-                      + (nu/2) (x^2 - y^2) [phi - sin(4 phi)/4]},   sin(phi) = b/r,  b = min(a, r),
+                      + (nu/2) (x^2 - y^2) [phi - sin(4 phi)/4]},   sin(phi) = b/r,  b = min(a, r)
 
-    inside and outside alike: b = a outside, and phi = pi/2 inside. The stick disc takes away the
-    same with c for a, except in q0/a; the differences of both brackets are formed by the sum rules
-    of sine and cosine from the angle between, phi_a - phi_c, which is known accurately.
+    (Johnson 3.91; [A3] of the source paper, corrected). The stick disc subtracts the same with c in
+    place of a, except in q0/a. The differences of both brackets follow from the accurate angle
+    phi_a - phi_c by the addition theorems of sine and cosine.
     """
     a_squared, r_squared = np.square(contact_radius), np.square(x) + np.square(y)
     slip_area = a_squared * np.abs(
         mindlin.deflection(share)
-    )  # a^2 - c^2; over pi, as all areas here
+    )  # a^2 - c^2, an area over pi like all areas here
     b_area = np.maximum(slip_area - np.maximum(a_squared - r_squared, 0.0), 0.0)  # b_a^2 - b_c^2
 
     sine_a = np.sqrt(np.minimum(a_squared, r_squared))  # r sin(phi_a), and so on

@@ -34,6 +34,9 @@ POSITIVE = ("tip_radius", "area")
 #: Names of columns that number the rows.
 INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "asperity", "")
 
+#: What stands in place of a number that is not known, in small letters.
+HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
+
 #: Mistakes of one file that are shown; the rest are counted.
 MOST_MISTAKES = 10
 
@@ -135,7 +138,7 @@ def read_table(
 
     required, optional, text : what is read, the last as text, and only where it is there
     instead : what is read in place of a required one where the first of these is there
-    also  : other names of columns;  holes : columns in which nan and empty cells are nan
+    also  : other names of columns;  holes : columns in which cells of `HOLES` are nan
     unnamed : what is meant where there is no header, and as many columns
 
     Raises FileError where it cannot be read, and TableError with all that is wrong in it.
@@ -367,7 +370,8 @@ def _numbers(
     numbers = np.full(len(cells), np.nan)
     for i, cell in enumerate(cells):
         number = source.number(cell)
-        if holes and (cell == "" or (number is not None and math.isnan(number))):
+        unknown = str(cell).lower() in HOLES or (number is not None and math.isnan(number))
+        if holes and unknown:
             continue
         place = f"{source.rows[i]}, column {name}"
         try:

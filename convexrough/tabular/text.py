@@ -39,6 +39,8 @@ _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3})
 _SURROGATE = re.compile("[\udc80-\udcff]")
 _WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])]|\s/\s*(?P<per>\S+))")
 _UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
+#: A line between parts of a listing.
+_RULE = re.compile(r"[-=*_]{3,}(\s+[-=*_]{3,})*")
 _BINARY = {
     b"PK\x03\x04": "an archive or an Excel workbook; name it .xlsx",
     b"MATLAB": "a MAT-file; name it .mat",
@@ -149,7 +151,7 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
             separator = inner[-1]
         elif inner.startswith(("#", "%")):
             comment = comment if lines else inner.lstrip("#%")
-        elif inner:
+        elif inner and not _RULE.fullmatch(inner):
             text = text if '"' in text else text.partition("#")[0]
             lines.append((number, text if separator or "\t" in text else text.strip()))
     if not lines:
@@ -175,7 +177,9 @@ def _headed(
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
     headers = [_header(row.text, style) for row in rows[: min(first, SAMPLE)]]
     place = max(range(len(headers)), key=lambda i: (wanted(headers[i]), -i))
-    header, rows = headers[place], rows[place + 1 :]
+    header, line, rows = headers[place], rows[place], rows[place + 1 :]
+    if style.separator == " ":
+        header, rows = _listed(header, line, rows, style)
     below = [cell.strip("[]() ") for cell in rows[0].cells] if rows else []
     units = [each in ("", "-") or parsed(each) is not None for each in below]
     if any(below) and all(units) and len(below) <= len(header):
@@ -183,6 +187,33 @@ def _headed(
                                 for name, each in zip(header, below, strict=False)]  # fmt: skip
         rows = rows[1:]
     return header, rows
+
+
+def _listed(
+    header: list[str], line: TextRow, rows: list[TextRow], style: Style
+) -> tuple[list[str], list[TextRow]]:
+    """A listing of a finite-element code: its header is `line`, which further pages repeat.
+
+    Where there are more names than numbers below, two spaces tell names apart. Titles, which are
+    left out, stand directly below the first header or above another one; they begin with no number
+    and have another number of cells.
+    """
+    first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), 0)
+    width = len(rows[first].cells) if rows else 0
+    apart = re.split(r"\s{2,}", line.text.strip())
+    header = apart if len(apart) == width < len(header) else header
+
+    def title(row: TextRow) -> bool:
+        return len(row.cells) != width and (not row.cells or style.number(row.cells[0]) is None)
+
+    kept = [row for row in rows[:first] if not title(row)]
+    for row in rows[first:]:
+        if row.cells != line.cells:
+            kept.append(row)
+        else:
+            while kept and title(kept[-1]):
+                kept.pop()
+    return header, kept
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, str]]:
@@ -273,7 +304,7 @@ def _header(text: str, style: Style) -> list[str]:
 
 
 def _numeric(cells: Sequence[str], style: Style) -> bool:
-    return all(style.number(cell) is not None for cell in cells if cell)
+    return any(cells) and all(style.number(cell) is not None for cell in cells if cell)
 
 
 def stripped(cells: list[str]) -> list[str]:

@@ -1,30 +1,29 @@
-r"""What is proved of a state of vector friction, whoever found it, in the order of the proof.
+r"""Proved bounds on the errors of a vector friction state from any source, in the proof's order.
 
-Forces q and displacements are in own units; stars mark the state of the true loads P, which are
-balls. Every asperity i that is proved to touch obeys, with its sliding threshold k_i and the rigid
-displacement X,
+Forces q and displacements are in own units. Stars mark the solution for the true loads P, which are
+balls. With the sliding threshold k_i, the rigid displacement X and the kernel B, each asperity i
+that is proved to touch obeys
 
     eta_i = X - (B q)_i,    q_i = q(eta_i),    sum q = T,
 
-where q(eta) is along eta, of length P [1 - (1 - |eta|/k)^(3/2)], or P beyond k; it is the
-gradient of a convex function of eta. All other asperities together bear at most `stray`.
+where q(eta) is parallel to eta, with the length P [1 - (1 - |eta|/k)^(3/2)], or P beyond k. It is
+the gradient of a convex function of eta. All other asperities together carry at most `stray`.
 
-1. The trial. Any eta is the displacement that exactly the forces q(eta) need on the true loads:
-   only the balance v_i = eta_i + (B q(eta))_i - X and the total are missed.
-2. The total. If sum q(eta) misses T by m, some s with |s| <= r makes sum q(eta + s) = T, where
-   r lambda(r) >= m and lambda(r) bounds from below the slope of this sum within r (`_shift`). On
-   the circle |s| = r the convex function less T.s rises outwards, so its minimum is inside.
-3. The residual of q' = q(eta + s), with the displacement X + s, is
-   e_i = |v_i + (B (q' - q))_i| and what `stray` adds. A sliding
-   component is P_i times a unit vector: on its face, with true loads.
-4. The theorem of `convex.theorem`:  || q* - q' ||_H <= || e ||_{H^-1} / mu,  h_i = 2 k_i / (3 P_i).
-5. The displacement. eta*_i = eta_i + w_i + (X* - X) with w_i = -v_i - (B (q* - q))_i.
-   So |X* - X| is an s as in step 2, for sums that w changes.
-6. Statuses. i slides where |eta*_i| > k_i for sure, and does not where |eta*_i| < k_i or where
-   |q*_i| < P_i.
+1. Trial. Any eta and the forces q(eta) obey the local law with the true loads exactly. Not zero are
+   the imbalance v_i = eta_i + (B q(eta))_i - X and m = |sum q(eta) - T|.
+2. Total. Let lambda(r) be a lower bound on the slope of s -> sum q(eta + s) for |s| <= r
+   (`_shift`). If r lambda(r) >= m, then some s with |s| <= r makes sum q(eta + s) = T: on the
+   circle |s| = r the convex function less T.s rises outwards, so its minimum lies inside.
+3. Residual. For q' = q(eta + s) and the displacement X + s the residual is
+   e_i = |v_i + (B (q' - q))_i| plus the effect of `stray`. Where an asperity slides, |q'_i| = P_i.
+4. Theorem (`convex.theorem`):  || q* - q' ||_H <= || e ||_{H^-1} / mu,  h_i = 2 k_i / (3 P_i).
+5. Displacement. eta*_i = eta_i + w_i + (X* - X) with w_i = -v_i - (B (q* - q))_i.
+   So step 2, with sums that include w, bounds |X* - X|.
+6. Statuses. Asperity i is proved to slide if |eta*_i| > k_i within the bounds, and not to slide if
+   |eta*_i| < k_i or |q*_i| < P_i.
 
-The energy E is convex: E(q) - E(q*) <= sum e_i |q_i - q*_i| + X.(sum q - T) of any forces q.
-docs/theory/vector-friction.md has the slopes of step 2, and what is left close to gross sliding.
+The energy E is convex, so E(q) - E(q*) <= sum e_i |q_i - q*_i| + X.(sum q - T) for any forces q.
+docs/theory/vector-friction.md derives lambda of step 2, and a second proof near gross sliding.
 """
 
 from __future__ import annotations
@@ -41,19 +40,19 @@ from convexrough.numbers.balls import Ball, quietly
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
 from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
-#: Radii that are tried for step 2, each so much larger than the one before. Heuristics.
+#: Number of radii tried in step 2, and their ratio. Heuristics.
 TRIALS, WIDER = 24, 1.5
 
-#: Above the rounding of a unit vector, and of a share |eta| / k.
+#: A bound on the rounding of a unit vector, and of |eta| / k.
 ROUNDED = 8 * ROUNDOFF
 
 
 class VectorBounds(NamedTuple):
-    """Proved bounds on a state, in own units; infinite where nothing is proved.
+    """Proved bounds on the errors of a state, in own units; infinite without a proof.
 
-    increments, slips : (n,) |q - q*| and |slip - slip*|;  displacement_error : |X - X*|
-    sliding, partial : (n,) proved to slide, and not to
-    excess : the energy of the forces above the least
+    increments, slips : (n,) on |q - q*| and |slip - slip*|;  displacement_error : on |X - X*|
+    sliding, partial : (n,) true where proved to slide, and proved not to slide
+    excess : on the energy of the forces above the minimum
     """
 
     proved: bool
@@ -66,14 +65,14 @@ class VectorBounds(NamedTuple):
 
     @classmethod
     def unproved(cls, n: int) -> VectorBounds:
-        """Nothing is known of n asperities."""
+        """The bounds for n asperities without any proof."""
         unknown, no = np.full(n, np.inf), np.zeros(n, dtype=bool)
         return cls(False, unknown, unknown, np.inf, no, no)
 
 
 @quietly
 def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """Bounds on a state of which increments, displacement and slips are believed to be nothing.
+    """Bounds on the errors of a state, which may come from any source.
 
     total : (2,) T
     """
@@ -88,12 +87,12 @@ def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> 
 
 
 def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """Steps 1 to 6."""
+    """The bounds by steps 1 to 6."""
     sure, softness = problem.sure, problem.softness
     reach = problem.reach
     limits, thresholds = problem.load_balls, problem.threshold_balls
 
-    # 1. The trial, and by how much it misses the balance and the total.
+    # 1. The trial, its imbalance, and the error of its total.
     eta = state.displacement - problem.couple(state.increments)
     q = _forces(eta, limits, thresholds)
     forces, force_errors = q.value.T, np.hypot(*q.error)
@@ -121,7 +120,7 @@ def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> Ve
     carried = float(np.where(sure, _steepest(problem, size - turned) * turned, 0.0).sum())
     displacement_error = _shift(problem, eta, turned, (missing + carried) * (1 + SAFETY))
 
-    # 6. Words, and bounds for the state as it was given.
+    # 6. Statuses, and bounds for the given state.
     uncertainty = (turned + displacement_error) * (1 + SAFETY) + ROUNDED * size
     distances = np.fmin(distances, _steepest(problem, size - uncertainty) * uncertainty) * (
         1 + SAFETY
@@ -131,7 +130,7 @@ def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> Ve
     partial = sure & ((size + uncertainty < thresholds.lower) | bears_more)
     increments = distances + force_errors + np.hypot(*(forces - state.increments).T) * (1 + SAFETY)
     increments = np.where(sure, increments, problem.most + np.hypot(*state.increments.T))
-    # What a vector has beyond a disc changes by no more than the vector and the radius do.
+    # eta less its projection onto the disc |eta| <= k changes by at most the changes of eta and k.
     slips = along(np.maximum(size - thresholds.value, 0.0), eta, size)
     slip_errors = np.hypot(*(slips - state.slips).T) + uncertainty + thresholds.error
     slip_errors = np.where(partial, np.hypot(*state.slips.T), np.where(sure, slip_errors, np.inf))
@@ -146,9 +145,9 @@ def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> Ve
 
 
 def _forces(eta: Array, limits: Ball, thresholds: Ball) -> Ball:
-    """(2, n) q(eta):  with z the positive part of 1 - |eta|/k,
+    """(2, n) q(eta), without cancellation: with the positive part z of 1 - |eta|/k,
 
-    P/k [1 + z / (1 + z^(1/2))] eta  up to the threshold, and P eta/|eta| beyond: nothing cancels.
+    P/k [1 + z / (1 + z^(1/2))] eta  up to the threshold, and P eta/|eta| beyond.
     """
     exact = Ball.exact(np.ascontiguousarray(eta.T))
     squares = exact * exact
@@ -158,7 +157,7 @@ def _forces(eta: Array, limits: Ball, thresholds: Ball) -> Ball:
 
 
 def _slopes(scale: Array, share: Array) -> tuple[Array, Array]:
-    """(n,) the eigenvalues of dq/deta along eta and across, which fall as |eta| grows.
+    """(n,) the eigenvalues of dq/deta along and across eta; they fall as |eta| grows.
 
     scale : P/k;  share : |eta|/k
     """
@@ -168,18 +167,19 @@ def _slopes(scale: Array, share: Array) -> tuple[Array, Array]:
 
 
 def _steepest(problem: VectorProblem, size: Array) -> Array:
-    """(n,) upper bounds on the slopes of q at displacements no shorter than this."""
+    """(n,) upper bounds on the slopes of q where |eta| is at least `size`."""
     share = np.fmax(size, 0.0) / problem.threshold_balls.upper * (1.0 - ROUNDED)
     _, across = _slopes(problem.load_balls.upper / problem.threshold_balls.lower, share)
     return np.asarray(np.where(problem.sure, across * (1 + SAFETY), 0.0))
 
 
 def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) -> float:
-    """The r of step 2, where each eta_i is anywhere within turned_i; infinite if none is found.
+    """The r of step 2 if each eta_i may change by up to turned_i; infinite if none is found.
 
-    In a direction z the slope of q_i is at least radial + (across - radial) sin^2 of the angle
-    between z and eta_i, at the longest eta_i. All together, by Minkowski's inequality, with sines
-    with errors theta_i:  lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
+    Along a unit vector z the slope of q_i is at least radial + d sin^2 of the angle between z and
+    eta_i, with d = across - radial at the longest eta_i. Let `least` be the smallest sum of d sin^2
+    over all z, and theta_i bounds on the errors of the sines. By Minkowski's inequality
+    lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
     """
     size = np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:
@@ -212,9 +212,10 @@ def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) ->
 
 
 def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Array) -> float:
-    """Bound on E(q) - E(q*), of forces within friction to rounding; infinite if X is.
+    """A bound on E(q) - E(q*) for forces within friction, up to rounding; infinite if X is.
 
-    e_i is the distance of X - (B q)_i from the deflection of q_i, or from the ray of those of q_i.
+    e_i is the distance of X - (B q)_i from the deflection of q_i; where |q_i| = P_i, from the ray
+    of all eta with these forces.
     """
     q, X = state.increments, state.displacement
     if not np.isfinite(X).all() or problem.margin == 0.0:
@@ -225,7 +226,7 @@ def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Arr
     along_q = (eta * along(np.ones(len(q)), q, length)).sum(axis=1)
     nearest = np.where(size < problem.loads, own, np.maximum(along_q, own))
     off = np.hypot(*(eta - along(nearest, q, length)).T)
-    # One roundoff of a size near P changes the deflection by far more than one.
+    # Near |q| = P one roundoff of |q| changes the deflection by many.
     steep = problem.deflections(np.minimum(size * (1 + ROUNDED), problem.loads)) - own
     sums = own + problem.influence.matrix @ size + float(np.hypot(*X))
     off = off + steep + (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * sums
@@ -235,7 +236,7 @@ def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Arr
 
 
 def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
-    """What either of two proofs says."""
+    """The better of two proofs, for each bound."""
     return VectorBounds(
         found.proved or other.proved,
         np.fmin(found.increments, other.increments),
@@ -247,11 +248,11 @@ def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
 
 
 def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """docs/theory/vector-friction.md, "Close to gross sliding".
+    """The bounds near gross sliding: docs/theory/vector-friction.md, "Close to gross sliding".
 
-    The sum of P_i - q_i.t is at most `unused`. So each q is within (2 P unused)^(1/2) of P t, all
-    together in the same sense; then X.t is no less than what it is at any asperity, and a sliding
-    force that is turned costs friction.
+    t is the unit vector along T, and the sum of P_i - q_i.t is at most `unused`. So
+    |q_i - P_i t| <= (2 P_i unused)^(1/2), and the lower bounds on X.t from single asperities hold
+    for all. Sliding forces that turn away from t would need more friction than is left.
     """
     sure, reach, unproved = problem.sure, problem.reach, VectorBounds.unproved(len(problem))
     P, thresholds = np.where(sure, problem.loads, 0.0), problem.threshold_balls
@@ -267,7 +268,7 @@ def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> V
     errors = np.where(sure, problem.errors, problem.most) + turned + 2 * ROUNDED * P
     errors = errors + np.hypot(*(state.increments - P[:, None] * t).T)
 
-    # B q by what is known of q: `coupled` at P t, within `uncertainty`.
+    # B q is within `uncertainty` of `coupled`, its value at q = P t.
     coupled, across = problem.couple(P[:, None] * t), np.array([-t[1], t[0]])
     uncertainty = reach @ np.where(sure, problem.errors, 0.0) + np.sqrt(
         2.0 * unused * (reach**2 @ most)
@@ -282,9 +283,9 @@ def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> V
         - uncertainty
     )
     least_displacement = lowest.max(where=sure & (missing < 1), initial=-np.inf)  # of X.t
-    highest = thresholds.upper + uncertainty  # of | X - coupled | where it sticks
+    highest = thresholds.upper + uncertainty  # of | X - coupled | where an asperity sticks
     pushed = least_displacement - coupled @ t > highest * (1 + SAFETY)
-    # Were it to stick, displacements would be small, and forces turned by what differs across t.
+    # If i stuck, |X| would be small, and differences of B q across t would turn the forces.
     weights, side = np.where(sure, least, 0.0), coupled @ across
     mean = float(weights @ side) / float(weights.sum())
     spread = np.sqrt(weights @ (side - mean) ** 2) - np.sqrt(weights @ uncertainty**2)
@@ -292,8 +293,8 @@ def _by_exhaustion(problem: VectorProblem, state: VectorState, total: Ball) -> V
     sliding = sure & (pushed | (spread * (1 - SAFETY) > np.sqrt(2.0 * unused) * longest))
     complete = problem.stray == 0 and bool(sure.all())
     proved = bool(sliding.any()) or complete
-    # Where nothing turns, the only state is its own mirror image: all along t, so that not all
-    # slide below the limit. If all but one do, that one sticks.
+    # Without bias the only state is symmetric, with all forces along t. So below the friction limit
+    # not all asperities slide. If all but one slide, that one sticks.
     straight = problem.bias == 0.0 and problem.margin > 0 and unused < float(least.min())
     below = float(left.lower) > AT_THE_END * ROUNDOFF * size
     last = complete and straight and below and int(sliding.sum()) == len(P) - 1

@@ -1,22 +1,22 @@
 """The friction problem with the full tangential kernel as one second-order cone program.
 
-Let m_i >= |q_i| be the size of force that friction must bear at asperity i, m_i / P_i = 1 - t_i^3,
-and M = B + shift the kernel made semidefinite. With S the share of the shift, the local energy of
-m less shift m^2 / 2 is P_i threshold_i times
+M = B + shift is the kernel with a diagonal that makes it positive semidefinite, S the share of the
+shift in the local stiffness. A variable m_i >= |q_i| bounds the size of each force, and
+m_i / P_i = 1 - t_i^3. The local energy of m less shift m^2 / 2 is P_i threshold_i times
 
     (3/5) t^5 - (S/3) t^6 - (1 - 2S/3) t^3 + 2/5 - S/3,
 
-which does not fall as m grows where S <= 1. So it may be minimised over m_i >= |q_i| together with
-(1/2) q'Mq, convex, under sum q = T: and the powers of t lifted to variables in the cones of
-`convexrough.convex.cones` make that exact, with four per asperity where all S_i <= 21/25 and with
-five where S_i <= 1. The multiplier of the total is the rigid displacement; that of |q_i| <= m_i is
-the slip and the slope of the local energy together.
+which does not fall as m grows if S <= 1. So the sum of these energies and of the convex
+(1/2) q'Mq may be minimised over m_i >= |q_i| and sum q = T. The cones of `convexrough.convex.cones`
+represent the powers of t exactly, with four cones per asperity if all S_i <= 21/25, with five if
+S_i <= 1. The multiplier of the total is the rigid displacement; that of |q_i| <= m_i is the sum of
+the slip and of the slope of the local energy.
 
-Under a small force every t is near 1 and the powers of t are nearly equal: in them the program
-loses all digits. So the same cones are written in u = 1 - t. Each says that a 2 x 2 matrix, of the
-basis 1, t or 1, t^2 times a weight, is semidefinite; the basis 1, u or 1, 1 - t^2 says the same. A
-variable of order u^k is solved for over epsilon_i^k, and q over epsilon_i P_i, where epsilon_i is
-the elastic estimate of |q_i| / P_i, or 1; so the numbers are about 1 under any force.
+Under a small force every t is near 1, and variables for powers of t would lose all digits. So the
+cones use u = 1 - t. Each cone says that a 2 x 2 moment matrix, in the basis 1, t or 1, t^2, is
+semidefinite; the basis 1, u or 1, 1 - t^2 gives an equivalent cone. The solver's variables are
+those of order u^k over epsilon_i^k, and q over epsilon_i P_i, where epsilon_i is the elastic
+estimate of |q_i| / P_i, at most 1. So the numbers are about 1 under any force.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ if TYPE_CHECKING:
 
 
 class _Lift(NamedTuple):
-    """Cones x y >= w^2, forms in the variables of one asperity; each but the first is small.
+    """Cones x y >= w^2 for one asperity, with x, y, w linear in k variables.
 
-    orders : (k,) the power of u that each variable is of; the first is the number 1
-    cones  : (cones, 3, k) the forms x, y, w
-    share  : (k,) the form m / P = 1 - t^3
-    energy : (2, k) the forms whose sum, the second times S, is the local energy
+    orders : (k,) order of each variable in u; the first variable is the number 1
+    cones  : (cones, 3, k) coefficients of x, y, w
+    share  : (k,) coefficients of m / P = 1 - t^3
+    energy : (2, k) coefficients whose sum, the second times S, gives the local energy
     """
 
     orders: Array
@@ -87,15 +87,15 @@ FIVE = _Lift(
 #: x y >= w^2 with x, y >= 0 is the second-order cone  x + y >= || (x - y, 2 w) ||.
 _SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 
-#: Below this part of gross sliding the state is elastic, proportional to T, to more digits than the
-#: cones give. A heuristic: the state at this part is solved for, and scaled.
+#: Below this fraction of gross sliding the state is proportional to T within the solver's accuracy:
+#: the program is solved at this fraction, and the result scaled. A heuristic.
 ELASTIC = 1e-9
 
-#: Accepted residuals, slips included, over accepted energies. A heuristic: at the default both say
-#: the same, as an energy within a part of the least fixes forces to the root of that part.
+#: Accepted residual, including slips, over the accepted relative gap. A heuristic: at the default
+#: gap of 1e-8 energies determine forces to its square root, 1e-4, the accepted residual.
 SLIPS = 1e4
 
-#: Most of the way to the boundary of the cones that a step of Clarabel may go. Short steps are an
+#: Largest part of the way to the boundary of the cones in a step of Clarabel. Short steps are an
 #: order more accurate; a few problems need long ones. Heuristics, tried one after the other.
 STEPS = (0.9, 0.99)
 
@@ -104,9 +104,9 @@ STEPS = (0.9, 0.99)
 class FrictionConic:
     """Settings of the cone program for `shear_vector`, through Clarabel.
 
-    tolerance : of Clarabel: duality gap and feasibility. Its status is not relied on
-    accepted  : an answer is accepted if its energy is proved to be within this of the least,
-        relatively, and its `residual`, slips included, is at most 1e4 times this; else SolverError
+    tolerance : tolerance of Clarabel for duality gap and feasibility. Its status is not used
+    accepted  : largest relative `duality_gap` of the result; its `residual` may be 1e4 times this.
+        Otherwise `solve` raises SolverError
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionConic())
     >>> state.residual < 1e-5
@@ -145,15 +145,12 @@ class FrictionConic:
 
 @dataclass(frozen=True, eq=False)
 class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
-    """The program, with its numbers about 1.
+    """The cone program, scaled so that its numbers are about 1.
 
-    The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., and then the lifts, each
-    asperity's together.
+    The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., and then those of the cones,
+    asperity by asperity.
 
-    total  : (2,) T
-    lift   : its cones
-    small  : (n,) epsilon
-    energy : what the energy is counted in
+    total  : (2,) T;  lift : the cones;  small : (n,) epsilon;  energy : the unit of energy
     """
 
     problem: VectorProblem
@@ -164,7 +161,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
 
     @classmethod
     def assemble(cls, problem: VectorProblem, total: Array) -> FrictionProgram:
-        """Raises SolverError, with the asperities, where S is above the range of the cones."""
+        """The program for a total (2,). Raises SolverError if S exceeds the range of the cones."""
         shares = problem.shift.shares
         if shares.max() > FIVE_CONES_LIMIT:
             raise _too_dense(problem)
@@ -176,7 +173,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
 
     @property
     def force(self) -> float:
-        """What the total is counted in."""
+        """The unit of the total."""
         return float(np.hypot(*self.total))
 
     def apply(self) -> ConeProgram:
@@ -185,7 +182,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return ConeProgram(*self._objective(), self._constraints(rows), constant, equalities=2)
 
     def _objective(self) -> tuple[csc_matrix, Array]:
-        """(1/2) q'Mq in q / (epsilon P), and the local energy in the lifts."""
+        """The quadratic and linear part: (1/2) q'Mq, and the local energies."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
@@ -201,7 +198,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return sparse.csc_matrix(sparse.block_diag((upper, nothing))), linear
 
     def _constraints(self, rows: Array) -> csc_matrix:
-        """sum q = T, counted in |T|, and then the cones of every asperity."""
+        """Rows of sum q = T over |T|, and then of the cones of every asperity."""
         from scipy import sparse
 
         n, _, variables = rows.shape
@@ -218,9 +215,9 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return constraints
 
     def _rows(self) -> Array:
-        """(n, rows, k) the cones of every asperity, three rows each:  m / P >= |(x, y)|  first.
+        """(n, rows, k) the rows of the cones of every asperity,  m / P >= |(x, y)|  first.
 
-        Each form is counted in the power of epsilon that it is of.
+        Each row is divided by the power of epsilon of its order.
         """
         lift, small = self.lift, self.small[:, None]
         leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
@@ -232,10 +229,10 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return np.concatenate((friction, rows), axis=1)
 
     def invert(self, raw: RawAnswer) -> VectorState:
-        """Forces, rigid displacement and slips from the answer and its multipliers.
+        """Forces, rigid displacement and slips from the solver's result and its multipliers.
 
-        An interior point leaves an asperity that slides a little short of P, and one that does not
-        a little slip: of the two, the larger part of its threshold is taken.
+        An interior point has |q_i| < P_i and a slip > 0 at every asperity. The asperity slides if
+        the slip exceeds the difference of its deflection from the threshold.
         """
         problem = self.problem
         n, P, thresholds = len(problem), problem.loads, problem.thresholds

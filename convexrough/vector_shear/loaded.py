@@ -1,8 +1,8 @@
-"""The loaded asperities of a contact: Mindlin's law of each, and how well their loads are known.
+"""The loaded asperities of a contact: Mindlin's law of each, and bounds on their loads.
 
-With increments u of the loads P that asperities hold in friction, the displacement that asperity i
-must take up is eta_i = threshold_i deflection(u_i / P_i); it slides beyond threshold_i = k P^(2/3).
-Forces are in f times the unit of loads, displacements in c_t f times the unit of lengths.
+An asperity with the load P and the shear force u has the deflection
+eta = threshold deflection(u / P), and slides beyond threshold = k P^(2/3). Shear forces are in
+units of f times the unit of loads, displacements of c_t f times the unit of lengths.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import annulus
 
-#: Below this part of P the state is elastic, proportional to the force, to all digits.
+#: Below this fraction of P the state is proportional to the force to all digits.
 ELASTIC = Fraction(1, 10**15)
 
 
@@ -35,15 +35,15 @@ ELASTIC = Fraction(1, 10**15)
 class Loaded:
     """n loaded asperities of a contact. Arrays are (n,), in own units.
 
-    scope    : of the contact's certificate, "none" where nothing is proved
+    scope    : scope of the contact's certificate; "none" without a proof
     touching : their indices in the scene
     loads, errors : P, and bounds on its errors;  thresholds : k P^(2/3)
-    influence : A among them;  shells : added to the diagonal of A they make it semidefinite
-    sure     : proved to touch
+    influence : operator A;  shells : added to its diagonal they make it positive semidefinite
+    sure     : true where proved to touch
     load_balls, threshold_balls : P and k P^(2/3) as balls where sure, 0 and 1 elsewhere
-    softness : the most of 3 P / (2 k P^(2/3)) where sure, 0 elsewhere
-    stray    : most that all asperities that are neither sure nor open carry together
-    stray_effect : most that this moves each of the others, were it a normal load
+    softness : upper bound on 3 P / (2 k P^(2/3)) where sure, 0 elsewhere
+    stray    : bound on the total load of all asperities that are neither sure nor proved open
+    stray_effect : bound on the displacement of any asperity by this load
     """
 
     levels: FrictionLevels
@@ -65,7 +65,7 @@ class Loaded:
 
     @classmethod
     def of(cls, contact: Contact) -> Self:
-        """Those of a contact, which keeps them; InputError where the scene has no friction."""
+        """The loaded asperities of a contact, cached. Raises InputError without friction."""
         return contact.cached(cls._assemble)
 
     @classmethod
@@ -110,12 +110,12 @@ class Loaded:
 
     @property
     def force_unit(self) -> float:
-        """What increments are shear forces in [force]."""
+        """[force] the unit of shear forces."""
         return float(self.levels.force_unit.value)
 
     @property
     def travel_unit(self) -> float:
-        """What tangential displacements are counted in [length]."""
+        """[length] the unit of tangential displacements."""
         return float(self.levels.travel_unit.value)
 
     @property
@@ -124,7 +124,7 @@ class Loaded:
         return (self.loads + self.errors) * (1 + SAFETY)
 
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
-        """(n,) u and eta of the scalar law under T [force]."""
+        """(n,) u and eta of `shear`, with the scalar kernel, under T [force]."""
         if height < ELASTIC * self.levels.load:
             shares = self.elastic.value * float(height / Fraction(self.units.force))
             return shares, shares / self.stiffest
@@ -133,19 +133,19 @@ class Loaded:
         return u.value[self.places], eta.value[self.places]
 
     def increments(self, deflections: Array) -> Array:
-        """u(eta), saturated at P."""
+        """(n,) the shear forces u of these deflections, P beyond the threshold."""
         u: Array = self.loads * annulus.force(annulus.width_at(deflections / self.thresholds))
         return u
 
     def deflections(self, increments: Array) -> Array:
-        """The local deflection of an asperity that does not slide, of u >= 0."""
+        """(n,) the deflections of these shear forces, 0 <= u <= P."""
         left = (self.loads - increments) / self.loads
         x = annulus.width_between(increments / self.loads, left)
         eta: Array = self.thresholds * annulus.deflection(x)
         return eta
 
     def slopes(self, deflections: Array) -> Array:
-        """c = du/deta, 0 where sliding."""
+        """(n,) c = du/deta, 0 where sliding."""
         c: Array = self.stiffest * (1.0 - annulus.width_at(deflections / self.thresholds))
         return c
 
@@ -157,14 +157,14 @@ class Loaded:
 
     @property
     def places(self) -> Indices:
-        """(n,) their places among the candidates of levels."""
+        """(n,) positions of the loaded asperities among the candidates."""
         return np.searchsorted(self.levels.candidates, self.touching)
 
     @cached_property
     def elastic(self) -> Ball:
-        """(n,) shares of a vanishing T, all sticking: the loads of a small rise of the total."""
+        """(n,) elastic shares of T if all stick: the derivatives of the loads by the total."""
         return self.levels.top.tangent.loads[self.places]
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
-        """(n, ...) values, among zeros for all other asperities of the scene."""
+        """(N, ...) these values, and 0 for all other asperities of the scene."""
         return among_zeros(values, self.touching, len(self.scene))

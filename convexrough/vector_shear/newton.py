@@ -1,17 +1,16 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
-The unknown is eta_i, the displacement vector that asperity i must take up. With the local law
-inverted, q_i = P_i force(|eta_i| / threshold_i) along eta_i, the conditions are the normal map
+The unknown is eta_i, the sum of deflection and slip of asperity i. The shear force
+q_i = P_i force(|eta_i| / threshold_i) is parallel to eta_i, and `convex.newton` solves
 
-    F = eta + B q(eta) - X = 0,    sum q(eta) = T,
+    F = eta + B q(eta) - X = 0,    sum q(eta) = T.
 
-which `convex.newton` solves: no set of sliding asperities is guessed, they are those with |eta_i|
-beyond the threshold. With dq_i/deta_i = W_i W_i' (rank 1 where sliding: the force can still turn) a
-step solves the symmetric system
+Asperities with |eta_i| > threshold_i slide, so no set of them is guessed. With
+dq_i/deta_i = W_i W_i' (of rank 1 where sliding: the force can still turn) a step solves
 
-    (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y,
+    (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y.
 
-the Hessian of the energy scaled by its local part: positive definite in the convex range.
+The matrix is symmetric, and positive definite if the energy is convex.
 """
 
 from __future__ import annotations
@@ -31,10 +30,10 @@ from convexrough.vector_shear.problem import VectorProblem, VectorState, along
 
 @dataclass(frozen=True)
 class FrictionNewton:
-    """Settings of Newton's method for `shear_vector`, from the Ciavarella-Jaeger state.
+    """Settings of Newton's method for `shear_vector`, which starts from the state of `shear`.
 
-    Stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step no longer halves
-    that. Raises SolverError if `max_iterations` steps do not get there.
+    It stops when  max_i |eta_i + (B q)_i - X| <= tolerance |X|  and a further step does not halve
+    this residual. Raises SolverError if this takes more than `max_iterations` steps.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionNewton())
     >>> state.residual < 1e-12
@@ -78,13 +77,13 @@ class _Iterate(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """|X|."""
+        """|X|, the scale of residuals."""
         return float(np.hypot(*self.displacement))
 
 
 @dataclass(frozen=True)
 class _Friction:
-    """The law of vector friction at one total, for `convex.newton`; total : (2,) T."""
+    """The equations of vector friction for one total T (2,), in the form of `convex.newton`."""
 
     problem: VectorProblem
     total: Array
@@ -93,7 +92,7 @@ class _Friction:
     unit: ClassVar[str] = "the displacement"
 
     def evaluate(self, unknown: Array) -> _Iterate | None:
-        """The state at eta, shifted so that forces add up to the total; None where that fails."""
+        """The state at eta, shifted so that forces add up to the total; None if this fails."""
         problem = self.problem
         shifted = _onto_total(problem, unknown, self.total)
         if shifted is None:
@@ -112,7 +111,7 @@ class _Friction:
         return _Iterate(shifted, q, coupling, roots, displacement, defect, residual, energy)
 
     def direction(self, state: _Iterate, left: float) -> Array:
-        """Solved directly: it leaves nothing."""
+        """The Newton step, from a direct solve that needs no tolerance."""
         return _direction(self.problem, state)
 
     def gradient(self, state: _Iterate) -> Array:
@@ -121,14 +120,14 @@ class _Friction:
         return along(bearable, state.unknown, size) + state.coupling - state.displacement
 
     def energy_rounding(self, state: _Iterate) -> float:
-        # Near gross sliding X is large, and then so is what rounding of the total does.
+        # Near gross sliding X is large, and so is the effect of rounding in the total.
         return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
 
     def noise(self, state: _Iterate) -> float:
-        """At least that of X, of which eta and B q are parts; mostly more, which is not known.
+        """A lower bound on the rounding error of F, from that of X.
 
-        Then steps go on until one does not halve the residual. But what is left across X on a
-        symmetric layout can shrink at every step until it vanishes from float64.
+        Usually steps end earlier, when one does not halve the residual. On a symmetric layout the
+        part of F across X can shrink at every step until it underflows; this bound ends the steps.
         """
         return ROUNDOFF * state.scale
 
@@ -137,7 +136,7 @@ class _Friction:
 
 
 def _direction(problem: VectorProblem, state: _Iterate) -> Array:
-    """d(eta); with the shift of the kernel added where the matrix is not positive definite."""
+    """d(eta); the shift of the kernel is added if the matrix is not positive definite."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
     n = len(problem)
@@ -173,7 +172,7 @@ def _direction(problem: VectorProblem, state: _Iterate) -> Array:
 
 
 def _roots(problem: VectorProblem, eta: Array) -> Array:
-    """(n, 2, 2) W: the frame along and across eta_i times the roots of the slopes there."""
+    """(n, 2, 2) W: unit vectors along and across eta_i times the roots of the slopes of q."""
     size = np.hypot(*eta.T)
     radial = problem.slopes(size)
     across = np.where(size > 0, problem.increments(size) / np.where(size > 0, size, 1.0), radial)
@@ -185,10 +184,10 @@ def _roots(problem: VectorProblem, eta: Array) -> Array:
 
 
 def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | None:
-    """eta + s, with the s in the plane that makes the forces add up to the total; or None.
+    """eta + s, with the vector s that makes the forces add up to the total; None if not found.
 
-    s minimises a convex function with the gradient sum q(eta + s) - T: Newton's method, halved
-    while a step overshoots.
+    s minimises a convex function with the gradient sum q(eta + s) - T, by Newton's method with
+    steps halved while they overshoot.
     """
     shift = np.zeros(2)
     excess = problem.local_forces(eta).sum(axis=0) - total
@@ -220,7 +219,7 @@ def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | Non
 
 
 def advice(problem: VectorProblem, total: float) -> str:
-    """What a user might try where no state is found at a total increment."""
+    """Advice for the user if no state is found at this total."""
     place = f"this was at {total / float(problem.loads.sum()):.6g} of gross sliding"
     number = float((problem.shells * problem.stiffest).max())
     if number < 1:

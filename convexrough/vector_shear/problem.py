@@ -1,25 +1,26 @@
-"""The friction problem with the full tangential kernel, as one convex program. Own units.
+"""The friction problem with the full tangential kernel, as one convex program.
 
-A shear force Q on the pressed contact is carried as Q_i = f q_i with vectors |q_i| <= P_i in the
-plane. A tangential point force moves the surface by Cerruti's tensor, here for both bodies,
+The shear force on asperity i is f q_i with a vector |q_i| <= P_i in the plane. A tangential point
+force at j moves the surfaces of both bodies at i by Cerruti's tensor
 
-    C_ij = 1 / (pi G r) [(1 - nu) I + nu d d'],    d the unit vector from j to i, r the distance.
+    C_ij = 1 / (pi G r) [(1 - nu) I + nu d d']
 
-With c_t Mindlin's ratio, A the normal coupling and bias = nu / (2 - nu), that is c_t B_ij with
+with the distance r, the unit vector d from j to i, shear modulus G and Poisson's ratio nu. With
+Mindlin's ratio c_t, the normal influence matrix A and bias = nu / (2 - nu), C_ij = c_t B_ij and
 
     B_ij = A_ij [(1 - bias) I + 2 bias d d'].
 
-The forces minimise a convex energy (times c_t f^2; displacements are times c_t f),
+With energies in units of c_t f^2 and displacements of c_t f, the forces minimise
 
-    sum_i P_i threshold_i potential(|q_i| / P_i) + (1/2) q'Bq   over |q_i| <= P_i, sum q = T = Q/f,
+    sum_i P_i threshold_i potential(|q_i| / P_i) + (1/2) q'Bq   over |q_i| <= P_i, sum q = T = Q/f.
 
-and at the least energy there are a rigid displacement X, the multiplier of the total, and slips,
-the multipliers of |q_i| <= P_i times the direction of q_i, with
+The multiplier of the total is the rigid displacement X. The multiplier of |q_i| <= P_i times the
+direction of q_i is the slip, and
 
     X = own(q_i) + (B q)_i + slip_i,    own(q) = threshold_i deflection(|q| / P_i) q / |q|.
 
-Averaging d d' over all directions leaves B = A: that is Ciavarella and Jaeger's problem. Derived in
-docs/theory/vector-friction.md, "The kernel" and "The program".
+The mean of d d' over all directions is I / 2. It would give B = A, the problem of `shear`
+(Ciavarella and Jaeger): docs/theory/vector-friction.md, "The kernel" and "The program".
 """
 
 from __future__ import annotations
@@ -38,12 +39,12 @@ from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
 from convexrough.sphere import mindlin
 from convexrough.vector_shear.loaded import Loaded
 
-#: Margins of convexity that Cholesky's factorisation is tried with, the best first.
+#: Margins of convexity for which a Cholesky factorisation is tried, the largest first.
 MARGINS = (0.6, 0.3, 0.1, 1e-2, 1e-3)
 
 
 class VectorState(NamedTuple):
-    """A friction state of the n loaded asperities; own units.
+    """A friction state of the n loaded asperities, in own units.
 
     total : (2,) T;  increments : (n, 2) q;  displacement : (2,) X;  slips : (n, 2)
     """
@@ -56,11 +57,10 @@ class VectorState(NamedTuple):
 
 
 class Shift(NamedTuple):
-    """What makes the kernel semidefinite: B + diag(shift_i I) >= 0.
+    """A diagonal that makes the kernel positive semidefinite: B + diag(values_i I) >= 0.
 
-    shares : (n,) S_i, the shift over the least local stiffness; convex where all S_i <= 1
-
-    docs/theory/vector-friction.md, "Convexity".
+    shares : (n,) S_i = values_i / h_i, h_i the least local stiffness; the energy is convex if all
+        S_i <= 1: docs/theory/vector-friction.md, "Convexity"
     """
 
     values: Array
@@ -69,7 +69,7 @@ class Shift(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class VectorProblem(Loaded):
-    """The loaded asperities of a contact, and how tangential forces couple them.
+    """The loaded asperities of a contact, and their coupling by tangential forces.
 
     bias   : nu / (2 - nu)
     kernel : (2n, 2n) B, in the order x_1, y_1, x_2, y_2, ...
@@ -80,7 +80,7 @@ class VectorProblem(Loaded):
 
     @classmethod
     def _assemble(cls, contact: Contact) -> Self:
-        """Raises InputError where it does not fit in memory."""
+        """The problem of a contact. Raises InputError if B does not fit in memory."""
         checks.fits_in_memory("loaded asperities", len(contact.loads.nonzero()[0]), 160, power=2)
         loaded = Loaded.of(contact)
         n = len(loaded)
@@ -110,13 +110,13 @@ class VectorProblem(Loaded):
 
     @property
     def convexity_numbers(self) -> Array:
-        """(n,) a_i / ((pi/2) s_i) of the pressed state, s_i half the distance to the nearest."""
+        """(n,) a_i / ((pi/2) s_i), with s_i half the distance to the nearest loaded asperity."""
         numbers: Array = self.shells / self.stiffness
         return numbers
 
     @property
     def product_error(self) -> float:
-        """The error of (B q)_i as computed is at most this times sum_j A_ij |q_j|."""
+        """Bound on the rounding error of (B q)_i over sum_j A_ij |q_j|."""
         entries = self.influence.entry_error
         return 2.0 * (entries + (2 * len(self) + SUM_ROUNDOFFS) * ROUNDOFF)
 
@@ -126,37 +126,36 @@ class VectorProblem(Loaded):
         return product.reshape(-1, 2)
 
     def own(self, increments: Array) -> Array:
-        """(n, 2) how far each asperity's own force moves it, |q_i| <= P_i."""
+        """(n, 2) the deflection of each asperity by its own force, |q_i| <= P_i."""
         size = self.sizes(increments)
         return along(self.deflections(size), increments, size)
 
     def sizes(self, increments: Array) -> Array:
-        """(n,) |q_i|, and exactly P_i where it is that to rounding, or beyond.
+        """(n,) |q_i|, and exactly P_i where |q_i| is at least P_i up to rounding.
 
-        The local law is steep there: one roundoff less than P_i would seem 2e-11 off the threshold.
+        Near P_i the local law is steep: one roundoff of |q_i| changes the deflection by 2e-11.
         """
         size, P = np.hypot(*increments.T), self.loads
         full: Array = np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
         return full
 
     def local_forces(self, deflections: Array) -> Array:
-        """(n, 2) q(eta), the inverse of `own`, along eta; |q_i| = P_i where it slides."""
+        """(n, 2) q(eta), the inverse of `own`, parallel to eta; |q_i| = P_i where sliding."""
         size = np.hypot(*deflections.T)
         return along(self.increments(size), deflections, size)
 
     def energy(self, increments: Array, coupling: Array) -> float:
-        """`coupling` is B q."""
+        """The energy of forces q, given their coupling B q."""
         P, thresholds = self.loads, self.thresholds
         local = mindlin.potential(np.hypot(*increments.T) / P) @ (P * thresholds)
         return float(local + 0.5 * (increments * coupling).sum())
 
     def residual(self, state: VectorState) -> float:
-        """How far the conditions of the least energy are from holding; dimensionless.
+        """The largest relative violation of the conditions of least energy.
 
-        The largest of: what displacements fail to balance by at an asperity, the part of a slip
-        that is not along the force, the slip where friction is not used up times the share of it
-        that is left (all over |X|); the force beyond P_i over P_i; the missing total over |T|. The
-        conditions are those of docs/theory/vector-friction.md, "The program".
+        Over |X|: the error of the equation for X above; the part of a slip across its force; and
+        slip_i times (1 - |q_i| / P_i). Over P_i: the part of |q_i| beyond P_i. Over |T|: the error
+        of the total. See docs/theory/vector-friction.md, "The program".
         """
         if not np.isfinite(state.displacement).all():
             return np.inf
@@ -179,11 +178,11 @@ class VectorProblem(Loaded):
     def shift(self) -> Shift:
         """A shift for the cones: docs/theory/vector-friction.md, "Convexity".
 
-        By the neighbours' distances (3), 2 / (2 - nu) of
+        By (3) of that page it is 2 / (2 - nu) times, with s_i as in `convexity_numbers`,
 
             1 / (pi E* s_i) at nu = 0,    (9/4) (1 - 2 nu / 3) / (pi E* s_i) for 0 < nu <= 1/2.
 
-        Where a share exceeds 21/25, the least with equal shares, from the smallest eigenvalue.
+        If a share exceeds 21/25, all shares are equal and follow from the smallest eigenvalue.
         """
         nu = 2.0 * self.bias / (1.0 + self.bias)
         factor = 1.0 if nu == 0 else 4.5 * (1.0 - 2.0 * nu / 3.0) / (2.0 - nu)
@@ -198,9 +197,9 @@ class VectorProblem(Loaded):
 
     @cached_property
     def margin(self) -> float:
-        """A proved mu > 0 with I + H^-1/2 B H^-1/2 >= mu I of the true loads; 0 if none is found.
+        """A proved mu > 0 with I + H^-1/2 B H^-1/2 >= mu I for the true loads; 0 if none is found.
 
-        Asperities not sure to touch are not among the unknowns.
+        H = diag(h_i) of `stiffness`. Asperities not proved to touch are left out.
         """
         root = np.repeat(np.sqrt(self.softness), 2)
         scaled = self.kernel * root * root[:, None]
@@ -208,12 +207,15 @@ class VectorProblem(Loaded):
 
     @property
     def reach(self) -> Array:
-        """(n, n) |B_ij v| <= reach_ij |v|."""
+        """(n, n) bounds on the norms of the B_ij: |B_ij v| <= reach_ij |v|."""
         bound: Array = self.influence.matrix * ((1.0 + self.bias) * (1 + SAFETY))
         return bound
 
 
 def along(lengths: Array, vectors: Array, sizes: Array) -> Array:
-    """(n, 2) of the given lengths, in the directions of the vectors; 0 where those are 0."""
+    """(n, 2) vectors of the given lengths in the directions of `vectors`; 0 where these are 0.
+
+    sizes : (n,) the lengths of `vectors`
+    """
     scale: Array = lengths / np.where(sizes > 0, sizes, 1.0)
     return vectors * scale[:, None]

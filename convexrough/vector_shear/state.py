@@ -1,9 +1,9 @@
 """`shear_vector`: the friction state of a pressed contact with the full tangential kernel.
 
-One step beyond Ciavarella and Jaeger (`shear`): tangential point forces move the surface by
-Cerruti's tensor, so forces and slips are vectors and turn a little out of the direction of the
-shear force. The state is the least of a convex energy (`convexrough.vector_shear.problem`), found
-by Newton's method or as a second-order cone program. Derived in docs/theory/vector-friction.md.
+`shear` uses the approximation of Ciavarella and Jaeger. Here tangential point forces move the
+surface by Cerruti's tensor, so forces and slips are vectors, which turn a little from the direction
+of the shear force. The state minimises a convex energy (`convexrough.vector_shear.problem`);
+Newton's method or a second-order cone program finds it. Derived in docs/theory/vector-friction.md.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from convexrough.vector_shear.problem import VectorProblem, VectorState
 
 
 class FrictionSolver(Protocol):
-    """A frozen settings object. Raises SolverError rather than return a poor answer."""
+    """Frozen settings of a solver, which raises SolverError rather than return a poor result."""
 
     @property
     def name(self) -> str: ...
@@ -42,20 +42,22 @@ class FrictionSolver(Protocol):
 class VectorShearState(Table, Plottable):
     """A vector friction state. Arrays are in the order of the scene's asperities.
 
-    force        : (2,) [force];  displacement : (2,) X of the deep points, both bodies [length]
-    forces       : (n, 2) [force], sum `force`
-    slips        : (n, 2) [length] gross slip along the force, 0 where not sliding
-    stick_radii  : (n,) c_i [length], 0 where sliding
-    disagreement : with Ciavarella and Jaeger: the 2-norm of the difference of all asperity forces
-        from those of `shear`, taken along the shear force, over the 2-norm of those
-    residual     : how far the conditions of the least energy are from holding, dimensionless,
-        recomputed from this answer: `VectorProblem.residual`
-    duality_gap  : [force length] bound on the energy of these forces above the least; infinite
-        where the energy is not proved to be convex
-    certificate  : what is proved, as in `shear`; errors of vectors are bounds on their lengths
+    force        : (2,) [force] shear force Q
+    displacement : (2,) [length] relative tangential displacement X of distant points
+    forces       : (n, 2) [force] shear forces on the asperities; their sum is `force`
+    slips        : (n, 2) [length] gross slip along the forces, 0 where not sliding
+    stick_radii  : (n,) [length] radii of the stick discs, 0 where sliding
+    disagreement : relative difference (2-norm) of the forces from those of `shear`
+    residual     : largest relative violation of the conditions of least energy, recomputed from
+        this result: `VectorProblem.residual`
+    duality_gap  : [force length] bound on the energy of these forces above the minimum; infinite
+        if the energy is not proved to be convex
+    certificate  : proved statuses and bounds; error bounds of vectors are on the length of their
+        difference
+    solver, iterations : name of the solver, and its number of steps
 
-    At |Q| = f P exactly, forces are f P_i along Q. A state of several asperities then exists, in
-    general, only in the limit of an infinite displacement: that and the slips, `residual` and
+    At |Q| = f P the forces are f P_i along Q. In general several asperities then reach this state
+    only in the limit of an infinite displacement: the displacement, the slips, `residual` and
     `duality_gap` are infinite.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
@@ -92,14 +94,14 @@ class VectorShearState(Table, Plottable):
 def shear_vector(
     contact: Contact, *, force: ArrayLike, solver: FrictionSolver | None = None
 ) -> VectorShearState:
-    """Apply a shear force to a pressed contact, first loading, at constant normal load.
+    """The friction state with the full tangential kernel, after first loading at constant load.
 
-    force  : a number, along x, or the pair (Qx, Qy) [force]
-    solver : default `FrictionNewton()`; or `FrictionConic()`, a cone program through Clarabel
+    force  : [force] the pair (Qx, Qy), or a number along x
+    solver : default `FrictionNewton()`; or `FrictionConic()`, a cone program solved by Clarabel
 
-    Raises InputError if the scene has no friction or |Q| exceeds f P (gross sliding), and
-    SolverError where the solver stops without an answer, is missing, or finds asperities so dense
-    that the program is not convex.
+    Raises InputError if the scene has no friction or |Q| exceeds f P; SolverError if the solver
+    does not converge or is not installed, or if the program is not convex because the asperities
+    are too dense.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
     >>> print(f"{state.disagreement:.3f}")
@@ -148,7 +150,7 @@ def shear_vector(
 
 
 def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> VectorState:
-    """The solver's answer, if it is one; the last forces of an error in scene units and order."""
+    """The solver's result, checked to be finite. An error has its forces in the scene's units."""
     try:
         state = solver.solve(problem, total)
     except SolverError as error:
@@ -164,7 +166,7 @@ def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> Vec
 
 
 def _vector(force: ArrayLike) -> Array:
-    """(2,) of a number, along x, or of a pair."""
+    """(2,) the force from a number along x, or from a pair."""
     if np.ndim(force) == 0:
         return np.array([checks.array("force", force, length=1)[0], 0.0])
     pair = checks.array("force", force)
@@ -175,10 +177,10 @@ def _vector(force: ArrayLike) -> Array:
 
 
 def _gross(problem: VectorProblem, total: Array) -> VectorState:
-    """|T| = sum P: one state of forces, all along T. Slips are along T too.
+    """The state at |T| = sum P: all forces and slips are along T.
 
-    So the displacements of the others, B q, must be alike across T. Where they are not, that is
-    only approached: asperities turn to T as X grows beyond all bounds.
+    This needs displacements B q with the same component across T at all asperities. Otherwise the
+    forces only tend to this state as X grows without bound.
     """
     along_total = total / np.hypot(*total)
     across_total = np.array([-along_total[1], along_total[0]])
@@ -196,14 +198,14 @@ def _gross(problem: VectorProblem, total: Array) -> VectorState:
 
 
 def _times(vectors: Array, size: Array | float) -> Array:
-    """Their product, and 0 where the vector is: also times infinity."""
+    """vectors * size, and 0 where the vector is 0, even times infinity."""
     product = np.zeros(np.broadcast_shapes(vectors.shape, np.shape(size)))
     np.multiply(vectors, size, out=product, where=vectors != 0)
     return product
 
 
 def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) -> float:
-    """With Ciavarella-Jaeger forces along the total; 0 at rest."""
+    """The relative difference from the forces of `shear` along the total; 0 at rest."""
     if height == 0:
         return 0.0
     other, _ = problem.from_rest(height)
@@ -215,7 +217,7 @@ def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) 
 def _certificate(
     contact: Contact, problem: VectorProblem, state: VectorState, bounds: VectorBounds
 ) -> ShearCertificate:
-    """From the bounds on one state, in the scene's units; those on vectors are on their lengths."""
+    """The certificate in the scene's units, from the bounds on a state."""
 
     def in_scene(errors: Array, values: Array, unit: float) -> Array:
         size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)
@@ -249,7 +251,7 @@ def _certificate(
 
 
 def _unmoved(contact: Contact, solver: str) -> VectorShearState:
-    """Nothing is loaded."""
+    """The state of a contact without load."""
     n = len(contact.scene)
     zero, none, pairs = frozen(np.zeros(n)), frozen(np.zeros(2)), frozen(np.zeros((n, 2)))
     certificate = shear(contact, force=0.0).certificate

@@ -28,8 +28,9 @@ POSITION_TOLERANCE = 1e-2
 #: Asperities at which a shift is tried, where rows are missing.
 MOST_TRIED = 1000
 
-#: Nodes with a load reach at least so far, over the size of the array, in the right unit.
-LEAST_REACH = 0.01
+#: The median distance of nodes with a load from their asperities, over the distance of these, is
+#: smaller; of points anywhere it is about 0.4.
+BY_CHANCE = 0.25
 
 #: Names of columns that can only number asperities.
 SURELY_INDEX = ("index", "asperity")
@@ -218,13 +219,17 @@ class _Placing:
         if len(self.scene) > 1:
             apart = nearest_distances(self.scene.asperities.positions)
         far = np.flatnonzero((values != 0) & (distances > apart[owners]))
-        size = np.abs(self.scene.contact_points).max()
-        for power in (3, 6, 9) if len(far) else ():
-            points = self.points[values != 0] * 10.0**-power
+        loaded = self.points[values != 0]
+
+        def fits(points: Array) -> bool:
+            """Near asperities, more than one, nearer than by chance."""
             near, their = _nearest(self.scene.contact_points, points)
-            if (near <= apart[their]).all() and np.abs(points).max() > LEAST_REACH * size:
-                self.mistakes.append(f"positions: {_too_far_out(power)}")
-                return owners
+            parts = near / apart[their]
+            return bool(parts.max() <= 1 and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
+
+        if len(loaded) and not fits(loaded) and (moved := self._moved(loaded, fits)):
+            self.mistakes.append(f"positions: {moved}")
+            return owners
         for i in far:
             found = (
                 f"a load at {self.points[i].tolist()}, {distances[i]:g} from the nearest asperity"
@@ -270,7 +275,15 @@ class _Placing:
         far = distances > allowed
         self.how = f"matched by position, to {distances.max():.2g}"
         doubtful = far.any() if len(points) == len(positions) else far.mean() > 0.5
-        if doubtful and (moved := self._moved(points, allowed)):
+
+        def fits(points: Array) -> bool:
+            distances, owners = _nearest(positions, points)
+            return bool(distances.max() <= allowed) and len(np.unique(owners)) == len(owners)
+
+        moved = (
+            self._moved(points, fits) or self._shifted(points, allowed, fits) if doubtful else ""
+        )
+        if moved:
             self.mistakes.append(f"positions: {moved}")
             return owners
         for i in np.flatnonzero(far):
@@ -282,14 +295,8 @@ class _Placing:
             self._refuse(i, found, "each asperity once")
         return owners
 
-    def _moved(self, points: Array, allowed: float) -> str:
-        """What was done to all points, where undoing it puts them on asperities."""
-        positions = self.scene.asperities.positions
-
-        def fits(points: Array) -> bool:
-            distances, owners = _nearest(positions, points)
-            return bool(distances.max() <= allowed) and len(np.unique(owners)) == len(owners)
-
+    def _moved(self, points: Array, fits: Callable[[Array], bool]) -> str:
+        """What was done to all points, where undoing it makes them fit."""
         x, y = (bare(self.table.called[name]) for name in ("x", "y"))
         exchange = f"--column x={y} --column y={x}"
         if fits(points[:, ::-1]):
@@ -302,6 +309,11 @@ class _Placing:
         for power in (*range(-9, 0), *range(1, 10)):
             if fits(points * 10.0**-power):
                 return _too_far_out(power)
+        return ""
+
+    def _shifted(self, points: Array, allowed: float, fits: Callable[[Array], bool]) -> str:
+        """By how much all points are shifted, where undoing it makes them fit."""
+        positions = self.scene.asperities.positions
         tried: Sequence[Any] = positions[:MOST_TRIED] - points[0]
         if len(points) == len(positions):
             tried = [positions.mean(axis=0) - points.mean(axis=0)]

@@ -2,27 +2,28 @@ r"""
 1. Two asperities by hand
 =========================
 
-**Claim.** Which of two asperities touch is decided by four systems of equations, of which exactly
-one gives an answer that is allowed. The same answer is the lowest point of an energy on the
-quadrant of loads that are not negative.
+**Claim.** Four systems of equations decide which of two asperities touch; exactly one of them has
+an admissible solution. This solution is also the minimum of an energy over the loads that are not
+negative.
 
-A flat stamp is lowered on two asperities, 1 and 2. It wants asperity :math:`i` to give way by
-:math:`D_i`. A loaded asperity gives way in two ways: it is squashed, and it sits in the dent that
-the other one makes. To keep the hand calculation linear, let each be a spring here. The next
+A flat stamp is lowered on two asperities, 1 and 2. It prescribes the displacement :math:`D_i` of
+asperity :math:`i` if the asperity touches. The displacement :math:`w_i` of an asperity has two
+parts: its own load :math:`P_i` compresses it, and the load on the other asperity lowers the
+surface under it. To keep the hand calculation linear, each asperity is a spring here. The next
 scripts return to Hertz's law.
 
 .. math:: w_1 = P_1 + A P_2, \qquad w_2 = A P_1 + P_2, \qquad 0 < A < 1.
 
-Each asperity either touches, then :math:`w_i = D_i` and :math:`P_i \ge 0`; or it does not, then
-:math:`P_i = 0` and its gap :math:`g_i = w_i - D_i` is not negative. Load and gap are never both
-positive: they are *complementary*.
+If an asperity touches, :math:`w_i = D_i` and :math:`P_i \ge 0`. If it does not, :math:`P_i = 0`
+and its gap :math:`g_i = w_i - D_i` is not negative. Load and gap are never both positive: they are
+*complementary*.
 """
 
 # %%
 # The naive form
 # --------------
 #
-# Both asperities are meant to give way, so solve the two equations for two loads.
+# Assume that both asperities touch, and solve the two equations :math:`w = D` for two loads.
 
 import itertools
 from typing import Any
@@ -45,12 +46,12 @@ print("loads:", naive)
 assert naive[1] < 0
 
 # %%
-# The second load is negative: asperity 2 would have to *pull* on the stamp. Nothing glues them
-# together, so this is not an answer, though every equation holds. The lower asperity lies in the
-# dent made by the taller one.
+# The second load is negative: asperity 2 would have to *pull* on the stamp. There is no adhesion,
+# so this is not a solution, although both equations hold. The taller asperity has lowered the
+# surface under the lower one so far that the stamp does not reach it.
 #
-# Cutting the negative load off does not mend it. Asperity 1 then no longer gives way by what is
-# asked of it.
+# To set the negative load to zero does not help: the displacement of asperity 1 then differs from
+# the prescribed one.
 
 cut = np.maximum(naive, 0.0)
 print("asked of asperity 1:", D[0], "  after cutting:", (stiffness @ cut)[0])
@@ -60,9 +61,9 @@ assert abs((stiffness @ cut)[0] - D[0]) > 0.1
 # The repair: four cases
 # ----------------------
 #
-# Each asperity touches or does not: :math:`2 \cdot 2` cases. In each one the loads of the open ones
-# are 0 and the gaps of the others are 0, which leaves as many equations as unknowns. Then look at
-# the signs.
+# Each asperity touches or does not: :math:`2 \cdot 2` cases. In each case the loads of the open
+# asperities and the gaps of the others are 0, so there are as many equations as unknowns. A case
+# is admissible if no load and no gap in its solution is negative.
 
 
 def solve_case(
@@ -92,9 +93,9 @@ answer = answers[0]
 assert np.allclose(answer, [1.0, 0.0])
 
 # %%
-# One case passes: asperity 1 carries :math:`P_1 = D_1 = 1`, and asperity 2 has a gap of :math:`A
-# D_1 - D_2 = 0.2`. That there is never a second answer is due to :math:`A < 1`; the exercise shows
-# what happens beyond.
+# One case is admissible: asperity 1 carries :math:`P_1 = D_1 = 1`, and asperity 2 has a gap of
+# :math:`A D_1 - D_2 = 0.2`. There is never a second solution because :math:`A < 1`; the exercise
+# shows what happens if :math:`A > 1`.
 #
 # The picture
 # -----------
@@ -103,11 +104,11 @@ assert np.allclose(answer, [1.0, 0.0])
 #
 # .. math:: \Phi(P) = \tfrac 1 2 P_1^2 + \tfrac 1 2 P_2^2 + A P_1 P_2 - D_1 P_1 - D_2 P_2
 #
-# the gap is its slope, :math:`g = \nabla \Phi`. At the lowest point of the quadrant :math:`P \ge 0`
-# a slope is 0, or the point is on the edge and the slope points uphill into the quadrant. That is
-# the contact law, word for word. Left: the energy, its free minimum (a cross, the naive answer) and
-# the minimum on the quadrant (a dot). Right: which of the four cases answers, for all that may be
-# asked.
+# the gap is its gradient, :math:`g = \nabla \Phi`. At the minimum over the quadrant
+# :math:`P \ge 0` each component of the gradient is 0, or the load is 0 and the component is not
+# negative. This is the contact law. Left: the energy, its free minimum (a cross, the naive
+# solution) and the minimum over the quadrant (a dot). Right: the admissible case for each pair
+# :math:`D_1, D_2`.
 
 
 def energy(P: Array) -> Any:
@@ -147,9 +148,9 @@ plt.show()
 # An independent check
 # --------------------
 #
-# Two of them. On a grid over what may be asked, one of the four cases is allowed at every point
-# that is not on a border. And a general-purpose solver of bounded problems, which knows no cases,
-# finds the same loads.
+# First, on a grid of prescribed displacements exactly one of the four cases is admissible at every
+# point that is not on a border. Second, a general-purpose solver for minimisation with bounds,
+# which does not use the cases, finds the same loads.
 
 interior = [
     sum(allowed(*solve_case(case, np.array([D1, D2]))) for case in CASES)
@@ -165,15 +166,14 @@ assert np.allclose(found.x, answer, atol=1e-6)
 # Exercise
 # --------
 #
-# Let the asperities be so close that :math:`A = 1.5`, and ask the same of both, :math:`D = (1, 1)`.
-# How many of the four cases are allowed? Draw the energy before you count.
+# Let the asperities be so close that :math:`A = 1.5`, and let both displacements be equal,
+# :math:`D = (1, 1)`. How many of the four cases are admissible? Draw the energy before you count.
 #
-# *Answer.* Three. Either asperity alone (the other one lies in its dent, with a gap of 0.5), and
-# both together with :math:`P_1 = P_2 = 1 / (1 + A) = 0.4`. The energy is a saddle: along :math:`P_1
-# + P_2 = \text{const}` it is highest in the middle, so "both" is not even a local minimum.
-# Uniqueness is lost exactly where the energy stops being convex, at :math:`A = 1`. Real asperities
-# do not sit in each other: how near is near enough is the shell lemma of
-# :doc:`03_why_cvxpy_refuses`.
+# *Answer.* There are three: either asperity alone touches (the other has a gap of 0.5), or both
+# touch with :math:`P_1 = P_2 = 1 / (1 + A) = 0.4`. The energy is a saddle: along
+# :math:`P_1 + P_2 = \text{const}` it is highest in the middle, so the state in which both touch is
+# not even a local minimum. Beyond :math:`A = 1` the energy is not convex and the solution is not
+# unique. The shell lemma of :doc:`03_why_cvxpy_refuses` tells how close real asperities may be.
 
 closer = np.array([[1.0, 1.5], [1.5, 1.0]])
 crowded = [case for case in CASES if allowed(*solve_case(case, np.ones(2), closer))]

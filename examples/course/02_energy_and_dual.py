@@ -1,28 +1,28 @@
 r"""
-2. The energy, its dual, and the word "optimal"
-===============================================
+2. The energy, its dual, and the word "optimal" ===============================================
 
-**Claim.** From any loads at all, right or wrong, two numbers can be computed: an energy, which is
-too high, and a dual bound, which is too low. Their difference, the *duality gap*, says how wrong
-the loads can be. A solver's word does not.
+**Claim.** From any loads, right or wrong, one can compute their energy, which is at least the
+minimum, and a dual bound, which is at most the minimum. The difference, the *duality gap*, limits
+the error of the loads. The status that a solver reports does not.
 
-Seven Hertzian tips stand on short elastic stems. Tip :math:`i` gives way by :math:`k P_i^{2/3}`,
-and stems and substrate by :math:`(M P)_i` with a symmetric matrix :math:`M` that is positive
-definite. (A stem is the diagonal of :math:`M`. Asperities without stems are the matter of
-:doc:`03_why_cvxpy_refuses`.) The loads minimise
+Seven Hertzian tips stand on short elastic stems. The load :math:`P_i` compresses tip :math:`i` by
+:math:`k P_i^{2/3}`. Stems and substrate move by :math:`(M P)_i` with a symmetric, positive
+definite matrix :math:`M`. (The stems are the diagonal of :math:`M`; :doc:`03_why_cvxpy_refuses`
+treats asperities without stems.) If the tips must take up the displacements :math:`D_i`, the loads
+minimise
 
 .. math:: \Phi(P) = \sum_i \tfrac 3 5 k P_i^{5/3} + \tfrac 1 2 P^\top M P - D^\top P,
           \qquad P \ge 0,
 
-which is convex, so a modelling language will take it as it is.
+which is convex, so a modelling language accepts it as it is.
 """
 
 # %%
 # The naive form
 # --------------
 #
-# Write it down in the units of the drawing: the sphere's radius and the modulus are 1. Then
-# approaches are about :math:`10^{-5}` and loads about :math:`10^{-9}`.
+# Write the program in units in which the sphere's radius and the modulus are 1. Then approaches
+# are about :math:`10^{-5}` and loads about :math:`10^{-9}`.
 
 import cvxpy as cp
 import matplotlib.pyplot as plt
@@ -56,8 +56,8 @@ status, naive = solve(k, M, D)
 print(status, naive)
 
 # %%
-# "Optimal", it says. Ask the loads themselves: what they make the tips give way by should be what
-# is prescribed.
+# The solver reports "optimal". Check the loads themselves: the displacements that they cause
+# should equal the prescribed ones.
 
 print("prescribed:      ", D[:2])
 print("what these cause:", (k * np.maximum(naive, 0) ** (2 / 3) + M @ naive)[:2])
@@ -65,18 +65,18 @@ assert status == "optimal"
 assert abs((k * np.maximum(naive, 0) ** (2 / 3) + M @ naive)[0] / D[0] - 1) > 1
 
 # %%
-# The solver stops when its residuals are below :math:`10^{-8}`. So are all approaches and loads
-# here, nearly: to it, everything was zero from the start. It did keep its promise. The promise was
-# about other numbers than ours.
+# The solver stops when its residuals are below :math:`10^{-8}`. The loads here are smaller than
+# that, so the starting values already count as a solution. The solver did what it promises, but
+# its tolerance does not fit the size of these numbers.
 #
 # The repair: a bound from the loads alone
 # ----------------------------------------
 #
 # For any trial loads :math:`p`, a square is not negative: :math:`(x - p)^\top M (x - p) \ge 0`, so
-# :math:`\tfrac 1 2 x^\top M x \ge p^\top M x - \tfrac 1 2 p^\top M p`. Put that into the energy.
-# What is left falls apart into one-tip problems, and each has a closed form: :math:`\tfrac 3 5 k
-# x^{5/3} - \lambda x` is least at :math:`x = (\lambda / k)^{3/2}`, with the value :math:`-\tfrac 2
-# 5 \lambda^{5/2} k^{-3/2}`, or 0 if :math:`\lambda < 0`. So
+# :math:`\tfrac 1 2 x^\top M x \ge p^\top M x - \tfrac 1 2 p^\top M p`. Insert this into the
+# energy. The remaining minimum separates into one problem per tip, and each has a closed form:
+# :math:`\tfrac 3 5 k x^{5/3} - \lambda x` is smallest at :math:`x = (\lambda / k)^{3/2}`, with the
+# value :math:`-\tfrac 2 5 \lambda^{5/2} k^{-3/2}`, or 0 if :math:`\lambda < 0`. So
 #
 # .. math:: \min \Phi \; \ge \; - \tfrac 1 2 p^\top M p
 #           - \tfrac 2 5 \sum_i k^{-3/2} \max(D - M p, 0)_i^{5/2} \quad \text{for every } p.
@@ -96,9 +96,9 @@ print(f"naive loads: energy {energy_of(naive):.3e}, dual bound {dual_bound(naive
 assert energy_of(naive) > 0 > dual_bound(naive)
 
 # %%
-# No loads at all have energy 0: the solver's "optimum" is worse than not touching. Scaled to its
-# own size, so that approaches and loads are about 1, the same program is solved well, and the gap
-# says so.
+# Zero loads have the energy 0: the solver's "optimum" has more energy than no contact at all. In
+# units in which displacements and loads are about 1, the solver solves the same program
+# accurately, and the duality gap shows it.
 
 length = D[0]
 force = (length / k[0]) ** 1.5
@@ -112,10 +112,11 @@ assert 0 <= gap < 1e-6 * abs(energy_of(loads))
 # From a gap to loads
 # -------------------
 #
-# The energy curves upwards at least as much as :math:`\tfrac 1 2 x^\top M x`. So loads whose energy
-# is within the gap of the least are within :math:`\sqrt{2\, \text{gap} / \mu}` of the right ones,
-# :math:`\mu` the smallest eigenvalue of :math:`M`. Mind the root: eight digits of energy are four
-# digits of load. The picture walks from the naive loads to the good ones.
+# The Hessian of the energy is at least :math:`M`. So loads whose energy exceeds the minimum by no
+# more than the gap differ from the exact loads by at most :math:`\sqrt{2\, \text{gap} / \mu}`,
+# where :math:`\mu` is the smallest eigenvalue of :math:`M`. Because of the root, eight digits of
+# the energy give only four digits of the loads. The picture goes from the naive loads to the
+# accurate ones.
 
 mu = float(np.linalg.eigvalsh(M)[0])
 rest = np.logspace(0, -5, 60)  # how much of the naive loads is left
@@ -143,8 +144,8 @@ plt.show()
 # --------------------
 #
 # Solve the contact law itself by Newton's method, in the indentations :math:`\delta` of the tips:
-# :math:`\delta + M P(\delta) = D` with :math:`P = (\max(\delta, 0) / k)^{3/2}`. No energy occurs in
-# it. The bound must hold, and the two energies must enclose the least one.
+# :math:`\delta + M P(\delta) = D` with :math:`P = (\max(\delta, 0) / k)^{3/2}`. This does not use
+# the energy. The bound must hold, and the energy and the dual bound must enclose the minimum.
 
 delta = D.copy()
 for _ in range(50):
@@ -163,11 +164,12 @@ assert energy_of(reference) <= energy_of(loads) * (1 - 1e-12)
 # Exercise
 # --------
 #
-# Put :math:`p = 0` into the dual bound. What does it say, in words? By how much is it off here?
+# Insert :math:`p = 0` into the dual bound. What does the bound say then? How far is it from the
+# minimum here?
 #
-# *Answer.* :math:`\min \Phi \ge -\tfrac 2 5 \sum k^{-3/2} D_i^{5/2}`, the energy of seven tips that
-# do not feel each other: neighbours and stems only make it harder to give way. It overestimates the
-# energy gained by a factor of 1.67.
+# *Answer.* :math:`\min \Phi \ge -\tfrac 2 5 \sum k^{-3/2} D_i^{5/2}`, the energy of seven tips
+# without stems that do not interact. Neighbours and stems make the contact more compliant, so they
+# reduce the loads. The absolute value of the bound is 1.67 times that of the minimum.
 
 alone = dual_bound(np.zeros(7))
 print("the bound from no loads, over the least energy:", alone / energy_of(reference))

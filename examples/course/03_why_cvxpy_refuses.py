@@ -2,13 +2,15 @@ r"""
 3. Why CVXPY refuses the energy
 ===============================
 
-**Claim.** The energy of asperities that feel each other is not convex by the rules of a modelling
-language, and not convex everywhere in truth. A picture of charged shells shows how far it is
-convex: up to contact discs 57 % larger than discs that just touch their neighbours.
+**Claim.** A modelling language does not accept the energy of asperities that interact as convex,
+and indeed it is not convex everywhere. An argument with charged shells shows where it is convex:
+up to contact radii 57 % larger than those at which neighbouring discs touch.
 
-Asperities on an elastic half-space act on each other as point forces, :math:`A_{ij} = 1 / (\pi E^*
-r_{ij})`. An asperity's effect on itself is already in Hertz's law, so :math:`A_{ii} = 0`. With unit
-:math:`E^*` the energy is
+The load :math:`P_j` of an asperity on an elastic half-space acts on asperity :math:`i` at the
+distance :math:`r_{ij}` as a point force, and displaces it by :math:`A_{ij} P_j` with
+:math:`A_{ij} = 1 / (\pi E^* r_{ij})`. Hertz's law :math:`k_i P_i^{2/3}` already contains the
+effect of a load on its own asperity, so :math:`A_{ii} = 0`. With prescribed displacements
+:math:`D_i` the energy is
 
 .. math:: \Phi(P) = \sum_i \tfrac 3 5 k_i P_i^{5/3} + \tfrac 1 2 P^\top A P - D^\top P .
 """
@@ -17,8 +19,8 @@ r_{ij})`. An asperity's effect on itself is already in Hertz's law, so :math:`A_
 # The naive form
 # --------------
 #
-# Write it down as it stands, for the 19 asperities nearest to the axis in the source paper's
-# example.
+# Write this energy in CVXPY, for the 19 asperities nearest to the axis in the example of Dini and
+# Hills (2009).
 
 import cvxpy as cp
 import matplotlib.pyplot as plt
@@ -60,8 +62,8 @@ except cp.error.DCPError as refusal:
 assert refused
 
 # %%
-# It points at the quadratic form, and it is right. A matrix with zeros on its diagonal has a trace
-# of 0, so if it has positive eigenvalues it has negative ones.
+# The message names the quadratic form, and it is right. A matrix with zeros on its diagonal has
+# the trace 0, so if it has positive eigenvalues it also has negative ones.
 
 eigenvalues = np.linalg.eigvalsh(A)
 print(f"eigenvalues of A: from {eigenvalues[0]:.3f} to {eigenvalues[-1]:.3f}")
@@ -69,9 +71,9 @@ assert eigenvalues[0] < 0 < eigenvalues[-1]
 assert abs(eigenvalues.sum()) < 1e-10
 
 # %%
-# There is a way to silence the check: wrap the matrix in ``psd_wrap``, a promise that it is
-# semidefinite. It is a false promise, and with crowded asperities the answer is false, too. Here
-# are two that sit in each other's dent:
+# The function ``psd_wrap`` turns the check off: with it the user asserts that the matrix is
+# positive semidefinite. This assertion is false, and for crowded asperities the solution is wrong,
+# too. An example with two asperities whose discs overlap:
 
 crowded = cp.quad_form(P[:2], cp.psd_wrap(np.array([[0.0, 2.0], [2.0, 0.0]]))) / 2
 hertz = 0.6 * cp.sum(cp.power(P[:2], 5 / 3))
@@ -88,14 +90,15 @@ assert lying.value > better + 0.1
 # ------------------
 #
 # Give each point force a spherical shell of radius :math:`s_i`, such that no two shells overlap,
-# and spread the force evenly over it, as if it were electric charge. By Newton's theorem two shells
-# act on each other as two points do, with energy :math:`P_i P_j / r_{ij}`. Each has also an energy
-# of its own, :math:`P_i^2 / (2 s_i)`. The energy of any charge distribution is not negative. Hence
+# and spread the force evenly over it, as if it were electric charge. By Newton's theorem two
+# shells act on each other as two points do, with energy :math:`P_i P_j / r_{ij}`. Each shell also
+# has an energy of its own, :math:`P_i^2 / (2 s_i)`. The energy of any charge distribution is not
+# negative. Hence
 #
 # .. math:: M = A + \operatorname{diag}\Big(\frac{1}{\pi E^* s_i}\Big)
 #           \; \text{ is positive semidefinite if } s_i + s_j \le r_{ij} .
 #
-# Half the distance to the nearest neighbour is a choice that always works.
+# Half the distance to the nearest neighbour is always a valid :math:`s_i`.
 
 s = 0.0025 / 2
 M = A + np.eye(len(D)) / (np.pi * s) * force / length
@@ -103,12 +106,12 @@ print(f"least eigenvalue of M: {np.linalg.eigvalsh(M)[0]:.3f}")
 assert np.linalg.eigvalsh(M)[0] > 0
 
 # %%
-# Hertz's own energy can spare that diagonal. Its second derivative is :math:`\tfrac 2 3 k P^{-1/3}
-# = 1 / (2 E^* a)` with :math:`a` the contact radius, which is more than :math:`1 / (\pi E^* s)` as
-# long as :math:`a < \tfrac \pi 2 s`. So the energy *is* convex where all contact radii are below
-# :math:`\tfrac \pi 2 s_i`. The picture shows the energy of two equal asperities along the line on
-# which one takes load from the other: a valley while contacts are small, and a ridge when they are
-# too large.
+# Hertz's energy is convex enough to supply this diagonal. Its second derivative is
+# :math:`\tfrac 2 3 k P^{-1/3} = 1 / (2 E^* a)` with the contact radius :math:`a`. This is more
+# than :math:`1 / (\pi E^* s)` as long as :math:`a < \tfrac \pi 2 s`. So the energy *is* convex
+# where all contact radii are below :math:`\tfrac \pi 2 s_i`. The picture shows the energy of two
+# equal asperities as load moves from one to the other: it has a minimum in the middle if the
+# contacts are small, and a maximum if they are too large.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
 shift = np.linspace(-1, 1, 201)
@@ -141,9 +144,10 @@ plt.show()
 # Still refused
 # -------------
 #
-# The quadratic part is convex now, and each local part :math:`\tfrac 3 5 k P^{5/3} - \tfrac{1}{2
-# \pi E^* s} P^2` is convex on its range. But the rules look at one term at a time, and this one is
-# a difference of two convex functions.
+# The quadratic part is convex now, and each local part
+# :math:`\tfrac 3 5 k P^{5/3} - \tfrac{1}{2 \pi E^* s} P^2` is convex on its range. But the rules
+# judge each term from the form in which it is written, and this term is a difference of two convex
+# functions.
 
 sigma = force / length / (np.pi * s)
 local = 0.6 * k @ cp.power(P, 5 / 3) - sigma / 2 * cp.sum_squares(P)
@@ -152,14 +156,14 @@ print("accepted by the rules:", split.is_dcp())
 assert not split.is_dcp()
 
 # %%
-# Script :doc:`05_exact_cones` finds words for it that the rules accept.
+# Script :doc:`05_exact_cones` writes it in a form that the rules accept.
 #
 # An independent check
 # --------------------
 #
-# The lemma rests on Newton's theorem, so test that: spread two charges over many points on two
-# shells and add up all pairs. The sum must be that of two point charges, whatever the radii, as
-# long as the shells do not overlap.
+# The lemma rests on Newton's theorem. To test the theorem, spread two charges over many points on
+# two shells and add up all pairs. The sum must be that of two point charges, whatever the radii,
+# as long as the shells do not overlap.
 
 
 def shell(radius: float, centre: float, count: int = 3000) -> Array:
@@ -183,12 +187,12 @@ assert np.allclose(mutual, 1.0, atol=1e-4)
 # --------
 #
 # Two equal asperities alone, at distance :math:`r`. Up to which contact radius is their energy
-# convex in truth, and what does the lemma promise?
+# convex, and what does the lemma prove?
 #
-# *Answer.* The Hessian has :math:`1/(2 E^* a)` on its diagonal and :math:`1/(\pi E^* r)` beside it,
-# so it is definite up to :math:`a = \tfrac \pi 2 r`. The lemma, with :math:`s = r/2`, promises half
-# of that: two asperities have only one neighbour each to make room for. Either way discs touch at
-# :math:`a = r/2`, long before.
+# *Answer.* The Hessian has :math:`1/(2 E^* a)` on its diagonal and :math:`1/(\pi E^* r)` off it,
+# so it is positive definite up to :math:`a = \tfrac \pi 2 r`. The lemma with :math:`s = r/2`
+# proves convexity up to half of that, because it allows for neighbours on all sides. Discs touch
+# at :math:`a = r/2`, below both limits.
 
 
 def definite(radius: float) -> bool:

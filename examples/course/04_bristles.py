@@ -2,21 +2,21 @@ r"""
 4. One asperity as a quadratic program of bristles
 ==================================================
 
-**Claim.** Hertz's law, with its power of 3/2, is the value of a quadratic program: a row of
-independent linear springs that can only push. Contact is complementarity all the way down, and the
-program converges at second order in the number of springs.
+**Claim.** Hertz's law, with its power of 3/2, follows from a quadratic program: a row of
+independent linear springs that can only push. Each spring obeys its own complementarity condition,
+and the program converges at second order in the number of springs.
 
-A sphere of radius :math:`R` (curvatures of both surfaces taken together) is pressed by an approach
-:math:`\delta` and answers :math:`P = \tfrac 4 3 E^* \sqrt R \, \delta^{3/2}`. Take :math:`E^* = R =
-1`.
+A sphere of radius :math:`R` (the relative radius of both surfaces) is pressed by an approach
+:math:`\delta` and carries the load :math:`P = \tfrac 4 3 E^* \sqrt R \, \delta^{3/2}`. Take
+:math:`E^* = R = 1`.
 """
 
 # %%
 # The naive form
 # --------------
 #
-# A solver of quadratic programs is robust and quick. Give it Hertz's energy, :math:`\tfrac 3 5 k
-# P^{5/3} - \delta P`.
+# Solvers of quadratic programs are robust and fast. Try to minimise Hertz's energy with one,
+# :math:`\tfrac 3 5 k P^{5/3} - \delta P`.
 
 from typing import Any
 
@@ -47,22 +47,22 @@ except cp.error.SolverError as refusal:
 assert refused
 
 # %%
-# A power of 5/3 is not quadratic, and one parabola cannot stand for it: its slope at 0 is 0 and its
-# curvature there is infinite.
+# A power of 5/3 is not quadratic, and no parabola approximates it near 0, where its slope is 0 and
+# its curvature is infinite.
 #
 # The repair: bristles
 # --------------------
 #
-# Stand springs side by side on a line through the centre, in a strip of width :math:`\Delta x`
-# each, of stiffness :math:`E^* \Delta x`. The surface of the sphere is above the line by :math:`x^2
-# / R`: *twice* as much as in a cut through the sphere. That is the method of dimensionality
-# reduction, and what makes the row answer as the half-space does. With forces :math:`f_j \ge 0`
+# Place springs side by side on a line through the centre. Each has the width :math:`\Delta x` and
+# the stiffness :math:`E^* \Delta x`. The sphere is replaced by a profile :math:`x^2 / R`, *twice*
+# the distance between the line and the sphere. With this profile, the row carries the same load as
+# the half-space (method of dimensionality reduction). With forces :math:`f_j \ge 0`
 #
 # .. math:: \text{minimise } \sum_j \frac{f_j^2}{2 E^* \Delta x} + \frac{x_j^2}{R} f_j - \delta f_j,
 #           \qquad f \ge 0,
 #
-# a quadratic program. Where a bristle touches it is shortened by :math:`\delta - x^2/R`, elsewhere
-# it has a gap. Adding up over :math:`|x| \le a = \sqrt{R \delta}`,
+# This is a quadratic program. A bristle that touches is shortened by :math:`\delta - x^2/R`; all
+# others have a gap. The sum over :math:`|x| \le a = \sqrt{R \delta}` is
 #
 # .. math:: P = \int_{-a}^{a} E^* \Big( \delta - \frac{x^2}{R} \Big) dx
 #           = E^* \Big( 2 a \delta - \frac{2 a^3}{3 R} \Big)
@@ -100,9 +100,9 @@ assert abs(f.sum() / hertz - 1) < 1e-3
 # The order of convergence
 # ------------------------
 #
-# The force on a bristle has a kink where contact ends. The midpoint rule is wrong there, by an
-# amount that depends on where in its strip the edge falls: take the root of the mean square over
-# many approaches. Without the kink's luck the order is 2.
+# The force on a bristle has a kink where contact ends. The error of the midpoint rule there
+# depends on the position of the edge within its strip. To average this out, take the root mean
+# square over many approaches. The order is then 2.
 
 counts = np.array([16, 32, 64, 128, 256])
 errors = []
@@ -136,11 +136,11 @@ plt.show()
 # An independent check
 # --------------------
 #
-# The bristles know more than the load. Hertz's pressure is their force per length :math:`q(x)`,
-# sent through Abel's transform, :math:`p(r) = -\tfrac 1 \pi \int_r^a q'(x) / \sqrt{x^2 - r^2}\,
-# dx`. With :math:`x = \sqrt{r^2 + t^2}` the root goes away. On the axis and at half the radius it
-# must be :math:`p_0 \sqrt{1 - r^2/a^2}`, :math:`p_0 = 2 E^* a / (\pi R)`. And the least energy must
-# be :math:`-\tfrac 2 5 \delta P`, as for any law of power 3/2.
+# The bristles also determine the pressure. It is the Abel transform of their force per length
+# :math:`q(x)`, :math:`p(r) = -\tfrac 1 \pi \int_r^a q'(x) / \sqrt{x^2 - r^2}\, dx`. The
+# substitution :math:`x = \sqrt{r^2 + t^2}` removes the singularity. On the axis and at half the
+# radius the pressure must be :math:`p_0 \sqrt{1 - r^2/a^2}` with :math:`p_0 = 2 E^* a / (\pi R)`.
+# The minimum of the energy must be :math:`-\tfrac 2 5 \delta P`, as for any law of power 3/2.
 
 p0 = 2 * modulus * a / (np.pi * radius)
 x, f = bristles(512, 1.4 * a, delta)
@@ -161,8 +161,8 @@ print(f"energy / (delta P) = {energy / (delta * f.sum()):.6f}")
 assert abs(energy / (delta * f.sum()) + 0.4) < 1e-4
 
 # %%
-# The package has the same program for any number of asperities, each with its bristles, coupled
-# through the sums.
+# The package has the same program for any number of asperities. Each has its own bristles, and the
+# total loads of the asperities interact.
 
 material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
 asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
@@ -177,9 +177,9 @@ assert apart < 1e-3
 # Exercise
 # --------
 #
-# A cone with slope :math:`\tan \theta` stands on its bristles at a height of :math:`\tfrac \pi 2
-# |x| \tan\theta`. Derive its law from the bristles, and compare with Sneddon's, :math:`P = 2 E^*
-# \delta^2 / (\pi \tan\theta)`.
+# A cone with the slope :math:`\tan \theta` has the bristle profile
+# :math:`\tfrac \pi 2 |x| \tan\theta`. Derive its law from the bristles, and compare with Sneddon's
+# law, :math:`P = 2 E^* \delta^2 / (\pi \tan\theta)`.
 #
 # *Answer.* Contact ends at :math:`a = 2 \delta / (\pi \tan\theta)`, and :math:`P = 2 E^* \int_0^a
 # (\delta - \tfrac \pi 2 x \tan\theta)\, dx = E^* a \delta`: Sneddon's law.

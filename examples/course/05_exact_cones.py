@@ -2,13 +2,14 @@ r"""
 5. The exact cones: powers of the contact radius
 ================================================
 
-**Claim.** Written in powers of the contact radius, the energy that no modelling language accepts
-becomes a second-order cone program, with four cones for each asperity, and nothing is lost: the
-cone program has the same least energy and the same loads.
+**Claim.** In powers of the contact radius, the energy that no modelling language accepts becomes a
+second-order cone program with four cones per asperity. The program is exact: it has the same
+minimum and the same loads.
 
-The shell lemma (:doc:`03_why_cvxpy_refuses`) left each asperity with :math:`h(P) = \tfrac 3 5 k
-P^{5/3} - \tfrac 1 2 \sigma P^2`, convex up to some load :math:`B`, but a difference of convex
-functions. With :math:`t` the contact radius over that at :math:`P = B`, :math:`P = B t^3`, and with
+The shell lemma (:doc:`03_why_cvxpy_refuses`) leaves for each asperity the local energy
+:math:`h(P) = \tfrac 3 5 k P^{5/3} - \tfrac 1 2 \sigma P^2` with :math:`\sigma = 1 / (\pi E^* s)`.
+It is convex up to some load :math:`B`, but written as a difference of convex functions. Let
+:math:`t` be the contact radius divided by that at :math:`P = B`. Then :math:`P = B t^3`, and with
 :math:`S = \sigma / (\tfrac 2 3 k B^{-1/3}) \le 1`
 
 .. math:: h = k B^{5/3} \Big[ \tfrac 3 5 t^5 - \tfrac S 3 t^6 \Big], \qquad 0 \le t \le 1 .
@@ -18,7 +19,7 @@ functions. With :math:`t` the contact radius over that at :math:`P = B`, :math:`
 # The naive form
 # --------------
 #
-# The bracket is a polynomial. Ask for it.
+# The bracket is a polynomial. Minimise it with CVXPY.
 
 from fractions import Fraction
 from itertools import product
@@ -42,9 +43,10 @@ except cp.error.DCPError as refusal:
 assert refused
 
 # %%
-# The usual remedy is to *lift*: call :math:`t^3, t^5, t^6` by names of their own, and ask of them
-# only what is convex. The term with the minus sign spoils it: the least energy wants :math:`y_6`
-# large, and that it is at most :math:`y_5` is all that can be said of it.
+# The usual remedy is a *lift*: introduce variables :math:`y_3, y_5, y_6` for
+# :math:`t^3, t^5, t^6`, and require only convex relations between them. Here the term with the
+# minus sign prevents this: the minimum makes :math:`y_6` as large as it can, and the only convex
+# upper bound is :math:`y_6 \le y_5`.
 
 y3, y5, y6 = (cp.Variable(nonneg=True) for _ in range(3))
 slope = 0.3  # stands for the approach: minimise h - slope * load
@@ -62,9 +64,10 @@ assert loose.value < true_least - 0.005
 # The repair: four cones
 # ----------------------
 #
-# Give names to :math:`t^2, \dots, t^5` and to :math:`z = t^5 - t^6`, so that the objective is
-# :math:`(\tfrac 3 5 - \tfrac S 3) y_5 + \tfrac S 3 z` with no minus sign left. Powers of one number
-# satisfy four rotated cones :math:`x y \ge w^2`, each with equality:
+# Introduce variables :math:`y_2, \dots, y_5` for :math:`t^2, \dots, t^5` and :math:`z` for
+# :math:`t^5 - t^6`. Then the objective is :math:`(\tfrac 3 5 - \tfrac S 3) y_5 + \tfrac S 3 z`,
+# without a minus sign. Powers of one number satisfy four rotated cones :math:`x y \ge w^2`, each
+# with equality:
 #
 # .. math:: 1 \cdot y_4 \ge y_2^2, \quad (y_2 - y_3)(y_4 - y_5) \ge (y_3 - y_4)^2,
 #           \quad y_3 y_5 \ge y_4^2, \quad (y_3 - y_4) z \ge (y_4 - y_5)^2 .
@@ -93,8 +96,8 @@ print(f"least energy {true_least:.9f}, by four cones {exact:.9f}")
 assert abs(exact - true_least) < 1e-7
 
 # %%
-# The four cones, and on them the curve of true powers, for :math:`t` from 0 to 1. It never leaves
-# the surface: it is the edge along which the program's answers lie.
+# The picture shows the four cones, and the curve of true powers for :math:`t` from 0 to 1. The
+# curve lies on the surface of each cone, and so do the solutions of the program.
 
 figure = plt.figure(figsize=(11, 10), layout="constrained")
 t = np.linspace(0, 1, 60)
@@ -124,16 +127,16 @@ plt.show()
 # An independent check: the identity
 # ----------------------------------
 #
-# Why can no lift have less energy? A cone :math:`x y \ge w^2` says :math:`x s^2 - 2 w s + y \ge 0`
-# for every :math:`s`. Multiply these four by weights that are not negative, and the sum is the
-# lifted energy less its tangent at :math:`t = s`:
+# Why has no lift less energy than the true powers? A cone :math:`x y \ge w^2` says
+# :math:`x s^2 - 2 w s + y \ge 0` for every :math:`s`. Multiply these four by weights that are not
+# negative, and the sum is the lifted energy less its tangent at :math:`t = s`:
 #
 # .. math:: \big(\tfrac 3 5 - \tfrac S 3\big) y_5 + \tfrac S 3 z - \lambda y_3 + \mu
 #           = d\,[s^4 - 2 s^2 y_2 + y_4] + c\,[\cdot] + e\,[\cdot] + \tfrac S 3 [\cdot] \ge 0 .
 #
 # Both sides are of first degree in :math:`S` and in the :math:`y`, and of degree 6 in :math:`s`.
-# Polynomials of degree 6 that agree at seven points are the same. So a finite number of evaluations
-# in whole fractions is a proof.
+# Polynomials of degree 6 that agree at seven points are the same. So a finite number of
+# evaluations in exact fractions is a proof.
 
 
 def difference(s: Fraction, S: Fraction, y: tuple[Fraction, ...]) -> Fraction:
@@ -161,13 +164,14 @@ assert len(checked) == 96
 assert all(value == 0 for value in checked)
 
 # %%
-# The weights are not negative for :math:`0 \le s \le 1` as long as :math:`e` is not. That is
-# concave in :math:`s`, with :math:`e = \tfrac 3 5 - \tfrac S 3` at 0 and :math:`e = \tfrac 5 3
-# (\tfrac{21}{25} - S)` at 1. So four cones are exact up to :math:`S = 21/25`; contacts whose discs
-# do not overlap have :math:`S \le 2/\pi = 0.64`.
+# The weights are not negative for :math:`0 \le s \le 1` if :math:`e` is not. The weight :math:`e`
+# is concave in :math:`s`, with :math:`e = \tfrac 3 5 - \tfrac S 3` at 0 and
+# :math:`e = \tfrac 5 3 (\tfrac{21}{25} - S)` at 1. So four cones are exact up to
+# :math:`S = 21/25`; contacts whose discs do not overlap have :math:`S \le 2/\pi = 0.64`.
 #
-# The whole scene is these cones for every asperity and one quadratic form. It finds the source
-# paper's 37 contacts, and Newton's method, which knows no cones, finds the same loads.
+# The program of a whole scene has these cones for every asperity, and one quadratic form. It finds
+# the 37 contacts of Dini and Hills (2009), and Newton's method, which uses no cones, finds the
+# same loads.
 
 asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
 scene = cr.Scene(
@@ -184,12 +188,12 @@ assert (by_newton.status == "contact").sum() == 37
 # Exercise
 # --------
 #
-# What happens to four cones beyond :math:`S = 21/25`? Take :math:`S = 0.97` and the slope at which
-# :math:`t = 0.9` should answer.
+# What happens with four cones beyond :math:`S = 21/25`? Take :math:`S = 0.97` and the slope
+# :math:`\lambda` for which the energy has its minimum at :math:`t = 0.9`.
 #
-# *Answer.* :math:`\lambda(0.9)` is that slope. The cones say less than the true least energy: one
-# weight of the identity has turned negative, and a lift that is no power of anything does better. A
-# fifth cone, with :math:`t` itself as a variable, mends that up to :math:`S = 1`, where the energy
+# *Answer.* The minimum of the cone program is below that of the energy: one weight of the identity
+# is negative, and a lift that does not consist of powers has less energy. A fifth cone, with
+# :math:`t` itself as a variable, makes the program exact up to :math:`S = 1`, where the energy
 # stops being convex.
 
 edge, at = 0.97, 0.9

@@ -2,22 +2,22 @@ r"""
 6. Active sets without guesswork
 ================================
 
-**Claim.** The loop that everybody writes first (solve, drop negative loads, add penetrations) can
-run round in circles on four asperities. Newton's method on the *normal map*, which has no set to
-guess, does not. And a certificate that knows neither says which of the two is right.
+**Claim.** A common loop (solve, drop negative loads, add penetrations) can cycle for ever with
+only four asperities. Newton's method on the *normal map*, which guesses no set, solves the same
+scene. A certificate, which uses neither method, shows which of the two results is right.
 
-Which asperities touch is the *active set*. If it were known, the loads would follow from as many
-equations as unknowns.
+Which asperities touch is the *active set*. If it were known, the loads would follow from a system
+with as many equations as unknowns.
 """
 
 # %%
 # The naive form: the guessing loop
 # ---------------------------------
 #
-# As contact is handled in many a finite-element code: in each pass take one Newton step for the
-# loads of the asperities that are thought to touch, drop those whose load has become negative, add
-# those that penetrate. An asperity that is added starts with the load it would carry alone. Stop
-# when a pass changes nothing.
+# Many finite-element codes treat contact in this way. Each pass takes one Newton step for the
+# loads of the asperities in the set, drops those whose load has become negative, and adds those
+# that penetrate. An asperity that is added starts with the load it would carry alone. The loop
+# ends when a pass changes nothing.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -66,9 +66,9 @@ def guessing_loop(k: Array, A: Array, D: Array, passes: int = 200) -> tuple[Arra
 
 
 # %%
-# Mostly it works. So look for a scene on which it does not: four asperities at random places and
-# heights, half as far from each other as in the source paper or more, whose contact discs do not
-# overlap, and on which the loop has not ended after 200 passes.
+# On most scenes this works. The next block finds a scene on which the loop has not ended after 200
+# passes: four asperities with random positions and heights, at distances of at least half the
+# spacing of Dini and Hills (2009), and without overlapping contact discs.
 
 
 def random_scene(rng: np.random.Generator) -> cr.Scene:
@@ -98,23 +98,24 @@ print("period:", period)
 assert period > 1
 
 # %%
-# Why? One asperity lies so deep in the dents of the others that it only just touches. Alone it
-# would carry far more. From there Newton's method for :math:`x^{2/3}`, which is concave, overshoots
-# zero; the asperity is dropped, then it penetrates, is added with the same large load, and so on
-# for ever. The rule looks at signs that belong to a point on the way, not to the answer.
+# Why? The loads on the other asperities lower one asperity so far that it only just touches. Alone
+# it would carry far more, and the loop starts it with that load. From there Newton's method for
+# :math:`x^{2/3}`, which is concave, overshoots zero; the asperity is dropped, then it penetrates,
+# is added with the same large load, and so on for ever. The loop decides by signs at an
+# intermediate point, not at the solution.
 #
 # The repair: the normal map
 # --------------------------
 #
-# Let one number say all of an asperity: :math:`\delta_i`, its indentation if it touches, minus its
+# Describe each asperity by one number :math:`\delta_i`: its indentation if it touches, minus its
 # gap if not. Its load is :math:`P_i = (\max(\delta_i, 0) / k_i)^{3/2}`, and the whole contact law
 # becomes one square system,
 #
 # .. math:: F(\delta) = \delta + A P(\delta) - D = 0 .
 #
-# It is once differentiable, so Newton's method applies, and the active set is the sign of the
-# answer. A step that does not make the residual smaller is halved. (Where the energy is convex,
-# :doc:`03_why_cvxpy_refuses`, the linear system of a step always has an answer.)
+# It is once differentiable, so Newton's method applies, and the signs of the solution give the
+# active set. A step that does not make the residual smaller is halved. (Where the energy is
+# convex, :doc:`03_why_cvxpy_refuses`, the linear system of a step always has a solution.)
 
 
 def normal_map(k: Array, A: Array, D: Array) -> tuple[Array, int]:
@@ -163,9 +164,9 @@ plt.show()
 # An independent check: the certificate
 # -------------------------------------
 #
-# ``certify`` is given loads, from anywhere, and proves how far they are from the solution. Of the
-# exact solution it proves here the same words from both; but the loop's loads are nearly a third of
-# the largest load from it, and those of the normal map are right but for rounding.
+# ``certify`` takes loads from any source and bounds their distance from the exact solution. Here
+# it proves the same statuses from both results. But the error of the loop's loads is nearly a
+# third of the largest load, while those of the normal map are accurate to rounding.
 
 force = contact.loads.max() / ((np.maximum(delta, 0) / k) ** 1.5).max()
 by_map = force * (np.maximum(delta, 0) / k) ** 1.5
@@ -183,14 +184,14 @@ assert bad.load_error > 0.01 * contact.loads.max()
 assert (abs(force * loads - contact.loads) <= bad.load_errors).all()
 
 # %%
-# It is not that the loop is near and only fails to end: in units of the largest load it is off by
+# The loop is not close to the solution either. Its largest error, over the largest load, is
 
 off = abs(force * loads - contact.loads).max() / contact.loads.max()
 print(f"{off:.3f}")
 assert off > 0.01
 
 # %%
-# How often? Of scenes drawn like this one, and by both methods:
+# How often does each method fail? Count over random scenes of the same kind:
 
 DRAWN = 200
 ended, reached = 0, 0
@@ -205,8 +206,8 @@ assert ended < DRAWN == reached
 # Exercise
 # --------
 #
-# One asperity alone, :math:`x^{2/3} = \delta` with :math:`k = 1`. From which starting loads does
-# Newton's method for :math:`x` become negative in its first step?
+# One asperity alone, :math:`x^{2/3} = \delta` with :math:`k = 1`. For which starting loads does
+# the first step of Newton's method for :math:`x` lead to a negative load?
 #
 # *Answer.* The step goes to :math:`x - \tfrac 3 2 x^{1/3} (x^{2/3} - \delta) = \tfrac 1 2 x^{1/3}
 # (3 \delta - x^{2/3})`: below zero for all :math:`x > (3 \delta)^{3/2}`, 5.2 times the right load.

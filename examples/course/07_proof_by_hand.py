@@ -2,12 +2,13 @@ r"""
 7. A proof one can check by hand
 ================================
 
-**Claim.** That two given loads are right to three digits, and that both asperities touch, can be
-proved with nothing but fractions. No number in the proof is rounded, and no solver is trusted.
+**Claim.** Fractions alone can prove that two given loads are correct to three digits, and that
+both asperities touch. No number in the proof is rounded, and no solver is trusted.
 
 Choose units in which an asperity of contact radius :math:`a` carries :math:`P = a^3` and is
-indented by :math:`a^2` (:math:`E^* = \tfrac 3 4`, :math:`R = 1`). Two asperities act on each other
-with :math:`A = \tfrac 1 4`, and are asked to give way by :math:`D = (1, \tfrac 3 5)`:
+indented by :math:`a^2` (:math:`E^* = \tfrac 3 4`, :math:`R = 1`). A unit load on one of two
+asperities displaces the other by :math:`A = \tfrac 1 4`. The prescribed displacements are
+:math:`D = (1, \tfrac 3 5)`:
 
 .. math:: a_1^2 + \tfrac 1 4 a_2^3 = 1, \qquad a_2^2 + \tfrac 1 4 a_1^3 = \tfrac 3 5 .
 """
@@ -16,7 +17,7 @@ with :math:`A = \tfrac 1 4`, and are asked to give way by :math:`D = (1, \tfrac 
 # The naive form
 # --------------
 #
-# Solve by computer and put the answer back into the equations.
+# Solve numerically and insert the solution into the equations.
 
 from fractions import Fraction
 
@@ -50,8 +51,7 @@ print("pairs of numbers that solve the first equation, says the computer:", len(
 assert len(solved) > 1
 
 # %%
-# Many answers to one equation, all near each other, and each of them exact if the computer is to be
-# believed. In truth:
+# In float64 many neighbouring numbers solve the equations exactly. In exact arithmetic:
 
 for x, y in solved[:3]:
     off = residuals((Fraction(float(x)), Fraction(float(y))))
@@ -59,43 +59,43 @@ for x, y in solved[:3]:
     assert off[0] != 0
 
 # %%
-# None is exact. And none ever will be: the answer is no fraction, so equality cannot be checked
-# with finitely many digits. An *inequality* can.
+# None of them is exact. The solution is irrational, so no fraction satisfies the equations
+# exactly. An *inequality* can be checked in fractions.
 #
 # The repair, line by line
 # ------------------------
 #
-# **1. Trial values**, from anywhere. Three digits will do.
+# **1. Trial values**, from any source. Three digits are enough.
 
 a: Pair = (Fraction(round(1000 * a1), 1000), Fraction(round(1000 * a2), 1000))
 P: Pair = (a[0] ** 3, a[1] ** 3)
 print("a =", *a, "  P =", *P)
 
 # %%
-# **2. Their residuals.** These loads solve the contact law exactly, for :math:`D + e` instead of
-# :math:`D`.
+# **2. Their residuals.** With the residuals :math:`e = w(P) - D`, the trial loads solve the
+# contact law exactly for :math:`D + e` instead of :math:`D`.
 
 e = residuals(a)
 print("e =", *e)
 assert all(abs(value) < Fraction(1, 500) for value in e)
 
 # %%
-# **3. A box.** No asperity carries more than it would alone: :math:`a_i^2 \le D_i`. Fractions above
-# the square roots:
+# **3. A box.** No asperity carries more than it would alone: :math:`a_i^2 \le D_i`. The box
+# :math:`b` consists of fractions above the square roots:
 
 b: Pair = (Fraction(1), Fraction(7, 9))
 assert all(b[i] ** 2 >= D[i] and b[i] >= a[i] for i in range(2))
 
 # %%
-# **4. Stiffness.** The indentation :math:`P^{2/3}` has the slope :math:`\tfrac 2 3 P^{-1/3} = 2 /
-# (3 a)`: in the box at least
+# **4. Stiffness.** The indentation :math:`P^{2/3}` has the slope
+# :math:`\tfrac 2 3 P^{-1/3} = 2 / (3 a)`. In the box it is at least :math:`h_i = 2 / (3 b_i)`:
 
 h: Pair = (2 / (3 * b[0]), 2 / (3 * b[1]))
 print("h =", *h)
 
 # %%
-# **5. Convexity.** For any two loads in the box, :math:`d` their difference, the displacements
-# differ by at least
+# **5. Convexity.** For any two loads :math:`P, P^*` in the box with the difference
+# :math:`d = P - P^*`, the displacements :math:`w` satisfy
 #
 # .. math:: d^\top (w(P) - w(P^*)) \ge h_1 d_1^2 + h_2 d_2^2 + 2 A d_1 d_2
 #           \ge (h_1 - A) d_1^2 + (h_2 - A) d_2^2 \ge (1 - \theta) (h_1 d_1^2 + h_2 d_2^2)
@@ -107,30 +107,31 @@ print("theta =", theta)
 assert theta == Fraction(3, 8)
 
 # %%
-# **6. Complementarity.** The true gaps :math:`g^*` are not negative, and 0 where :math:`P^*` is
-# not. So
+# **6. Complementarity.** The true gaps :math:`g^*` are not negative, and 0 where :math:`P^* > 0`.
+# So
 #
 # .. math:: d^\top (w(P) - w(P^*)) = d^\top (e - g^*) = d^\top e - P^\top g^* \le d^\top e .
 #
-# **7. Together**, by Cauchy and Schwarz with weights :math:`h`: the square of the distance,
-# :math:`h_1 d_1^2 + h_2 d_2^2`, is at most
+# **7. Together**, by the inequality of Cauchy and Schwarz with the weights :math:`h`, the square
+# of the distance, :math:`h_1 d_1^2 + h_2 d_2^2`, is at most
+# :math:`\sum_i e_i^2 / h_i / (1 - \theta)^2`:
 
 square = (e[0] ** 2 / h[0] + e[1] ** 2 / h[1]) / (1 - theta) ** 2
 bounds = [square / h[i] for i in range(2)]  # on d_1^2 and d_2^2
 print("errors squared at most:", *(f"{float(bound):.2e}" for bound in bounds))
 
 # %%
-# **8. The words.** An asperity touches if its load exceeds the bound on its error. Squares spare us
-# the root.
+# **8. Statuses.** An asperity touches if its load exceeds the bound on its error. To avoid roots,
+# compare squares.
 
 for i in range(2):
     print(f"asperity {i + 1}: P^2 = {float(P[i] ** 2):.4f} > {float(bounds[i]):.1e}: contact")
     assert P[i] ** 2 > bounds[i]
 
 # %%
-# That is a proof. Every line can be redone with pencil and paper. Where the proof would have failed
-# says as much: the picture shows, for all trial values, how large an error the certificate would
-# have granted, and where it would still have said "contact" of both.
+# This is a proof. Every line can be repeated with pencil and paper. The picture shows for all
+# trial values how large the bound on the error is, and for which of them the certificate still
+# proves that both asperities touch.
 
 x, y = np.meshgrid(np.linspace(0.7, 1.1, 161), np.linspace(0.4, 0.9, 161))
 h1, h2 = float(h[0]), float(h[1])
@@ -152,8 +153,9 @@ plt.show()
 # An independent check
 # --------------------
 #
-# First, 50 digits: bisection in fractions, and the true error beside the bound. Second, the
-# package, which does the same in floating-point numbers, and counts their rounding.
+# First, bisection in fractions finds 50 digits of the solution, and the true error is compared
+# with the bound. Second, the package computes the same bound in floating-point numbers and
+# includes their rounding.
 
 low, high = Fraction(0), Fraction(1)  # a_1: the second equation gives a_2^2, the first judges
 for _ in range(170):
@@ -186,12 +188,14 @@ assert float(error_1) <= certificate.load_errors[0] < 2 * float(bounds[0]) ** 0.
 # Exercise
 # --------
 #
-# A third asperity stands between them, with :math:`A_{31} = \tfrac 1 4`, :math:`A_{32} = \tfrac 1
-# 5`, asked for :math:`D_3 = \tfrac 1 5`. Prove that it is open.
+# A third asperity stands between them, with :math:`A_{31} = \tfrac 1 4`,
+# :math:`A_{32} = \tfrac 1 5` and the prescribed displacement :math:`D_3 = \tfrac 1 5`. Prove that
+# it is open.
 #
-# *Answer.* Its trial load is 0 and its gap :math:`g_3 = \tfrac 1 4 P_1 + \tfrac 1 5 P_2 - \tfrac 1
-# 5` is positive, so :math:`e_3 = 0`. The box gets :math:`b_3 = \tfrac{9}{20}`, and in line 5 each
-# :math:`h_i` loses the sum of its row. The error of the gap is at most the distance times
+# *Answer.* Its trial load is 0 and its gap
+# :math:`g_3 = \tfrac 1 4 P_1 + \tfrac 1 5 P_2 - \tfrac 1 5` is positive, so :math:`e_3 = 0`. The
+# box has :math:`b_3 = \tfrac{9}{20}`, and in line 5 subtract from each :math:`h_i` the sum of its
+# row of :math:`A`. The error of the gap is at most the distance times
 # :math:`(\tfrac 1 {16 h_1} + \tfrac 1 {25 h_2})^{1/2}`.
 
 h3 = 2 / (3 * Fraction(9, 20))

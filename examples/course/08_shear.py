@@ -2,11 +2,12 @@ r"""
 8. Shear as a difference of two pressings
 =========================================
 
-**Claim.** Press with :math:`P`, then shear with :math:`Q`. The shear force on every asperity is the
-friction coefficient times the load that it would lose if the total were reduced by :math:`Q / f`.
-Asperities that would come off are those that slide. So whoever can press can shear.
+**Claim.** Press a contact with the load :math:`P`, then shear it with the force :math:`Q`. The
+shear force on every asperity is the coefficient of friction :math:`f` times the load that it would
+lose if the total load were reduced by :math:`Q / f`. The asperities that would lose contact are
+those that slide. So a solver for normal contact also solves shear.
 
-That is Ciavarella and Jäger's theorem. It holds where a tangential force moves the surface as a
+This is Ciavarella and Jäger's theorem. It holds if a tangential force displaces the surface as a
 normal force does, up to a factor :math:`c_t = (2 - \nu) / (2 (1 - \nu))`.
 """
 
@@ -14,7 +15,8 @@ normal force does, up to a factor :math:`c_t = (2 - \nu) / (2 (1 - \nu))`.
 # The naive form
 # --------------
 #
-# Friction is proportional to load, so let every asperity take its share, :math:`Q_i = Q P_i / P`.
+# Friction is proportional to load. So assume that every asperity carries a share in proportion to
+# its load, :math:`Q_i = Q P_i / P`.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -61,9 +63,10 @@ print(f"needed displacements: from {shares.min():.2e} to {shares.max():.2e}")
 assert shares.max() > 1.2 * shares.min()
 
 # %%
-# All asperities are moved by the same two bodies: there is one displacement, not 37. The inner
-# ones, helped along by their neighbours, get too much force and the outer ones too little. And
-# beyond the limit there is no answer at all:
+# All asperities connect the same two bodies, so all must have the same displacement, not 37
+# different ones. The neighbours displace the inner asperities as well, so the assumption gives
+# these too much force, and the outer ones too little. It also gives a result beyond the limit of
+# friction, where there is none:
 
 try:
     cr.shear(pressed, force=1.01 * limit)
@@ -81,11 +84,11 @@ assert refused
 #
 # .. math:: Q_i = f (P_i - p_i), \qquad X = c_t f (D_0(P) - D_0(L)), \qquad s_i = c_t f g_i(L) .
 #
-# Why: subtract the two contact laws of an asperity that touches in both. Its own law gives :math:`k
-# P_i^{2/3} - k p_i^{2/3}`, which is Mindlin's displacement over :math:`c_t f`; the coupling is
-# :math:`A (P - p)`; the right side is the difference of approaches, the same for all. An asperity
-# that comes off in the second pressing has :math:`p_i = 0`, so :math:`Q_i = f P_i`: it slides, and
-# its gap is what it slides by.
+# The reason: subtract the two contact laws of an asperity that touches at both loads. Its own
+# compression gives :math:`k P_i^{2/3} - k p_i^{2/3}`, which is Mindlin's displacement over
+# :math:`c_t f`; the coupling is :math:`A (P - p)`; the right side is the difference of approaches,
+# the same for all. An asperity that is open in the second pressing has :math:`p_i = 0`, so
+# :math:`Q_i = f P_i`. It slides, and its slip is :math:`c_t f` times its gap.
 
 second = cr.press(scene, load=pressed.load - Q / FRICTION)
 forces = FRICTION * (pressed.loads - second.loads)
@@ -101,9 +104,9 @@ assert abs(forces.sum() / Q - 1) < 1e-12
 # Sticking discs
 # --------------
 #
-# Where an asperity does not slide it sticks on an inner disc of radius :math:`a_i (1 - Q_i / (f
-# P_i))^{1/3}`: the contact disc of the second pressing. Dark discs stick; the ring around them, and
-# the hatched discs, have slipped.
+# An asperity that does not slide sticks on an inner disc of radius
+# :math:`a_i (1 - Q_i / (f P_i))^{1/3}`: the contact disc of the second pressing. In the picture
+# dark discs stick; the rings around them and the hatched discs have slipped.
 
 figure, panels = plt.subplots(1, 3, figsize=(11, 4.4), layout="constrained", sharey=True)
 smooth_radius = cr.smooth(scene, load=pressed.load).contact_radius
@@ -131,10 +134,10 @@ plt.show()
 # An independent check
 # --------------------
 #
-# Three. Mindlin's law of one asperity, the coupling and the slip must give every asperity the same
-# displacement. Slip must occur only where friction is used up. And ``shear``, which solves for the
-# increments themselves and never takes a difference of two loads, must agree, with a proof of
-# which asperities slide.
+# There are three checks. Mindlin's law for one asperity, the interaction and the slip must add up
+# to the same displacement for every asperity. Slip may occur only at asperities whose shear force
+# has reached the limit of friction. And ``shear``, which computes the differences in ball
+# arithmetic, must agree, and prove which asperities slide.
 
 balance = needed(forces) + slips
 print(f"spread of the displacements: {np.ptp(balance) / displacement:.1e}")
@@ -151,9 +154,9 @@ assert ((state.status == "sliding")[touching] == (slips > 0)).all()
 # Exercise
 # --------
 #
-# From which shear force on does the outermost ring slide? Use nothing but ``press``.
+# At which shear force does the outermost ring start to slide? Use ``press`` only.
 #
-# *Answer.* It slides when it would come off: press with less and less until its load is 0, say at
+# *Answer.* It slides when it would lose contact: reduce the total load until its load is 0, at
 # :math:`L_A`. Then :math:`Q / (f P) = 1 - L_A / P = 0.3517`.
 
 outermost = touching[-1]

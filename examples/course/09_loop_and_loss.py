@@ -2,22 +2,23 @@ r"""
 9. The loop, memory, and the loss
 =================================
 
-**Claim.** Shear to and fro at constant normal load. The energy that a cycle costs can be read off
-the *indentation curve*, without any shear: it is eight :math:`c_t f^2` times the area between the
-curve and its chord. And a contact remembers its turning points, and nothing else.
+**Claim.** Shear a contact back and forth at constant normal load. The energy that a cycle
+dissipates follows from the curve of approach against load (the *indentation curve*), without any
+shear: it is :math:`8 c_t f^2` times the area between this curve and its chord. And a contact
+remembers only the turning points of the force.
 """
 
 # %%
 # The naive form
 # --------------
 #
-# By :doc:`08_shear` all shear states are differences of pressings. With :math:`V(L)` the least
-# energy at total load :math:`L`, whose slope is the approach :math:`D_0(L)`, the loss of a cycle
-# between :math:`\pm Q` is, with :math:`L = P - Q / f`,
+# By :doc:`08_shear` all shear states are differences of pressings. Let :math:`V(L)` be the minimum
+# of the energy at the total load :math:`L`; its derivative is the approach :math:`D_0(L)`. With
+# :math:`L = P - Q / f` the loss of a cycle between :math:`\pm Q` is
 #
 # .. math:: W = 8 c_t f^2 \Big\{ V(P) - V(L) - (P - L) \frac{D_0(P) + D_0(L)}{2} \Big\} .
 #
-# Two pressings; nothing could be simpler. Beside it, the sum over asperities that ``cycle``
+# This takes two pressings. The block compares it with the sum over asperities that ``cycle``
 # reports.
 
 from itertools import pairwise
@@ -70,18 +71,17 @@ assert abs(naive_loss(0.5) / cr.cycle(pressed, maximum=0.5 * limit).loss - 1) < 
 assert abs(naive_loss(1e-6) / tiny.loss - 1) > 10
 
 # %%
-# Right at large amplitudes; at small ones no digit is right, and even the sign is wrong: energies
-# of size :math:`P D_0` are subtracted, and what is left is of third order in :math:`Q`. A damper
-# lives at small amplitudes.
+# At large amplitudes the result is right. At small ones no digit is right, and even the sign is
+# wrong: energies of size :math:`P D_0` are subtracted, and their difference is of third order in
+# :math:`Q`. Dampers work at small amplitudes.
 #
 # The repair
 # ----------
 #
-# Solve for the increments :math:`u_i = P_i - p_i`, which are small themselves, and add up losses,
-# none of which is negative: Mindlin's for an asperity in partial slip, :math:`4 f P_i s_i` for one
-# that slides by :math:`s_i`. Nothing is subtracted. That is what ``cycle`` does; it reports as
-# ``balance_defect`` how well the trapezoid form agrees, evaluated to thirty digits, of which
-# cancellation leaves some :math:`10^{-28} (f P / Q)^3`.
+# Add up the losses of the asperities, none of which is negative: Mindlin's loss for an asperity in
+# partial slip, and :math:`4 f P_i s_i` for one that slides by :math:`s_i`. ``cycle`` does this.
+# Its field ``balance_defect`` is the relative difference from the formula above, evaluated to
+# thirty digits; because of cancellation it is about :math:`10^{-28} (f P / Q)^3`.
 
 print(f"loss over W0 at 1e-6: {tiny.loss_normalised:.10e}, defect {tiny.balance_defect:.0e}")
 assert tiny.balance_defect < 1e-28 * 1e6**3
@@ -90,10 +90,10 @@ assert tiny.balance_defect < 1e-28 * 1e6**3
 # The picture
 # -----------
 #
-# Left: the loop, whose area is the loss, and the smooth sphere's. Right: the indentation curve
-# between :math:`L` and :math:`P`, and its chord. The grey sliver, times :math:`8 c_t f^2`, is the
-# same loss. A straight indentation curve, as of a flat punch, would cost nothing: no slip before
-# gross sliding.
+# Left: the loop, whose area is the loss, and the loop of a smooth sphere. Right: the indentation
+# curve between :math:`L` and :math:`P`, and its chord. The grey area between them, times
+# :math:`8 c_t f^2`, is the same loss. If the curve were straight, as for a flat punch, nothing
+# would slip before gross sliding, and the loss would be 0.
 
 half = cr.cycle(pressed, maximum=0.8 * limit)
 loop = half.loop(200)
@@ -127,8 +127,8 @@ plt.show()
 # An independent check
 # --------------------
 #
-# The area of the sliver by Gauss's rule, from pressings alone, piece by piece between the loads at
-# which a ring begins to touch; and the area of the loop as a polygon, which lies inside it.
+# Gauss's rule gives the grey area from pressings alone, interval by interval between the loads at
+# which a ring begins to touch. A polygon inside the loop gives the area of the loop.
 
 onsets = np.unique((1 - cr.onset_of_sliding(pressed) / limit).round(12))
 ends = np.concatenate(([0.2], onsets[(onsets > 0.2) & (onsets < 1)], [1.0]))
@@ -150,9 +150,10 @@ assert 0 < half.loss - loop.area < 1e-3 * half.loss
 # Memory
 # ------
 #
-# The displacement is no function of the force: at 0.3 on the way up and on the way down it differs.
-# What the contact knows of its past are the turning points; a small loop that closes wipes its own
-# two out. After the detour to 0.4 and back the path goes on as if nothing had been.
+# The displacement is not a function of the force: at 0.3 it differs between the way up and the way
+# down. The state depends on the past through the turning points only, and a small loop that closes
+# removes its own two. After the detour to 0.4 and back the path continues as if there had been no
+# detour.
 
 plain = cr.history(pressed, forces=np.array([0.3, 0.7, 0.3, -0.5, 0.7]) * limit)
 nested = cr.history(pressed, forces=np.array([0.7, -0.1, 0.4, -0.1, -0.5, 0.7]) * limit)
@@ -170,12 +171,13 @@ assert abs(lost / inner.loss - 1) < 1e-9
 # Exercise
 # --------
 #
-# Halve a small amplitude. By how much does the loss fall? And what is the smooth sphere's loss at
-# small :math:`t = Q / (f P)`?
+# The amplitude of a small cycle is halved. By which factor does the loss fall? And what is the
+# smooth sphere's loss at small :math:`t = Q / (f P)`?
 #
-# *Answer.* By eight: the trapezoid rule is wrong by :math:`-\tfrac 1 {12} D_0'' (P - L)^3`. For the
-# sphere, expand :math:`e(t) = 1 - (1-t)^{5/3} - \tfrac{5 t}{6} [1 + (1-t)^{2/3}]`: the terms in
-# :math:`t` and :math:`t^2` cancel, and :math:`e = \tfrac 5 {162} t^3 + \dots`
+# *Answer.* The factor is 8, because the error of the trapezoid rule is
+# :math:`-\tfrac 1 {12} D_0'' (P - L)^3`. For the sphere, expand
+# :math:`e(t) = 1 - (1-t)^{5/3} - \tfrac{5 t}{6} [1 + (1-t)^{2/3}]`: the terms in :math:`t` and
+# :math:`t^2` cancel, and :math:`e = \tfrac 5 {162} t^3 + \dots`
 
 small, smaller = (cr.cycle(pressed, maximum=part * limit) for part in (2e-4, 1e-4))
 print(f"halved: {small.loss / smaller.loss:.4f}")

@@ -2,21 +2,22 @@ r"""
 10. The memory curve
 ====================
 
-**Claim.** Let normal load :math:`P` and shear :math:`Q = f T` move together along any path. The
-whole tangential state of the array, of however many asperities, is *one curve in the plane of*
-:math:`P` *and* :math:`T`. Ruler and pencil are enough to draw it: no elasticity enters. Elasticity
-is asked only in the end, once at each corner of the curve.
+**Claim.** Let the normal load :math:`P` and the shear force :math:`Q = f T` vary together along
+any path, with the coefficient of friction :math:`f`. *One curve in the plane of* :math:`P` *and*
+:math:`T` describes the whole tangential state, for any number of asperities. It can be drawn with
+ruler and pencil, without elasticity. Forces and displacements then need one normal contact for
+each corner of the curve.
 """
 
 # %%
 # The naive form
 # --------------
 #
-# :doc:`09_loop_and_loss` had constant :math:`P`: what a contact remembers is its turning points of
-# :math:`Q`, and a way back is the way there at twice the size. So let us follow a path in which
-# :math:`P` moves, too, and at each point shear the contact as it is pressed then: the history of
-# :math:`Q` at that :math:`P`. Four points: press; shear; press further at constant :math:`Q`;
-# and let the load go again, at constant :math:`Q`.
+# :doc:`09_loop_and_loss` had constant :math:`P`: a contact remembers the turning points of
+# :math:`Q`, and the branch after a turning point is the first loading at twice the size. Now
+# :math:`P` varies as well. The naive form takes the contact pressed by the present :math:`P` and
+# applies the history of :math:`Q` to it. The path has four points: press; shear; increase the load
+# at constant :math:`Q`; reduce it again at constant :math:`Q`.
 
 from fractions import Fraction
 from itertools import pairwise
@@ -57,11 +58,11 @@ assert abs(naive(1) / path.displacements[1] - 1) < 1e-12
 assert naive(2) < 0.8 * path.displacements[2]
 
 # %%
-# Right while :math:`P` rests, and wrong by a fifth as soon as it moves: by the naive form pressing
-# harder at constant :math:`Q` would move the bodies *back*. In truth new contact is laid around the
-# old one, it is laid without shear, and nothing moves at all. (At point 4 the naive form is right
-# again: so much slips on the way down that what came between is forgotten. That, too, should follow
-# from a rule.)
+# The result is right while :math:`P` is constant, and wrong by a fifth as soon as it changes: by
+# the naive form a larger load at constant :math:`Q` would move the bodies *back*. In fact new
+# contact forms around the old one, it carries no shear at first, and nothing moves. (At point 4
+# the naive form is right again: so much slips during unloading that the contact forgets the third
+# point. A rule should give this, too.)
 
 assert path.displacements[2] == path.displacements[1]
 
@@ -69,17 +70,22 @@ assert path.displacements[2] == path.displacements[1]
 # The repair
 # ----------
 #
-# Give the state a curve :math:`\vartheta(s)` over levels :math:`0 \le s \le P`, no steeper than 45
-# degrees, from the origin to the present point :math:`(P, T)`. It says with which slope each layer
-# of the contact was laid down. A straight piece of path changes it by one of three rules.
+# Describe the state by a curve :math:`\vartheta(s)` over the levels :math:`0 \le s \le P`, from
+# the origin to the present point :math:`(P, T)`, nowhere steeper than 45 degrees. The *layer* at
+# the level :math:`s` is the contact that is added as the load grows from :math:`s` to
+# :math:`s + ds`; the slope of the curve there, times :math:`f`, is the shear that the layer
+# carries per unit of load. A straight piece of the path changes the curve by one of three rules.
 #
-# 1. :math:`P` rises, and :math:`T` no faster: everything sticks. Draw the piece onto the end.
-# 2. The path runs back along the curve: nothing slips. Rub that part out.
-# 3. Else slip, of sign :math:`c`: lay a ruler of slope :math:`c` through the new point. Below the
-#    level :math:`L` where it meets the curve nothing changes; above, the ruler is the curve.
+# 1. :math:`P` rises, and :math:`T` changes no faster: everything sticks. Append the piece to the
+#    curve.
+# 2. The path runs back along the curve: nothing slips. Remove that part of the curve.
+# 3. Otherwise the contact slips, with a sign :math:`c = \pm 1`. Draw a line of slope :math:`c`
+#    through the new point. Below the level :math:`L` where it meets the curve, the curve remains;
+#    above, the line replaces it.
 #
-# Ten lines, in fractions. (What is left out: a falling path that meets the old curve again. There
-# all above is forgotten, and the rest of the piece starts afresh.)
+# The following function does this in fractions. (It omits one case: a falling path that meets the
+# old curve again. There the contact forgets everything above, and the rest of the piece starts
+# anew.)
 
 Curve = list[tuple[Fraction, Fraction]]
 
@@ -98,7 +104,7 @@ def draw(curve: Curve, P: Fraction, T: Fraction) -> Curve:
         return draw(back, P, T) if back[-1][0] >= P else [*back, (P, T)]
     c = 1 if lean > 0 else -1
     kept = list(curve)
-    while c * (T - c * (P - kept[-1][0]) - kept[-1][1]) >= 0:  # the ruler has not met it yet
+    while c * (T - c * (P - kept[-1][0]) - kept[-1][1]) >= 0:  # the line has not met it yet
         last = kept.pop()
     (s0, h0), (s1, h1) = kept[-1], last
     slope = (h1 - h0) / (s1 - s0)
@@ -117,9 +123,9 @@ for p, t in corners:
 # The picture
 # -----------
 #
-# Each step of the drawing: the path in grey, the curve in black, the ruler dashed; a dot marks the
-# front :math:`L`, down to which the contact slipped. Unloading at constant shear, the last step,
-# slips though :math:`Q` rests: friction gives way under it.
+# The picture shows each step: the path in grey, the curve in black, the line of rule 3 dashed; a
+# dot marks the front :math:`L`, down to which the contact slipped. In the last step the contact
+# slips although :math:`Q` is constant, because the limit of friction falls with the load.
 
 figure, places = plt.subplots(
     2, 2, figsize=(11, 8.5), sharex=True, sharey=True, layout="constrained"
@@ -147,19 +153,22 @@ plt.show()
 # Why it needs no elasticity
 # --------------------------
 #
-# Cut each contact into bristles, springs side by side, which bear :math:`f_b(s)` at total load
-# :math:`s`. Whatever slope :math:`\theta(s)` within :math:`\pm 1` we choose, let bristle :math:`b`
-# carry :math:`q_b = f \int \theta\, df_b`. Geometry says at every load that approach = own
-# indentation + what the others displace. That is *linear*, so multiply it by
-# :math:`c_t f\, \theta` and integrate over :math:`s`: it becomes the balance of tangential
-# displacements. So every curve is an equilibrium, whatever the shapes, heights or elasticity. And
-# it respects friction, :math:`|q_b| \le f f_b`, as slopes stay within 45 degrees. Which curve it
-# is, is decided by which bristles slip: those that join above :math:`L`. The ruler meets the curve
-# where as much force as asked for is found; and forces are *loads*, which add up to :math:`P` on
-# any scene.
+# Cut each contact into bristles, springs side by side, which carry the normal forces
+# :math:`f_b(s)` at the total load :math:`s`. Choose any slope :math:`\theta(s)` within
+# :math:`\pm 1`, and let bristle :math:`b` carry the shear force
+# :math:`q_b = f \int \theta\, df_b`. By the contact law, the approach minus a constant is at every
+# load the bristle's own indentation plus the displacement due to the loads on the other
+# asperities. This law is *linear*. Multiply its derivative by :math:`c_t f\, \theta`, where
+# :math:`c_t` is the ratio of tangential to normal compliance, and integrate over :math:`s`: the
+# result is the balance of tangential displacements. So every curve is an equilibrium, for any
+# shapes, heights and elasticity. It also respects friction, :math:`|q_b| \le f f_b`, because no
+# slope exceeds 45 degrees. The bristles that slip determine the curve: they are those that come
+# into contact above :math:`L`. The level :math:`L` follows from the total shear force alone,
+# because the forces :math:`f_b` add up to :math:`P` on any scene.
 #
-# The elastic problem is asked once per corner :math:`s_k`, as normal contact. With the bends
-# :math:`c_k` of the curve there,
+# The elastic problem is solved once per corner :math:`s_k`, as a normal contact with loads
+# :math:`P_i(s_k)` and approach :math:`D_0(s_k)`. With the change :math:`c_k` of slope at the
+# corner, the shear forces and the displacement are
 #
 # .. math:: Q_i = f \sum_k c_k P_i(s_k), \qquad X = c_t f \sum_k c_k D_0(s_k) .
 
@@ -188,10 +197,10 @@ print(f"{len(curves[-1]) - 1} presses for the last state, {path.presses} for all
 # An independent check
 # --------------------
 #
-# One contact, and no curve at all: 4000 bristles of one sphere on a plane, each of which sticks or
-# slips by itself. A parabola cut into bristles of stiffness :math:`E^* \Delta x` at :math:`\pm x`,
-# indented by :math:`\delta - x^2 / R`, is Hertz and Mindlin exactly. Move the two bodies in small
-# steps along the same four corners.
+# This check uses one contact and no curve: a sphere on a plane as 4000 bristles, each of which
+# sticks or slips by itself. As their number grows, bristles of stiffness :math:`E^* \Delta x` at
+# :math:`\pm x` with the indentation :math:`\delta - x^2 / R` give the laws of Hertz and Mindlin
+# exactly. Move the two bodies in small steps along the same path.
 
 R, count = 1.0, 4000
 one = cr.Scene(
@@ -227,10 +236,11 @@ assert worst < 2e-3
 # When it is exact
 # ----------------
 #
-# What the rules use is **order**: as the load rises no indentation falls and no gap opens. Then the
-# layers of the contact are nested, and "joined above :math:`L`" is a statement on loads alone. On
-# most scenes it holds, and ``order`` says how far that is proved. It can fail: put a low, small
-# summit between five crowded ones. Pressed far, they push the ground away from under it.
+# The rules assume **order**: as the load rises, no indentation falls and no gap opens. Then the
+# contact at a smaller load is part of the contact at a larger one, and the level at which a
+# bristle comes into contact is well defined. The field ``order`` of a result says whether order is
+# proved. It can fail: place a low, small summit between five crowded ones. Under a large load they
+# lower the surface under it faster than the sphere approaches.
 
 turn = 2 * np.pi * np.arange(5) / 5
 points = np.vstack(([0.0, 0.0], np.column_stack((np.cos(turn), np.sin(turn)))))
@@ -254,15 +264,16 @@ assert np.isinf(failing.displacement_errors).all()  # general steps instead, and
 # Exercise
 # --------
 #
-# Let the path be closed and repeat it. Let :math:`m_\pm` be the least :math:`P \pm T` along it.
-# Draw the two lines :math:`T = s - m_-` and :math:`T = m_+ - s`. Why does the curve pass through
-# their crossing for ever? At which level is it, for the four corners above?
+# A closed path is repeated. Let :math:`m_\pm` be the smallest :math:`P \pm T` along it. Draw the
+# two lines :math:`T = s - m_-` and :math:`T = m_+ - s`. Why does the curve always pass through
+# their crossing? At which level is the crossing for the four corners above?
 #
-# *Answer.* When :math:`P - T = m_-` is reached, the curve ends on the first line and is nowhere
-# steeper than it, so it lies above it; and likewise below the second. At the crossing
-# :math:`L^* = (m_+ + m_-)/2` both together leave one point. A later ruler never comes below it. So
-# everything below :math:`L^*` sticks for ever: here :math:`m_+ = 0.6`, :math:`m_- = 0.2`, and
-# :math:`L^* = 0.4`.
+# *Answer.* When the path reaches :math:`P - T = m_-`, the curve ends on the first line. It is
+# nowhere steeper than this line, so it lies above the line. In the same way it lies below the
+# second line once the path has reached :math:`P + T = m_+`. At the crossing,
+# :math:`L^* = (m_+ + m_-)/2`, only one point satisfies both. Later lines of rule 3 never meet the
+# curve below this level. So everything below :math:`L^*` sticks for ever: here :math:`m_+ = 0.6`,
+# :math:`m_- = 0.2`, and :math:`L^* = 0.4`.
 
 settled = cr.steady(scene, loads=P, forces=FRICTION * T)
 crossing = (min(p + t for p, t in corners) + min(p - t for p, t in corners)) / 2

@@ -10,6 +10,7 @@ from warnings import catch_warnings
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.io import savemat
 
 import convexrough as cr
 
@@ -73,6 +74,36 @@ def test_lists(tmp_path: Path, header: str) -> None:
     assert_allclose(surface.heights, HEIGHTS * (1e-3 if named else 1), rtol=1e-14)
 
 
+@pytest.mark.parametrize("form", ["vectors", "matrices", "matrices along x"])
+def test_matlab_with_axes(tmp_path: Path, form: str) -> None:
+    x, y = (2 * X[0], 3 * Y[:, 0]) if form == "vectors" else (2 * X, 3 * Y)
+    turned = "T" if "along" in form else "real"
+    arrays = {"X": getattr(x, turned), "Y": getattr(y, turned), "z": getattr(HEIGHTS, turned)}
+    savemat(tmp_path / "a.mat", arrays)
+    surface = raw(tmp_path / "a.mat")
+    assert_allclose(surface.pixel, (2, 3))
+    assert_array_equal(surface.heights, HEIGHTS)
+    savemat(tmp_path / "a.mat", arrays | {"z": arrays["z"].T})
+    with pytest.raises(cr.InputError, match="as y and x are long; transpose it"):
+        raw(tmp_path / "a.mat")
+
+
+@pytest.mark.parametrize("mark", ["nan", "BAD", "-9999", "1.70141e38", "N/A"])
+@pytest.mark.parametrize("listed", [False, True])
+def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
+    cells = np.array([[f"{each:.9f}" for each in row] for row in HEIGHTS], dtype=object)
+    cells[3, 4:6] = mark
+    rows = zip(X.ravel(), Y.ravel(), cells.ravel(), strict=True) if listed else cells
+    content = "".join(",".join(map(str, row)) + "\n" for row in rows)
+    path = text(tmp_path, "x,y,z\n" + content if listed else content)
+    pixel = None if listed else 1.0
+    with pytest.raises(cr.ConvexroughError, match=r"2 holes .*--fill"):
+        raw(path, pixel=pixel)
+    filled = raw(path, pixel=pixel, fill=True)
+    assert filled.filled == 2
+    assert_allclose(np.delete(filled.heights, 3, 0), np.delete(HEIGHTS, 3, 0), atol=1e-9)
+
+
 def test_a_file_is_levelled_unless_asked(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", HEIGHTS + 5 * X + 2 * Y)
     surface = cr.surface.read(tmp_path / "a.npy", pixel=10.0)
@@ -88,7 +119,7 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
 @pytest.mark.parametrize(
     ("content", "options", "message"),
     [
-        (matrix(), {}, "pixel: found none, expected its size, as the file does not say"),
+        (matrix(), {}, "pixel: found none, expected its size, which the file does not state"),
         (matrix(HOLED), {"pixel": 1.0}, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
         (matrix(np.full((7, 9), np.nan)), {"pixel": 1.0, "fill": True}, "expected some heights"),
         (matrix(np.ones((7, 9))), {"pixel": 1.0}, "found 1 everywhere, expected a rough surface"),
@@ -96,7 +127,7 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         (matrix(1e-9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
         (matrix(), {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
         (matrix(), {"pixel": 1.0, "unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
-        (matrix(), {"pixel": 1.0, "height_unit": "nm"}, "unit: found none, expected that of a pix"),
+        (matrix(), {"pixel": 1.0, "height_unit": "nm"}, "unit: found none, expected the unit of"),
         (
             "# Width: 9 µm\n# Height: 7 µm\n" + matrix(),
             {"unit": "nm"},
@@ -111,9 +142,9 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         (
             "x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n",
             {},
-            "x, y: found a place twice, expected each",
+            "x, y: found a point twice, expected each",
         ),
-        ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected places"),
+        ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
         ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
         ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
         ("", {}, "empty"),
@@ -177,7 +208,7 @@ class TestInstruments:
     def test_no_such_format(self, tmp_path: Path) -> None:
         path = tmp_path / "a.bin"
         path.write_bytes(b"\1\2\3" * 50)
-        with pytest.raises(cr.FileError, match=r"a\.bin: no format that SurfaceTopography knows"):
+        with pytest.raises(cr.FileError, match=r"a\.bin: SurfaceTopography cannot read it"):
             raw(path)
         with pytest.raises(cr.FileError, match="cannot be read: No such file"):
             raw(tmp_path / "b.gwy")

@@ -180,6 +180,26 @@ def tributary(case: Case) -> dict[str, Any]:
             "area [m²]": area}  # fmt: skip
 
 
+RULE = "-" * 60 + "\n"
+
+
+def abaqus(case: Case) -> str:
+    """A report of fields."""
+    title = "*** \nField Output Report, written Mon May  4\n\nSource 1\n---------\n\n"
+    title += 'Output sorted by column "Node Label".\n\n  Node Label      x       y      load\n'
+    columns = {"node": 1 + case.order, **case.table()}
+    below = "          @Loc 1  @Loc 1  @Loc 1\n"
+    return title + below + RULE + lines(columns, "  ", header=False)
+
+
+def ansys(case: Case) -> str:
+    """A listing of two pages."""
+    head = "\n PRINT F NODAL SOLUTION PER NODE\n\n  LOAD STEP=     1  SUBSTEP=     1\n"
+    head += "   TIME=    1.0000      LOAD CASE=   0\n\n    NODE    x    y    load\n"
+    nodes = lines({"node": 1 + case.order, **case.table()}, "   ", header=False).splitlines(True)
+    return head + "".join(nodes[:7]) + head + "".join(nodes[7:])
+
+
 GERMAN = dict(separator=";", decimal=",")
 SHUFFLED = lambda case, start=0, name="index": {  # noqa: E731
     name: case.order + start, "load": case.loads[case.order]
@@ -219,6 +239,8 @@ READ: dict[str, tuple[Callable[[Path, Case], str], str]] = {
         to, lines(case.table()).replace("load\n", "load\nm,m,N\n", 1)), ""),
     "titles above the header": (lambda to, case: raw(
         to, "Project: plate\nDate;1 May 2026\n\n" + lines(case.table(), ";", ",")), ""),
+    "a report of Abaqus": (lambda to, case: raw(to, abaqus(case), "a.rpt"), ""),
+    "pages of ANSYS": (lambda to, case: raw(to, ansys(case), "a.lis"), ""),
     "pixels of a map": (lambda to, case: text()(to, case.pixels()), "--within 1e-9"),
     "nodes with areas": (lambda to, case: text()(to, tributary(case)), ""),
     "nodal forces": (lambda to, case: text()(to, patches(case)), "--nodes"),
@@ -256,6 +278,12 @@ REFUSED: dict[str, tuple[Callable[[Path, Case], str], str]] = {
         to, case.table("x y pressure")), "expected a column 'area', or x and y on a regular grid"),
     "another name, not said": (lambda to, case: text()(to, case.table("x y Fz")),
                                "expected a column 'load'; --column load=Fz names another"),
+    "totals of Abaqus": (lambda to, case: raw(
+        to, abaqus(case) + f"\n   Total  0  0  {case.loads.sum()}\n", "a.rpt"),
+        "from the nearest asperity"),
+    "maxima of ANSYS": (lambda to, case: raw(
+        to, ansys(case) + "\n MAXIMUM ABSOLUTE VALUES\n NODE  1  2  3\n", "a.lis"),
+        "found 3 cells, expected 4, as in the header: MAXIMUM ABSOLUTE VALUES"),
     "a row of totals": (lambda to, case: raw(
         to, lines(case.table()) + f"Sum,,{case.loads.sum()}\n"), "column x: found 'Sum'"),
 }  # fmt: skip
@@ -340,6 +368,29 @@ def test_pixels_in_another_unit(tmp_path: Path, command: Any, case: Case) -> Non
     outcome = command("verify", "scene.toml", text()(tmp_path, shifted))
     assert "from the nearest asperity" in outcome.err
     assert "10^" not in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("scale", "said"),
+    [
+        ((1e-3, 1e-3), "found them 10^-3 times as far out"),
+        ((-1, 1), "x has the other sign: --scale x=-1"),
+        (None, "x and y are exchanged: --column x=y --column y=x"),
+    ],
+)
+def test_nodes_that_are_moved(
+    tmp_path: Path, command: Any, case: Case, scale: tuple[float, float] | None, said: str
+) -> None:
+    """In one line, also where every node is near some asperity."""
+    nodes = patches(case)
+    x, y = (
+        (nodes["y"], nodes["x"])
+        if scale is None
+        else np.c_[nodes["x"], nodes["y"]].T * np.c_[scale].T
+    )
+    outcome = command("verify", "scene.toml", text()(tmp_path, nodes | {"x": x, "y": y}), "--nodes")
+    assert (outcome.status, outcome.err.count("\n")) == (2, 1)
+    assert said in outcome.err
 
 
 def test_columns_that_differ_in_case(tmp_path: Path, command: Any, case: Case) -> None:
@@ -474,6 +525,17 @@ def test_the_modulus_is_said(tmp_path: Path, command: Any, case: Case) -> None:
     assert " mN\n" in outcome.out
 
 
+@pytest.mark.parametrize(("modulus", "said"), [("210e3", "softer than rubber"), ("5e12", "above")])
+def test_an_unlikely_modulus_is_told(
+    tmp_path: Path, command: Any, case: Case, modulus: str, said: str
+) -> None:
+    write_scene(tmp_path, f"youngs_modulus = {modulus}")
+    outcome = command("run", "scene.toml", "--no-figures")
+    assert outcome.status == 0
+    assert f"{said}" in outcome.err
+    assert " Pa): " in outcome.err
+
+
 def test_a_map_without_a_unit(tmp_path: Path, command: Any, case: Case) -> None:
     heights = cr.surface.self_affine(0.8, 1e-7, 2e-5, seed=1, pixels=64).heights
     np.save(tmp_path / "map.npy", heights)
@@ -521,7 +583,7 @@ def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
     assert f"{np.argmax(case.loads)} at (" in str(cases["loads: contact set"][0].text)
     again = command("verify", "scene.toml", name, "--junit", "found.xml")
     assert again.status == 2
-    assert "found.xml: is there already" in again.err
+    assert "found.xml: exists already" in again.err
 
 
 def test_bounds_are_said_in_plain_numbers() -> None:
