@@ -1,11 +1,11 @@
 """Rough frictional contact as one convex program, with a proof of which asperities touch.
 
-Nothing is imported before it is used: the command line starts at once, and an interrupt finds no
-import half done. The public names are listed in `__init__.pyi`.
+Each public name is imported when it is first used, so that the command line starts at once.
+`__init__.pyi` lists the public names.
 
-In the examples of docstrings `cr` is this package and `np` numpy, `scene` is that of `Scene` and
-`contact` that of `press`: the source paper's, of which 37 of 61 asperities touch; `new_scene` is
-what `convexrough new` writes, and `folder` is an empty folder.
+The examples in docstrings use these names: `cr` is this package and `np` is numpy; `scene` has the
+61 asperities of the source paper, and in `contact`, the example of `press`, 37 of them touch;
+`new_scene` is the scene file that `convexrough new` writes; `folder` is an empty folder.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""The public names, and where each lives: `__init__.py` imports one when it is first used."""
+"""The public names and their modules; `__init__.py` imports each name when it is first used."""
 
 from . import compare as compare
 from . import fields as fields

@@ -1,6 +1,6 @@
-"""`python -m convexrough`, and what the command `convexrough` starts.
+"""The entry point of `python -m convexrough` and of the command `convexrough`.
 
-Everything is imported inside, so that an interrupt is one line whenever it comes.
+`main` does all imports itself, so that an interrupt prints one line at any time.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def main() -> int:
         status = run()
         import signal
 
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is only to end
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the exit is left
         return status
     except KeyboardInterrupt:
         _say_interrupted()
@@ -32,7 +32,7 @@ def main() -> int:
 
 
 def _unraisable(unraised: Any) -> None:
-    """An interrupt that came where none can be raised, as inside a callback of a library."""
+    """Exit on an interrupt that cannot be raised, such as one in a callback of a library."""
     if issubclass(unraised.exc_type, KeyboardInterrupt):
         _say_interrupted()
         os._exit(INTERRUPTED)

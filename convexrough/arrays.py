@@ -1,4 +1,4 @@
-"""The arrays that everything here is made of."""
+"""Types of arrays, and small operations on arrays."""
 
 from __future__ import annotations
 
@@ -23,29 +23,29 @@ def frozen(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def summed(values: NDArray[Any]) -> Any:
-    """The sum along the last axis: a number, or (m, 1) of rows."""
+    """The sum along the last axis: a number for a vector, (m, 1) for m rows."""
     return values.sum(axis=-1, keepdims=values.ndim > 1)
 
 
 def largest(values: NDArray[Any]) -> Any:
-    """The largest along the last axis, at least 0: a number, or (m, 1) of rows."""
+    """The maximum of 0 and the last axis: a number for a vector, (m, 1) for m rows."""
     return values.max(axis=-1, initial=0.0, keepdims=values.ndim > 1)
 
 
 def even(value: float, length: int) -> Array:
-    """(length,) read-only, this value everywhere: one number in memory stands for all."""
+    """A read-only array (length,) of equal values that stores only one number."""
     return np.broadcast_to(np.float64(value), (length,))
 
 
 def evenly(function: Callable[[Array], Array], values: Array) -> Array:
-    """function(values), of each on its own: worked out once where one number stands for all."""
+    """function(values) of an elementwise function, evaluated once for an array of `even`."""
     if values.strides == (0,) and len(values):
         return even(function(values[:1])[0], len(values))
     return function(values)
 
 
 def taken(values: Array, which: Indices) -> Array:
-    """values[which]; still one number where that stands for all."""
+    """values[which]; from an array of `even`, again one that stores only one number."""
     if values.strides == (0,) and len(values):
         return even(values[0], len(which))
     return np.asarray(values[which])
@@ -54,7 +54,7 @@ def taken(values: Array, which: Indices) -> Array:
 def among_zeros(
     values: NDArray[Any], places: Indices, count: int, *, axis: int = 0
 ) -> NDArray[Any]:
-    """Values set at their places of `count` along an axis, among zeros (or False)."""
+    """An array of length `count` along an axis: values at these places, 0 or False elsewhere."""
     shape = list(values.shape)
     shape[axis] = count
     full = np.zeros(shape, dtype=values.dtype)
@@ -64,5 +64,5 @@ def among_zeros(
 
 
 def row_sums(values: Array) -> Array:
-    """(m,) the sums of the rows of (m, n), each rounded once."""
+    """The sums (m,) of the rows of an array (m, n), each rounded once."""
     return np.array([math.fsum(row) for row in values])

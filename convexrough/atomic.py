@@ -14,20 +14,20 @@ from typing import Any
 
 from convexrough.errors import file_errors
 
-#: What is left of a file by a process that was killed while it wrote: its name, and the process.
+#: Name of an unfinished file: the name of the file to be, and the process that writes it.
 _UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<process>\d+)\.unfinished", re.DOTALL)
 
 
 def unfinished(path: Path) -> Path:
-    """A name beside `path` for what is not whole yet."""
+    """The path next to `path` under which this process writes the file until it is complete."""
     return path.with_name(f".{path.name}.{os.getpid()}.unfinished")
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A name beside `path` to write to, which takes its place if all goes well, or vanishes.
+    """A temporary path; its file replaces `path` if the body succeeds and is removed otherwise.
 
-    Raises FileError where it cannot be written. A process that is killed leaves the file beside it.
+    Raises FileError where it cannot be written. A killed process leaves the temporary file behind.
     """
     temporary = unfinished(path)
     try:
@@ -35,19 +35,19 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
             os.replace(temporary, path)
     finally:
-        with suppress(OSError):  # a file system that became read-only has said so already
+        with suppress(OSError):  # a file system that became read-only has raised already
             temporary.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str | bytes) -> Path:
-    """Write a file; the path."""
+    """Write a file and return its path."""
     with replacing(path) as temporary:
         temporary.write_bytes(text if isinstance(text, bytes) else text.encode())
     return path
 
 
 def to_json(contents: Any) -> str:
-    """Valid JSON, in which infinities and nan are null."""
+    """The contents as valid JSON, with null for infinities and nan."""
     return json.dumps(_finite(contents), indent=2, allow_nan=False)
 
 
@@ -62,7 +62,7 @@ def _finite(value: Any) -> Any:
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Remove what killed processes left in a folder; of one that still runs, nothing."""
+    """Remove the unfinished files and folders of processes that no longer run."""
     for path in folder.iterdir():
         found = _UNFINISHED.fullmatch(path.name)
         if not found or path.is_symlink() or _runs(int(found["process"])):
@@ -74,6 +74,6 @@ def remove_unfinished(folder: Path) -> None:
 
 
 def _runs(process: int) -> bool:
-    import psutil  # only asked when something is left
+    import psutil  # imported only when an unfinished file is found
 
     return psutil.pid_exists(process)

@@ -1,4 +1,4 @@
-"""A cache on an object: derived objects are stored on it and freed with it."""
+"""Objects that store what was computed from them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ Made = TypeVar("Made")
 
 
 class Cached:
-    """Base class that caches objects derived from it; each is made once and freed with it."""
+    """Base class of objects that store what was computed from them and free it with themselves."""
 
     def cached(self, make: Callable[[Self], Made]) -> Made:
-        """make(self), cached. The result must not refer to self, or memory is freed late."""
+        """make(self), computed once. The result must not refer to self, or memory is freed late."""
         cache: dict[Any, Any] = self.__dict__.setdefault("_cache", {})
         if make not in cache:
             cache[make] = make(self)

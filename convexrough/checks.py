@@ -14,7 +14,7 @@ from convexrough.errors import InputError
 #: Sizes of numbers, in a scene's own units, whose products and powers float64 can hold.
 SMALLEST, LARGEST = 1e-60, 1e60
 
-#: Expectation for numbers outside this range.
+#: What error messages expect instead of a number outside this range.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
@@ -31,7 +31,7 @@ def non_negative(what: str, value: float | None) -> float:
 
 
 def is_sized(number: float) -> bool:
-    """0, or of a size whose products and powers float64 can hold."""
+    """True for 0, and for a size whose products and powers float64 can hold."""
     return number == 0 or SMALLEST <= abs(number) <= LARGEST
 
 
@@ -43,7 +43,7 @@ def between(what: str, value: float | None, low: float, high: float) -> float:
 
 
 def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
-    """A copy as float64 numbers, of any shape; text, dates and complex numbers are none."""
+    """A float64 copy, of any shape; raises InputError for text, dates and complex numbers."""
     try:
         if np.asarray(values).dtype.kind not in "biufO":
             raise TypeError("no real numbers")
@@ -61,10 +61,10 @@ def array(
     smallest: float = 0.0,
     one: str = "asperity",
 ) -> Array:
-    """A read-only copy of a vector; `sign` is "", "positive" or "not negative".
+    """A read-only copy of a vector. A number stands for `length` equal values.
 
-    A number stands for a vector of `length` equal values. smallest : smallest size, unless 0
-    one : the name of what has one value each, in messages
+    sign : "", "positive" or "not negative";  smallest : smallest size of values that are not 0
+    one  : what has one value each, for messages
     """
     vector = numbers(what, values)
     if vector.ndim == 0 and length is not None:
@@ -73,7 +73,7 @@ def array(
         count = "a list of numbers" if length is None else f"{length} values, one per {one}"
         raise InputError(what, found=f"shape {np.shape(values)}", expected=count)
     each = vector[:1] if vector.strides == (0,) else vector
-    good = np.abs(each) <= LARGEST  # nan is not
+    good = np.abs(each) <= LARGEST  # False for nan
     if sign == "positive":
         good &= each > 0
     elif sign == "not negative":
@@ -98,9 +98,9 @@ def friction(coefficient: float | None) -> float:
 
 
 def bearable(what: str, forces: ArrayLike, limit: float) -> Array:
-    """Shear forces, of any shape; raises InputError unless |Q| <= limit = f P."""
+    """The shear forces Q as an array of any shape; raises InputError unless |Q| <= limit = f P."""
     given = numbers(what, forces)
-    good = np.abs(given) <= limit * (1 + 1e-15)  # nan is not
+    good = np.abs(given) <= limit * (1 + 1e-15)  # False for nan
     if not good.all():
         place = np.unravel_index(int(np.argmin(good)), given.shape)
         name = f"{what}[{', '.join(map(str, place))}]" if place else what
@@ -126,7 +126,7 @@ def instance(what: str, value: object, kind: type) -> None:
 
 
 def exactly_one(first: str, a: object, second: str, b: object) -> None:
-    """Exactly one of two alternatives is given (the other is None)."""
+    """Raise InputError unless exactly one of two alternatives is given (the other is None)."""
     if (a is None) == (b is None):
         found = "neither" if a is None else "both"
         raise InputError(f"{first}, {second}", found=found, expected="exactly one of the two")
@@ -138,7 +138,7 @@ def fits_in_memory(what: str, count: float, bytes_each: float, power: int = 1) -
     needed = bytes_each * count**power
     if needed < 2**26:
         return
-    import psutil  # only asked when something may be large
+    import psutil  # imported only when an array may be large
 
     available = psutil.virtual_memory().available
     if needed > available:
@@ -151,7 +151,7 @@ def fits_in_memory(what: str, count: float, bytes_each: float, power: int = 1) -
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """What to suggest for an unknown name: the valid one like it, or else all of them."""
+    """A suggestion for an unknown name: the most similar valid name, or else all valid names."""
     import difflib  # only when something is misspelt
 
     names = {each.lower(): each for each in valid}
@@ -172,7 +172,7 @@ def _checked(
 
 
 def _number(what: str, value: float | None, expected: str) -> float:
-    if value is None or isinstance(value, (bool, str, bytes)):  # text stands for no number
+    if value is None or isinstance(value, (bool, str, bytes)):  # float() accepts text
         raise InputError(what, found=repr(value), expected=expected)
     try:
         return float(value)

@@ -1,9 +1,9 @@
 """Comparison of all formulations and solvers on one scene: agreement, certificate and time.
 
 The same code certifies all results; it does not depend on the solver. A certificate of global scope
-is about the only solution. If another certified result differs from it by more than the bounds, the
-mathematics or the code of the package has a mistake. Two certificates of local scope need not
-contradict each other: each box may contain a solution of its own.
+proves that the solution is the only one. If another certified result differs from it by more than
+the bounds, the mathematics or the code of the package has a mistake. Two certificates of local
+scope may differ by more than their bounds: each box may contain a solution of its own.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from convexrough.scene.scene import Scene
 #: How many asperities a message names before it says "and so many more".
 MOST_NAMED = 5
 
-#: Solvers that CVXPY reaches by these names, where packages of these names are installed.
+#: Solvers that CVXPY can call if the packages with these names are installed.
 THROUGH_CVXPY = ("SCS", "QOCO")
 
 
@@ -48,10 +48,12 @@ class Entry(Record):
     outcome : "answered", "refused" (the solver does not accept the scene) or "failed"
     message : the reason where there is no solution, else ""
     contact : the certified solution, or None
-    disagreement : max |load - reference| over the largest load of the reference; nan without both
-    different_statuses : asperities whose status differs from the reference; None without both
-    steps : the log of its iterations, where `compare` was asked for it: by step a mapping of
-        solver, step, objective and residual; those of OSQP and CVXPY are not known
+    disagreement : max |load - reference| over the largest load of the reference; nan where either
+        has no solution
+    different_statuses : number of asperities whose status differs from that in the reference; None
+        where either has no solution
+    steps : for each iteration its solver, step, objective and residual, if `compare` was called
+        with `log`; OSQP and the solvers of CVXPY do not report theirs
     memory : [bytes] largest increase of the resident memory of the process during the solution,
         without memory that the allocator reused; None if the system is not Linux
     """
@@ -68,10 +70,10 @@ class Entry(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Table, Plottable):
-    """All entries, that of the reference (Newton's method) first.
+    """The entries of all solvers; the first is that of the reference, Newton's method.
 
-    contradictions : sentences about pairs of certified results, at least one of global scope, that
-        contradict each other; each would be a mistake in the mathematics or in the code
+    contradictions : sentences about pairs of certified results, at least one of them of global
+        scope, that contradict each other; each shows a mistake in the mathematics or in the code
     """
 
     entries: tuple[Entry, ...]
@@ -79,7 +81,7 @@ class Comparison(Table, Plottable):
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
-        """The answers, in the order of their entries."""
+        """The solutions, in the order of their entries."""
         return tuple(entry.contact for entry in self.entries if entry.contact is not None)
 
     @property
@@ -97,7 +99,7 @@ class Comparison(Table, Plottable):
         yield "contradictions", "; ".join(self.contradictions) or "none"
 
     def _variables(self) -> Variables:
-        """A row for each entry; nan and "" where there is no answer."""
+        """A row for each entry; nan and "" where there is no solution."""
         none = np.full(len(self.contacts[0].scene), np.nan) if self.contacts else np.empty(0)
         answers = [entry.contact for entry in self.entries]
         statuses = [entry.different_statuses for entry in self.entries]
@@ -126,13 +128,13 @@ def compare(
     influence: Kind | None = None,
     log: bool = False,
 ) -> Comparison:
-    """Press on the scene with every solver.
+    """Solve one normal contact with every solver, and compare the results.
 
     approach [length] or load [force] : the prescribed quantity, exactly one
-    solvers  : settings objects; the default is `every_solver()`. Newton's method is the reference
+    solvers  : solver objects; the default is `every_solver()`. Newton's method is the reference
         and always the first
     influence : compliance operator, as for `press`
-    log : keep the steps of each solver in its entry
+    log : store the steps of each solver in its entry
 
     Raises InputError where the reference refuses the input. Errors of the other solvers are in
     their entries.
@@ -163,7 +165,7 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers: each formulation with its final Newton step and without it.
+    """All solvers; each formulation with a final Newton step is included with and without it.
 
     The cone program in CVXPY is also solved by SCS and QOCO, where they are installed.
     """
@@ -180,9 +182,9 @@ def every_solver() -> tuple[solvers.Solver, ...]:
 
 
 def solver_named(name: str) -> solvers.Solver:
-    """A solver by its name in a scene file, or made by `package.Class` without arguments.
+    """The solver with this name in scene files, or `package.Class()` for a name with a dot.
 
-    Raises InputError where there is none, it cannot be made, or it is no solver.
+    Raises InputError where there is no such solver.
     """
     module, _, attribute = name.rpartition(".")
     if not module:
@@ -231,10 +233,10 @@ def _relative(difference: Array, loads: Array) -> float:
 
 
 def _load_code_of(solver: solvers.Solver) -> None:
-    """Have a solver import what it needs, so that the time of the comparison is that of solving."""
+    """Make a solver import what it needs, so that the measured time contains no imports."""
     two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
     small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
-    with suppress(ConvexroughError):  # it will come again
+    with suppress(ConvexroughError):  # the scene itself raises it again
         press(small, approach=1e-2, solver=solver)
 
 
@@ -251,10 +253,11 @@ class Answer(NamedTuple):
 
 
 def contradictions(first: Answer, second: Answer) -> list[str]:
-    """Sentences about contradictions of two results, one for each kind; empty if there are none.
+    """A sentence for each kind of contradiction between two results; empty if there is none.
 
-    Loads, gaps or approaches differ by more than the sum of their bounds, or one result proves that
-    an asperity touches and the other that it is open. A result without proof contradicts nothing.
+    Two results contradict each other if loads, gaps or approaches differ by more than the sum of
+    their bounds, or if one proves that an asperity touches and the other that it is open. A result
+    without a proof contradicts nothing.
     """
     one, other = first.certificate, second.certificate
     if "none" in (one.scope, other.scope):

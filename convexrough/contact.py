@@ -43,16 +43,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contact(Cached, Table, Plottable):
-    """A solved normal contact. Arrays are (n,), in the order of the scene's asperities.
+    """A solved normal contact. Arrays are (n,), in the order of the scene's n asperities.
 
     loads         : [force]
     contact_radii : [length]
     approach      : D0 [length];  load : total [force]
     prescribed_load : [force] None where the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : largest relative error of the displacements D_i = D0 + d_i due to point forces
-        in place of pressures, to leading order: max sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i over
-        the loaded asperities
+    model_error   : largest relative error of the displacements D_i = D0 + d_i (d_i: the scene's
+        offsets) because point forces replace pressures, to leading order: max over the loaded
+        asperities of sum_j A_ij P_j a_j^2 / (10 r_ij^2) / D_i
     crowding      : largest (a_i + a_j) / r_ij; above 1 contact discs overlap and the model fails
     covered       : number of open summits under the contact disc of a neighbour, where a point
         force does not represent the pressure
@@ -87,12 +87,12 @@ class Contact(Cached, Table, Plottable):
 
     @property
     def gaps(self) -> Array:
-        """(n,) [length] 0 where touching."""
+        """Gaps (n,) [length], 0 where touching."""
         return self.certificate.gaps
 
     @property
     def status(self) -> NDArray[np.str_]:
-        """(n,) "contact", "open" or "undecided"; each of the first two is proved."""
+        """Statuses (n,): "contact" or "open" where that is proved, else "undecided"."""
         return self.certificate.status
 
     @cached_property
@@ -102,7 +102,7 @@ class Contact(Cached, Table, Plottable):
         >>> contact.warnings
         ()
         """
-        from convexrough.plausibility import warnings_of  # a floor above: when asked
+        from convexrough.plausibility import warnings_of  # a higher layer
 
         return tuple(warnings_of(self))
 
@@ -111,7 +111,7 @@ class Contact(Cached, Table, Plottable):
         yield from (("warning", each[:LINE]) for each in self.warnings)
 
     def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
-        """A proof file for `convexrough check` and other checkers; `.save(path)` writes it.
+        """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.
 
         sheared : shear states of this contact to prove as well, with the losses of their cycles
 
@@ -122,7 +122,7 @@ class Contact(Cached, Table, Plottable):
             NearState,
             prove,
             refuse_many,
-        )  # it reads and writes: when asked
+        )  # a higher layer
 
         refuse_many(self.scene)
         by_load, n = self.prescribed_load is not None, len(self.scene)
@@ -148,11 +148,11 @@ class Contact(Cached, Table, Plottable):
         load: float | None = None,
         holding: Holding | None = None,
     ) -> Gradient:
-        """Derivatives of a weighted sum of results with respect to the scene: one linear system.
+        """Derivatives of a weighted sum of results with respect to the scene, by one linear system.
 
-        loads, gaps    : (n,) weights on them;  approach, load : weights on the approach and the
-            total load. At least one is needed
-        holding        : "load" or "approach": which of the two is held; default what was prescribed
+        loads, gaps    : (n,) weights of the asperities' loads and gaps
+        approach, load : weights of the approach and the total load. At least one weight is needed
+        holding        : "load" or "approach", held constant; default: what was prescribed
 
         Raises InputError where no asperity is loaded, and SolverError where the state has no
         derivative because the energy is not convex there.
@@ -160,7 +160,7 @@ class Contact(Cached, Table, Plottable):
         >>> print(f"{contact.gradient(load=1.0, holding='approach').approach:.5g}")
         0.012145
         """
-        from convexrough.gradients.states import contact_gradient  # a floor above: when asked
+        from convexrough.gradients.states import contact_gradient  # a higher layer
 
         weights = {"loads": loads, "gaps": gaps, "approach": approach, "load": load}
         return contact_gradient(self, holding, **weights)
@@ -168,17 +168,15 @@ class Contact(Cached, Table, Plottable):
     def change(self, direction: Direction) -> ContactChange:
         """First-order changes of loads, gaps and approach for a change of the scene.
 
-        direction : the change of the scene
-
-        Raises InputError and SolverError as `gradient`.
+        Raises InputError and SolverError as `gradient` does.
         """
-        from convexrough.gradients.change import contact_change  # a floor above: when asked
+        from convexrough.gradients.change import contact_change  # a higher layer
 
         return contact_change(self, direction)
 
     @property
     def mean_pressures(self) -> Array:
-        """(n,) [force / length^2] load over contact area, 0 where open."""
+        """Load over contact area (n,) [force / length^2], 0 where open."""
         areas = np.pi * self.contact_radii**2
         return frozen(np.divide(self.loads, areas, out=np.zeros(len(areas)), where=areas > 0))
 
@@ -194,13 +192,13 @@ def press(
 ) -> Contact:
     """Press the sphere on the asperities by an approach [length] or with a load [force].
 
-    solver : default `solvers.Newton()`; or its name in a scene file, such as "conic"
+    solver : a solver or its name in scene files, such as "conic"; default `solvers.Newton()`
     start  : (n,) [force] initial loads; in the convex range the solution does not depend on them
     influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
         on a lattice), "scattered" (transforms on a mesh); None for the cheapest
 
-    Raises InputError for bad values and SolverError where the solver stops without a solution. A
-    solution without a certificate is returned: check `contact.certificate.scope`.
+    Raises InputError for bad values and SolverError where the solver stops without a solution.
+    Loads that could not be certified are returned too: check `contact.certificate.scope`.
 
     >>> contact = cr.press(scene, approach=5e-5)
     >>> print(f"{contact.load:.4g}", (contact.status == "contact").sum(), contact.certificate.scope)
@@ -223,9 +221,9 @@ def solve(
 
 
 def levels_of(contact: Contact) -> Levels:
-    """The normal solutions of a contact's scene at loads up to its own.
+    """The normal solutions of a contact's scene at loads up to the load of the contact.
 
-    `contact.cached(levels_of)` gives the same ones each time.
+    `contact.cached(levels_of)` returns the same object each time.
     """
     problem, state, found = vars(contact).get("_known") or _proved_again(contact)
     if isinstance(found, Obstacle):
@@ -239,14 +237,14 @@ def levels_of(contact: Contact) -> Levels:
     def pressed(at_load: NormalProblem) -> Array:
         try:
             return solver.solve(at_load).loads
-        except SolverError:  # crowded contacts: begin at the loads that are known
+        except SolverError:  # crowded contacts: start from the known loads
             return solver.solve(at_load, state.loads.high).loads
 
     return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 
 
 def _proved_again(contact: Contact) -> tuple[NormalProblem, Trial, Proved | Obstacle]:
-    """The problem of a contact, its loads refined, and the solution proved from them."""
+    """The problem of a contact, its refined loads, and what is proved from them."""
     load = contact.prescribed_load
     approach = contact.approach if load is None else None
     problem = NormalProblem.assemble(
@@ -269,7 +267,7 @@ def _contact(
         given = checks.array("start", start, length=len(scene), sign="not negative")
         first = given[problem.candidates] / force
     with threads.one_where(4 * len(problem)):
-        if len(problem) == 0:  # too small an approach for anything to touch
+        if len(problem) == 0:  # no asperity can touch at so small an approach
             solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
         else:
             solution = _solved(solver, problem, first)
@@ -306,13 +304,13 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
-    # A copy knows its solver by name alone, and proves again.
+    # An unpickled copy has only the solver's name, and proves its loads again.
     contact.__dict__.update(_by=solver, _known=known)
     return contact
 
 
 def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solution:
-    """The solver's solution, checked; an error gets its last loads in scene units and order."""
+    """The checked solution; the last loads in a SolverError are in scene units and order."""
     try:
         solution = solver.solve(problem, start)
     except SolverError as error:
@@ -327,10 +325,7 @@ def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solu
 
 
 def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> tuple[float, float]:
-    """Measures of the validity of point forces: `model_error` and `crowding` of Contact.
-
-    radii : (n,) [length] of the candidates
-    """
+    """`model_error` and `crowding` of Contact, from the candidates' contact radii (n,) [length]."""
     prescribed = solution.approach + problem.offsets
     touching = np.flatnonzero((solution.loads > 0) & (prescribed > 0))
     if len(touching) < 2:
@@ -344,12 +339,12 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
 
 
 def _covered(scene: Scene, radii: Array) -> int:
-    """How many open summits lie under a disc of one of these radii (n,) [length]."""
+    """The number of open summits under contact discs with these radii (n,) [length]."""
     discs, summits = np.flatnonzero(radii), np.flatnonzero(radii == 0)
     nearest = 0.0 if scene.lattice is None else scene.lattice.spacing
     if len(discs) == 0 or len(summits) == 0 or float(radii.max()) < 0.99 * nearest:
         return 0
-    from scipy.spatial import cKDTree  # 0.1 s to import: only where discs may be that wide
+    from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     points = scene.contact_points
     under = cKDTree(points[summits]).query_ball_point(points[discs], radii[discs])
@@ -357,15 +352,16 @@ def _covered(scene: Scene, radii: Array) -> int:
 
 
 def closest_changes(contact: Contact) -> Array:
-    """(n,) [force] what loads would gain, to first order, in the geometry "closest"; 0 in that.
+    """First-order load changes (n,) [force] if the geometry were "closest"; 0 if it is.
 
-    There an asperity meets the sphere at r R / (R + rho): its drop is less by
-    r^2 rho / (2 R (R + rho)), and influences 1 / (pi E* r) are greater by about rho / R. Hence
+    In that geometry an asperity of tip radius rho, at a distance r from the axis of a base of
+    radius R, meets the base at r R / (R + rho). Its drop is smaller by r^2 rho / (2 R (R + rho)),
+    and influences 1 / (pi E* r) are greater by about rho / R. At the same approach,
 
-        (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,     at the same approach,
+        (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 
-    with H = (2/3) indentation / P the local part of the Hessian; along x and y where the base has
-    a radius for each.
+    where H = (2/3) indentation / P is the local part of the Hessian. A base with two radii
+    contributes both terms along x and along y.
     """
     scene, touching = contact.scene, np.flatnonzero(contact.loads)
     gains = np.zeros(len(scene))
@@ -389,7 +385,7 @@ def closest_changes(contact: Contact) -> Array:
 
 
 def _nearer(scene: Scene, touching: Indices, A: Influence, loads: Array) -> Array:
-    """(n,) what displacements gain where points move inwards by rho / R of their place."""
+    """The increase (n,) of the displacements when points move inwards by rho / R of positions."""
     rho, radii = scene.asperities.tip_radii[touching], along(scene.sphere_radius)
     if radii[0] == radii[1]:
         return np.asarray(rho / radii[0] * A.apply(loads))

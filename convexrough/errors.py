@@ -17,7 +17,7 @@ class ConvexroughError(Exception):
     """Base class of all errors that this package raises."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickled with its message, so that it passes between processes unchanged."""
+        """Pickle the error with its message, so that it passes between processes unchanged."""
         return _again, (type(self), self.args), self.__dict__
 
 
@@ -47,9 +47,9 @@ class InputError(ConvexroughError, ValueError):
 
 @contextmanager
 def blamed_on(where: object, *, unless_known: bool = False) -> Iterator[None]:
-    """InputErrors of the body with this place (a file, a table) in front.
+    """Put this place (a file, a table) in front of the InputErrors of the body.
 
-    unless_known : those that name a place already stay as they are, as all mistakes of a file do
+    unless_known : leave errors that name a place unchanged. A MistakesError is never changed
     """
     try:
         yield
@@ -79,12 +79,12 @@ class TableError(MistakesError):
 
 
 class FileError(ConvexroughError):
-    """A file or folder cannot be read or must not be overwritten."""
+    """A file or folder cannot be read or written, or must not be overwritten."""
 
 
 @contextmanager
 def file_errors(path: Path, what: str) -> Iterator[None]:
-    """An OSError of the body as a FileError: what the path cannot do, and why."""
+    """Turn an OSError of the body into a FileError: what cannot be done with the path, and why."""
     try:
         yield
     except OSError as error:
@@ -117,7 +117,7 @@ class ProofError(ConvexroughError):
     """Nothing could be proved; the message says why."""
 
 
-#: Packages of extras with another name.
+#: Packages to install for the extras that are not named after their package.
 PACKAGES = {"parquet": "pyarrow", "dask": "'dask[dataframe]' distributed"}
 
 
@@ -134,4 +134,4 @@ class ExtraError(ConvexroughError, ImportError):
 
 
 class WorkerError(ConvexroughError):
-    """The workers stopped or run another version; rows computed so far are kept."""
+    """The workers stopped or run another version of the package; computed rows are kept."""

@@ -18,7 +18,7 @@ from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState
 from convexrough.sphere import hertz, surface_shear
 
-#: Pairs of a point and an asperity evaluated at a time: what stays in a cache.
+#: Number of pairs of a point and an asperity evaluated at a time: they fit in the CPU's cache.
 BLOCK = 2**14
 
 
@@ -32,7 +32,7 @@ def peak_pressures(contact: Contact) -> Array:
 
 
 def pressure(contact: Contact, points: ArrayLike) -> Array:
-    """Normal pressure p(r) = sum_i p0_i sqrt(1 - |r - r_i|^2 / a_i^2), over the discs that hold r.
+    """Normal pressure p(r) = sum_i p0_i sqrt(1 - |r - r_i|^2 / a_i^2) over discs that contain r.
 
     points : (..., 2) [length]  places on the surface; the axis of the sphere is the origin
     result : (...) [force / length^2]  0 outside every contact disc
@@ -50,9 +50,9 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
 
 
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
-    """Normal displacement of both surfaces, the far bodies at rest: (...) [length].
+    """Sum of both surfaces' normal displacements relative to the distant bodies: (...) [length].
 
-    The sum of the fields of all asperities, with pressures on discs and not point forces.
+    It is the sum of the fields of all asperities, with Hertz pressures and not point forces.
     """
     touching = np.flatnonzero(contact.loads)
     centres = contact.scene.contact_points[touching]
@@ -67,9 +67,10 @@ def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
 
 
 def traction(state: ShearState, points: ArrayLike) -> Array:
-    """Shear traction q(r) along x of first loading: (...) [force / length^2].
+    """Shear traction q(r) along x after loading from rest: (...) [force / length^2].
 
-    Of each asperity f p0 sqrt(1 - r^2/a^2), less f p0 (c/a) sqrt(1 - r^2/c^2) where it sticks.
+    Each asperity contributes f p0 sqrt(1 - r^2/a^2), minus f p0 (c/a) sqrt(1 - r^2/c^2) within its
+    stick radius c.
     """
     asperities = _Sheared(state)
     return _sum_over_discs(
@@ -83,11 +84,11 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
 
 
 def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
-    """Displacement along x of both surfaces, the far bodies at rest: (...) [length].
+    """Sum of both surfaces' displacements along x relative to the distant bodies: (...) [length].
 
-    The sum over asperities of Johnson's 3.91, the source's [A3] and [A4] for both bodies. Where the
-    surfaces stick, the displacement of the deep points less this is 0, to the accuracy of
-    Ciavarella and Jaeger's forces: they are exact only on average over directions.
+    It is the sum over asperities of Johnson's (3.91) for both bodies, the source paper's [A3] and
+    [A4]. Where the surfaces stick, it equals the relative displacement of the bodies, to the
+    accuracy of Ciavarella and Jaeger's forces, which are exact only on average over directions.
     """
     asperities = _Sheared(state)
     material = state.contact.scene.material
@@ -108,7 +109,7 @@ def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
 
 
 class _Sheared:
-    """The loaded asperities of a friction state, as `sphere.surface_shear` asks for them.
+    """The loaded asperities of a shear state, in the form that `sphere.surface_shear` needs.
 
     centres : (n, 2) [length];  radii : (n,) a [length];  peaks : (n,) f p0 [force / length^2]
     shares  : (n,) Q_i / (f P_i), exactly +-1 where sliding
@@ -129,10 +130,10 @@ def cell_areas(points: Array) -> Array:
 
     points : (n, 2) [length];  result : (n,) [length^2], nan on the outline
 
-    Of each Delaunay triangle, (edge)^2 cot(opposite angle) / 8 goes to both ends of each edge.
-    About 2 s for 1e5 points.
+    Each Delaunay triangle adds (edge)^2 cot(opposite angle) / 8 to both ends of each of its edges.
+    It takes about 2 s for 1e5 points.
     """
-    from scipy.spatial import Delaunay, QhullError  # 0.1 s to import: only when asked
+    from scipy.spatial import Delaunay, QhullError  # takes 0.1 s to import
 
     unknown: Array = np.full(len(points), np.nan)
     if len(points) < 4:
@@ -148,7 +149,7 @@ def cell_areas(points: Array) -> Array:
         edge = points[right] - points[left]
         squared = np.sum(edge**2, axis=1)
         cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-        flat = cross < 1e-9 * squared  # three points of a straight outline, but for rounding
+        flat = cross < 1e-9 * squared  # three points in line, within rounding
         share = squared * np.sum(u * v, axis=1) / np.where(flat, np.nan, cross) / 8.0
         np.add.at(areas, left, share)
         np.add.at(areas, right, share)
@@ -157,7 +158,7 @@ def cell_areas(points: Array) -> Array:
 
 
 def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> Array:
-    """sum_i peak_i sqrt(1 - |r - r_i|^2 / radius_i^2) over the discs that hold r.
+    """sum_i peak_i sqrt(1 - |r - r_i|^2 / radius_i^2) over the discs that contain r.
 
     points : (..., 2) [length];  centres : (n, 2) [length];  radii : (n,) [length], positive
     peaks  : (n,) [any];  result : (...) [as peaks]
@@ -173,12 +174,12 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
 def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
-    """sum_i profile(|r - r_i|, i) over the discs that hold r.
+    """sum_i profile(|r - r_i|, i) over the discs that contain r.
 
-    Time and memory grow with the number of points and of the discs about each, not with their
-    product: discs are found by a k-d tree, in groups whose radii differ by less than a factor 2.
+    Time and memory grow with the number of pairs of a point and a disc that contains it: a k-d tree
+    finds the discs, in groups whose radii differ by less than a factor 2.
     """
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+    from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     places = _places(points)
     flat = places.reshape(-1, 2)
@@ -200,7 +201,7 @@ def _sum_over_discs(
 def _sum_everywhere(
     points: ArrayLike, centres: Array, field: Callable[[Array, Array], Array]
 ) -> Array:
-    """sum_i field_i(r - r_i), in blocks: `field` takes x and y (m, n) from all n centres."""
+    """sum_i field_i(r - r_i), in blocks: `field` takes x and y (m, n) relative to n centres."""
     places = _places(points)
     flat = places.reshape(-1, 2)
     total = np.zeros(len(flat))

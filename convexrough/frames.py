@@ -1,4 +1,4 @@
-"""Named arrays as a data frame of pandas or a data set of xarray, which are loaded only here."""
+"""Named arrays as a pandas data frame or an xarray data set; only this module imports the two."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-#: What each array is along, and the array. What the first is along are the rows of a data frame.
+#: By name: the dimensions of an array, and the array. Those of the first are a data frame's rows.
 Variables: TypeAlias = dict[str, tuple[tuple[str, ...], NDArray[Any]]]
 
 #: The names of the components of a vector.
@@ -37,7 +37,7 @@ def dataframe(variables: Variables, attributes: dict[str, Any]) -> pandas.DataFr
 
 
 def dataset(variables: Variables, attributes: dict[str, Any]) -> xarray.Dataset:
-    """A data set of copies of all arrays, which may be changed; those of a result may not."""
+    """A data set with writable copies of all arrays."""
     arrays = {name: (along, np.array(values)) for name, (along, values) in variables.items()}
     known = {"x", "y", "asperity"} & set(arrays)
     vectors = any("direction" in along for along, _ in arrays.values())

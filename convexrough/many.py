@@ -1,8 +1,8 @@
 """Press many scenes at once, and compute a cycle of each.
 
 All scenes have the same number of asperities. Scenes with the same positions and tip radii share
-one matrix, so that a product for all of them is one product of matrices. Scenes that this does not
-prove are solved one by one.
+one matrix, so that a product for all of them is one product of matrices. Scenes whose solution is
+not proved in this way are pressed one by one.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from convexrough.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contacts(Table):
-    """What `press_many` finds of m scenes with n asperities each. Errors are proved bounds.
+    """The contacts of m scenes with n asperities each. Errors are proved bounds.
 
     `contacts[k]` is the `Contact` that `press` returns for scene k, made on first access.
 
     controls : (m,) what was prescribed: approaches [length], or loads [force] where `by_load`
     loads, approaches : (m,) totals [force], and D0 [length];  load_errors, approach_errors : (m,)
     asperity_loads : (m, n) [force];  asperity_load_errors : (m, n)
-    status   : (m, n) "contact", "open" or "undecided"; each of the first two is proved
-    alone    : (k,) indices of the scenes whose solution the rows do not prove to be the only one:
-        these were pressed one by one
+    status   : (m, n) "contact" or "open" where that is proved, else "undecided"
+    alone    : (k,) indices of the scenes that were pressed one by one, because the computation of
+        all together did not prove their solution to be the only one
 
     >>> contacts = cr.press_many([scene, scene], approach=[5e-5, 1e-5])
     >>> contacts.asperity_loads.shape, (contacts.status == "contact").sum(axis=1).tolist()
@@ -64,7 +64,7 @@ class Contacts(Table):
         return len(self.scenes)
 
     def __getitem__(self, k: int) -> Contact:
-        """One of them."""
+        """The contact of scene k."""
         k = range(len(self))[k]
         known: dict[int, Contact] = self.__dict__.setdefault("_known", {})
         if k not in known:
@@ -74,9 +74,9 @@ class Contacts(Table):
         return known[k]
 
     def cycles(self, maximum: ArrayLike, minimum: ArrayLike | None = None) -> Cycles:
-        """The steady cycle of each between shear forces [force], (m,) or one for all.
+        """The steady cycle of each contact between two shear forces.
 
-        minimum : default the negatives of the maxima
+        maximum, minimum : (m,) [force], or one for all; the default minimum is -maximum
 
         Raises InputError where a scene has no friction, a minimum exceeds its maximum, or either
         exceeds f P in size.
@@ -120,7 +120,7 @@ class Contacts(Table):
 
     @property
     def _together(self) -> list[PressedRows]:
-        """Those proved in rows; a copy presses again."""
+        """The scenes proved together, in stacks; an unpickled copy computes them again."""
         if "_pressed" not in self.__dict__:
             self.__dict__["_pressed"] = in_rows(self.scenes, self.controls, self.by_load)
         rows: list[PressedRows] = self.__dict__["_pressed"]
@@ -129,9 +129,9 @@ class Contacts(Table):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cycles(Table):
-    """A steady cycle of each of m contacts, as of `Cycle`. Arrays are (m,), status is (m, n).
+    """The steady cycles of m contacts. Arrays are (m,), status is (m, n), with `Cycle`'s meanings.
 
-    `cycles[k]` is the `Cycle` of one of them.
+    `cycles[k]` is the `Cycle` of contact k.
 
     >>> cycles = cr.press_many([scene, scene], load=3.6e-7).cycles([9e-8, 4e-8])
     >>> print([f"{loss:.3g}" for loss in cycles.losses], cycles[0].loss == cycles.losses[0])
@@ -157,7 +157,7 @@ class Cycles(Table):
         return len(self.contacts)
 
     def __getitem__(self, k: int) -> Cycle:
-        """One of them."""
+        """The cycle of contact k."""
         return cycle(
             self.contacts[k], maximum=float(self.maximum[k]), minimum=float(self.minimum[k])
         )
@@ -166,9 +166,9 @@ class Cycles(Table):
 def press_many(
     scenes: Sequence[Scene], *, approach: ArrayLike | None = None, load: ArrayLike | None = None
 ) -> Contacts:
-    """Many scenes with as many asperities, pressed by an approach [length] or a load [force].
+    """Press many scenes with equal numbers of asperities by approaches or with loads.
 
-    approach or load : one for all, or one for each
+    approach [length] or load [force] : (m,), or one for all
 
     Raises InputError for scenes of different sizes, and what `press` raises.
 
@@ -201,7 +201,7 @@ def press_many(
     for k in np.flatnonzero(alone).tolist():
         one = known[k] = _pressed(scenes[k], name, controls[k])
         proof = one.certificate
-        errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and that of the sum
+        errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the roundoff of the sum
         own = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
         for total, value in zip(TOTALS, own, strict=True):
             fields[total][k] = value

@@ -1,4 +1,4 @@
-"""How much memory work takes."""
+"""Measurement of the memory that a computation takes."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from pathlib import Path
 
 
 class MemoryRise:
-    """How far the resident memory of this process has risen above its level at the start.
+    """The rise of this process's resident memory since the object was made.
 
-    Linux keeps the highest level and forgets it on request, whatever language asked for the memory.
-    An allocator that reuses what it holds hides some.
+    Linux records the peak of all memory of a process and resets it on request. Memory that an
+    allocator reuses is not counted.
     """
 
     def __init__(self) -> None:
         self._before: int | None = None
-        with suppress(AttributeError, OSError, TypeError):  # glibc: give back what is freed
+        with suppress(AttributeError, OSError, TypeError):  # glibc: release freed memory
             ctypes.CDLL(None).malloc_trim(0)
         with suppress(OSError):
             Path("/proc/self/clear_refs").write_text("5")
             self._before = self._level("VmRSS")
 
     def risen(self) -> int | None:
-        """[bytes] None where the system does not say."""
+        """The highest rise so far [bytes]; None if the system does not report it."""
         peak = self._level("VmHWM")
         if self._before is None or peak is None:
             return None

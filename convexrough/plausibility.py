@@ -1,4 +1,4 @@
-"""How far a contact is from where its model ceases to hold: numbers, and warnings in words."""
+"""Measures of whether the asperity model holds for a contact, and warnings where it does not."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ import numpy as np
 from convexrough.contact import Contact
 from convexrough.tabular.units import UnitNames
 
-#: Fewer asperities in contact than this are no rough surface.
+#: Contacts of fewer asperities than this get a warning.
 FEW = 5
 
 #: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
 RUBBER, DIAMOND = 1e6, 1.2e12
 
-#: Contact radius over radius from which the parabola differs from the sphere by 1 %.
+#: Contact radius over radius of curvature at which a paraboloid differs from a sphere by 1 %.
 STEEP = 0.2
 
 
 def limits_of(contact: Contact) -> dict[str, Any]:
-    """Numbers that tell how far the model holds, with no unit but that of pressure.
+    """Measures of the validity of the model, by name; those without a unit are ratios or counts.
 
-    contact      : how many asperities touch;  covered, crowding : as in `Contact`
-    extent       : how far contact reaches from the axis, over the radius of the base
-    steepness    : the largest contact radius over the tip radius
-    mean_pressure, hardness : the largest [force / length^2], and the material's, or None
-    beyond_hardness : how many asperities are
-    mismatch     : Dundurs' beta of two bodies, which is neglected
+    contact      : number of asperities that touch;  covered, crowding : as in `Contact`
+    extent       : largest distance of a point of contact from the axis, over the base's radius
+    steepness    : largest ratio of contact radius to tip radius
+    mean_pressure, hardness : largest mean pressure; the material's hardness or None
+        [force / length^2]
+    beyond_hardness : number of asperities whose mean pressure exceeds the hardness
+    mismatch     : Dundurs' beta of two bodies, which the model neglects
     """
     scene, touching = contact.scene, contact.loads > 0
     radii, hardness = contact.contact_radii, scene.material.hardness
@@ -50,63 +51,63 @@ def limits_of(contact: Contact) -> dict[str, Any]:
 
 
 def warnings_of(contact: Contact) -> Iterator[str]:
-    """What a user should know of a contact before relying on it, in words with numbers."""
+    """Reasons not to rely on a contact, each a sentence with numbers."""
     if contact.certificate.scope == "none":
-        yield "not certified: these loads come without any proof"
+        yield "not certified: nothing is proved about these loads"
     elif undecided := int((contact.status == "undecided").sum()):
-        yield f"not certified: {undecided} of the asperities undecided"
+        yield f"not certified: undecided asperities: {undecided}"
     yield from doubts(limits_of(contact))
 
 
 def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
-    """What a user should know of the summary of a contact, in words with numbers."""
+    """Reasons not to rely on a contact, from its `limits_of`, each a sentence with numbers."""
     if 0 < normal["contact"] < FEW:
         yield (
-            f"asperities in contact: {normal['contact']}, fewer than {FEW}: hardly a rough "
-            "surface; is the spacing, or the approach or load, in the unit that was meant?"
+            f"asperities in contact: {normal['contact']}, fewer than {FEW}: too few for a rough "
+            "surface; check the units of the spacing and of the approach or load"
         )
     if normal["extent"] > STEEP:
         yield (
-            f"contact reaches to {normal['extent']:.3g} of the base's radius: its paraboloid "
-            f"differs from a sphere by 1 % at {STEEP:g}"
+            f"contact extends to {normal['extent']:.3g} of the base's radius from the axis: the "
+            f"paraboloid of the model differs from a sphere by 1 % at {STEEP:g}"
         )
     if normal["steepness"] > STEEP:
         yield (
-            f"contact radius is {normal['steepness']:.3g} of the tip radius: the paraboloid of a "
-            f"tip differs from a sphere by 1 % at {STEEP:g}"
+            f"contact radius is {normal['steepness']:.3g} of the tip radius: the paraboloid of the "
+            f"model differs from a sphere by 1 % at {STEEP:g}"
         )
     if normal["crowding"] > 1:
         yield (
-            "contact discs overlap (crowding above 1): the asperity model does not hold; crowding "
-            f"is {normal['crowding']:.3g}"
+            f"contact discs overlap (crowding {normal['crowding']:.3g}, above 1): the asperity "
+            "model does not hold"
         )
     if normal["covered"]:
         yield (
             f"open summits under a contact disc: {normal['covered']}; a point force does "
-            "not stand for its pressure there"
+            "not represent the pressure of the disc at these summits"
         )
     if normal["beyond_hardness"]:
         unit = f" {pressure_unit}" if pressure_unit else ""
         yield (
-            f"mean pressure up to {normal['mean_pressure']:.4g}{unit} beyond the hardness, "
-            f"{normal['hardness']:.4g}{unit}, on {normal['beyond_hardness']} of "
+            f"mean pressure up to {normal['mean_pressure']:.4g}{unit} exceeds the hardness "
+            f"{normal['hardness']:.4g}{unit} on {normal['beyond_hardness']} of "
             f"{normal['contact']} asperities: they would yield"
         )
 
 
 def unlikely_modulus(modulus: float, units: UnitNames) -> Iterator[str]:
-    """A contact modulus that only gels have, or no pair of bodies, where units are named."""
+    """A warning if the contact modulus is that of a gel, or of no pair of bodies; needs units."""
     unit = units.unit("pressure")
     if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
         limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"
         yield (
-            f"contact modulus is {described_modulus(modulus, units)}: {limit} Pa; is it in the "
-            "units of [units]?"
+            f"contact modulus is {described_modulus(modulus, units)}: {limit} Pa; check that it "
+            "is in the units of [units]"
         )
 
 
 def described_modulus(modulus: float, units: UnitNames) -> str:
-    """A contact modulus, also in pascals where the units are named."""
+    """A contact modulus as text, also in pascals if the units are named."""
     unit = units.unit("pressure")
     if unit is None:
         return f"{modulus:.10g}"

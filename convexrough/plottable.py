@@ -1,4 +1,4 @@
-"""`result.plot()`: the plotting modules are in a higher layer and are imported when called."""
+"""The method `plot` of results; it imports the plotting modules, a higher layer, when called."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ class Plottable:
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
         """Draw the main figure of the result, as `convexrough.plots.plot`; return the axes."""
-        from convexrough.plots import plot  # it loads matplotlib: only when asked
+        from convexrough.plots import plot  # it imports matplotlib
 
         return plot(self, axes, **options)
 
     def _picture(self) -> str:
-        """A small map as an image of HTML, for which nothing is solved."""
+        """A small map as an HTML image, made without solving anything."""
         from convexrough.plots import thumbnail
 
         return thumbnail(self)

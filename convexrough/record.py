@@ -1,4 +1,4 @@
-"""Base classes of results: printing on one screen, tables, pickles."""
+"""Base classes of results: they print on one screen, convert to tables, and can be pickled."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Along: TypeAlias = dict[tuple[str, ...], tuple[str, ...]]
 #: Names that look plural but have no singular.
 COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
 
-#: How many values of an array are written out, and how many letters of a text.
+#: Largest array and longest text that are printed in full.
 FEW, LINE = 4, 76
 
 
 class Record:
-    """A dataclass that prints a line for each field, and whose copies are read-only, too."""
+    """A dataclass that prints a line for each field; unpickled arrays are read-only again."""
 
     #: Properties that are printed before the fields.
     _shown: ClassVar[tuple[str, ...]] = ()
@@ -50,22 +50,22 @@ class Record:
         return f"<div style='{style}'>{table}{picture}</div>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields without the cache, which is made again when needed."""
+        """The fields; what was computed from them is not pickled."""
         return {each.name: getattr(self, each.name) for each in self._fields()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for value in state.values():
             if isinstance(value, np.ndarray):
-                value.flags.writeable = False  # which a pickle forgets
+                value.flags.writeable = False  # a pickle does not store this
         self.__dict__.update(state)
 
     def _fields(self) -> Any:
         return fields(self)  # type: ignore[arg-type]
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        """The name of each line, and what stands there."""
+        """The name and the text of each line."""
         for name in (*self._shown, *(each.name for each in self._fields() if each.repr)):
-            if text := in_text(getattr(self, name)):  # nothing is said where there is nothing
+            if text := in_text(getattr(self, name)):  # empty values are left out
                 yield name, text
 
     def _headline(self) -> str:
@@ -79,33 +79,33 @@ class Record:
 
 
 class Table(Record):
-    """A record whose arrays are along asperities, steps or points.
+    """A record with arrays that have an entry for each asperity, step or point.
 
-    A column has the name of one of its values, in data frames as in files: `load` of `loads`.
+    Columns of data frames and files are named in the singular: `load` for `loads`.
     """
 
-    #: The first key is what the rows of a data frame are.
+    #: The first key is the dimension of the rows of a data frame.
     _along: ClassVar[Along] = {}
 
     def columns(self, *names: str) -> dict[str, NDArray[Any]]:
-        """These arrays, by what one value of each is called."""
+        """These arrays, by the singulars of their names."""
         return {singular(name): getattr(self, name) for name in names}
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """A data frame of pandas: a row for each asperity, step, point or solver.
+        """A pandas data frame with a row for each asperity, step, point or solver.
 
-        Columns have the names of single values, `load` of `loads`, those of vectors with _x and _y;
-        numbers and words of the whole are in `attrs`. What is along two things, such as the forces
-        of asperities at each step of a history, is in `to_xarray` alone.
+        Columns are named in the singular, components of vectors with _x and _y. Fields that are one
+        number or text are in `attrs`. Only `to_xarray` has arrays of two dimensions, such as the
+        forces of asperities at each step of a history.
 
         Raises ExtraError where pandas is not installed.
         """
         return frames.dataframe(self._variables(), self._attributes())
 
     def to_xarray(self) -> xarray.Dataset:
-        """A data set of xarray: every array, by the names of what it is along.
+        """An xarray data set of all arrays, with named dimensions.
 
-        Numbers and words of the whole are in `attrs`.
+        Fields that are one number or text are in `attrs`.
 
         Raises ExtraError where xarray is not installed.
         """
@@ -127,19 +127,19 @@ class Table(Record):
         return places | arrays if rows_first else arrays | places
 
     def _attributes(self) -> dict[str, Any]:
-        """The fields that are one number or word."""
+        """The fields that are one number or text."""
         values = self.__getstate__()
         return {name: it for name, it in values.items() if isinstance(it, (str, int, float))}
 
 
 def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
-    """A mapping for each row of columns, in the numbers of Python."""
+    """A mapping for each row of columns, with Python's own numbers."""
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def singular(name: str) -> str:
-    """What one value of an array is called: load of loads, radius of radii, loss of losses."""
+    """The singular of a name: load for loads, radius for radii, loss for losses."""
     for ending, one in (("radii", "radius"), ("losses", "loss"), ("approaches", "approach"),
                         ("ities", "ity")):  # fmt: skip
         if name.endswith(ending):
@@ -182,7 +182,7 @@ def _of_array(values: NDArray[Any]) -> str:
 
 
 def _counted(statuses: NDArray[np.str_]) -> Iterator[str]:
-    """How many there are of each, in the order in which they come."""
+    """The number of each status, in the order of first occurrence."""
     while len(statuses):
         same = statuses == statuses[0]
         yield f"{np.count_nonzero(same):,} {statuses[0]}"

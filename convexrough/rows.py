@@ -1,7 +1,7 @@
-"""Scenes with as many asperities each, pressed and cycled in rows of one stack.
+"""Press and cycle scenes with equal numbers of asperities together, as rows of a stack.
 
 Scenes with the same positions and tip radii are a family: they share one matrix, so that a product
-for all of them is one product of matrices. Scenes that rows do not prove are left out.
+for all of them is one product of matrices. Scenes that are not proved in this way are left out.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ MOST = 512
 #: Largest total size of the matrices of all rows processed at once.
 MATRICES = 2**20
 
-#: What is one number for each contact, and for each cycle.
+#: Fields with one number for each contact, and for each cycle.
 TOTALS = ("loads", "load_errors", "approaches", "approach_errors")
 CYCLE = ("losses", "loss_errors", "displacement_amplitudes", "displacement_errors")
 
 
 class PressedRows(NamedTuple):
-    """Some scenes that were proved in rows.
+    """Scenes that were proved together: a stack of m rows.
 
-    places : which of all;  problem : in whose units;  high : their levels
-    squares : (m, n) r^2 [length^2]
+    places  : (m,) indices of the scenes;  problem : the one with the units of the stack
+    high    : their solutions;  squares : (m, n) squared distances from the axis [length^2]
     """
 
     places: Indices
@@ -56,7 +56,7 @@ class PressedRows(NamedTuple):
     squares: Array
 
     def contacts(self) -> dict[str, NDArray[Any]]:
-        """Arrays along the rows, by the names of `Contacts`."""
+        """The fields of `Contacts` for these rows, by name."""
         found, force, length = self.high, self.problem.units.force, self.problem.units.length
         loads = found.loads.value * force
         off = np.abs(loads.sum(axis=1) - found.load.value * force)
@@ -74,9 +74,9 @@ class PressedRows(NamedTuple):
     def cycles(
         self, upper: Array, lower: Array, friction: Array
     ) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
-        """Which cycles rows prove, and arrays along the rows by the names of `Cycles`.
+        """Which cycles (m,) are proved, and the fields of `Cycles` for these rows, by name.
 
-        upper, lower : (m,) Q [force];  friction : (m,) f
+        upper, lower : (m,) shear forces [force];  friction : (m,) coefficients
         """
         problem, high, units = self.problem, self.high, self.problem.units
         f, nu = Ball.exact(friction), Ball.exact(problem.scene.material.poisson_ratio)
@@ -84,7 +84,7 @@ class PressedRows(NamedTuple):
         drop = (half / f).scaled(1.0 / units.force)
         total = high.load - drop
         inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
-        total = where(inside, total, high.load)[:, None]  # others are done one by one
+        total = where(inside, total, high.load)[:, None]  # others are computed one by one
         rows = replace(self.stack, exact_load=total, exact_approach=None)
         offsets, reach = rows.exact.offsets.value, _reach(problem, total.value)
         found = solved(rows, offsets, self.squares, reach, self.box.closed)
@@ -107,10 +107,7 @@ class PressedRows(NamedTuple):
 
 
 def in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> list[PressedRows]:
-    """Those of the scenes that rows prove.
-
-    controls : (m,) loads [force] or approaches [length]
-    """
+    """The scenes that can be proved together, pressed; controls : (m,) [force] or [length]."""
     if not scenes or len(scenes[0]) > MOST:
         return []
     with threads.one_where(MATRICES):
@@ -137,7 +134,7 @@ def _in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> Iterato
 
 
 def _family(scene: Scene) -> tuple[Any, ...]:
-    """Scenes where this is equal differ in heights and friction alone."""
+    """A key; scenes with equal keys differ only in heights and friction."""
     asperities = scene.asperities
     shape = asperities.positions.tobytes(), asperities.tip_radii.tobytes()
     elastic = scene.material.contact_modulus, scene.material.poisson_ratio
@@ -145,7 +142,7 @@ def _family(scene: Scene) -> tuple[Any, ...]:
 
 
 def _leader(scene: Scene, control: float, by_load: bool) -> NormalProblem | None:
-    """Of a family: its problem with all asperities as candidates; None where none can touch."""
+    """The problem with all asperities as candidates; None where no asperity can touch."""
     approach, load = (None, control) if by_load else (control, None)
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
     return problem.widened(np.arange(len(scene))) if len(problem) else None
@@ -157,7 +154,7 @@ def _proved(
     controls: Array,
     by_load: bool,
 ) -> Iterator[PressedRows]:
-    """Of one stack, in units of the first."""
+    """Press the scenes of one stack, in the units of the first problem, and yield those proved."""
     first, places = every[0][0], np.array([k for _, k in every])
     n, units = len(first), first.units
     coupled, offsets, known = list[tuple[slice, NormalProblem]](), list[Ball](), list[Ball]()
@@ -195,7 +192,7 @@ def _repeated(values: Array, shape: tuple[int, int]) -> Array:
 
 
 def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
-    """(m, n) d of scenes that differ in heights, as `NormalProblem.exact` has them."""
+    """Enclosed offsets (m, n) of scenes differing only in heights, as in `NormalProblem.exact`."""
     scene, length = problem.scene, problem.units.length
     if len(rows) == 1 and rows[0] is scene:
         return problem.exact.offsets[None, :]
@@ -208,7 +205,7 @@ def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
 
 
 def _reach(problem: NormalProblem, loads: Array) -> Array:
-    """a^2 of smooth contacts [length^2]."""
+    """Squared contact radii [length^2] of smooth spheres under these loads."""
     scene, force = problem.scene, loads * problem.units.force
     a = hertz.contact_radius(force, scene.material.contact_modulus, scene.mean_radius)
     return np.asarray(a**2)

@@ -1,8 +1,7 @@
 """For the tests of other software: assert that forces are certified, or that two answers agree.
 
-All raise AssertionError with a message that says which asperities, by how much, and which status;
-none needs a test framework. Loads that no certificate can judge (negative, not finite, of the
-wrong number) raise InputError, as everywhere.
+Each function raises AssertionError with the asperities concerned, their errors and statuses; none
+needs a test framework. Loads that are negative, not finite or too few or many raise InputError.
 """
 
 from __future__ import annotations
@@ -65,10 +64,11 @@ def assert_shear_certified(
 ) -> ShearCertificate:
     """Check that exactly the asperities claimed to slide do; return the certificate of the forces.
 
-    forces  : (n,) [force] of first loading, along the shear force, from any source
+    forces  : (n,) [force] along the shear force, after loading from rest, from any source
     force   : [force] their prescribed sum
     within  : also check that the error of every force is below this fraction of the largest
-    sliding : (n,) bool, the claim; default: asperities whose force is f P to 1e-4 of it
+    sliding : (n,) bool, which asperities are claimed to slide; default: those whose force is f P_i
+        within a fraction 1e-4 (P_i: the load)
 
     Raises AssertionError with the asperities concerned.
     """

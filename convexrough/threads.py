@@ -1,4 +1,4 @@
-"""Work on parts of large arrays, some parts on each core: numpy and transforms let others run."""
+"""Work on parts of large arrays in threads: numpy and Fourier transforms run in parallel."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from typing import Any, TypeVar
 
 Part = TypeVar("Part")
 
-#: Work on no more numbers than this is done sooner than threads are started.
+#: Work on at most this many numbers takes less time than starting threads.
 MANY = 2**18
 
 
 def cores() -> int:
-    """How many this process may use."""
+    """The number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def worthwhile(numbers: int) -> int:
-    """How many to start for work on arrays of so many numbers."""
+    """The number of threads to use for arrays of this many numbers."""
     return cores() if numbers > MANY else 1
 
 
 def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) -> None:
-    """work(part) for each part, in any order; parts must not write to what another reads.
+    """Call work(part) for each part, in any order; a part must not write what another reads.
 
-    Threads are started here and have ended when this returns: a process may be forked at any time.
+    The threads have ended when this returns, so that the process may be forked.
     """
     if threads == 1:
         for part in parts:
@@ -43,16 +43,16 @@ def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) ->
 
 
 def chunks(length: int, size: int) -> Iterator[slice]:
-    """Slices that cover an array, of this size at most."""
+    """Slices of at most this size that cover an array of this length."""
     for start in range(0, length, size):
         yield slice(start, min(start + size, length))
 
 
 class OneThread(ContextDecorator):
-    """Linear algebra in one thread, while any thread of this process is inside.
+    """A context in which linear algebra uses one thread.
 
-    Two add up in another order, and are in the way of threads that work on arrays here. The last
-    to leave gives the others back.
+    Several threads would round sums differently and slow down the threads of `each`. When the last
+    thread leaves the context, the former limits are restored.
     """
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class OneThread(ContextDecorator):
         with self._lock:
             self._inside += 1
             if self._limits is None:
-                import scipy.linalg  # noqa: F401  what is not loaded yet cannot be told
+                import scipy.linalg  # noqa: F401  limits apply only to loaded libraries
                 from threadpoolctl import threadpool_limits
 
                 _free()
@@ -87,7 +87,7 @@ class OneThread(ContextDecorator):
 
 
 def _free() -> None:
-    """Let this thread set limits: threadpoolctl 3.8 heeds only the thread that was first."""
+    """Let this thread set limits: threadpoolctl 3.8 obeys only the first thread that sets them."""
     from threadpoolctl import OpenBLASController
 
     if hasattr(OpenBLASController, "clear_controlling_thread"):
@@ -98,5 +98,5 @@ one_thread = OneThread()
 
 
 def one_where(numbers: int) -> AbstractContextManager[object]:
-    """`one_thread` for work on arrays of so many numbers, if that is worth threads of its own."""
+    """`one_thread` if arrays of this many numbers are worth several threads of `each`."""
     return one_thread if worthwhile(numbers) > 1 else nullcontext()

@@ -1,3 +1,3 @@
-"""The package's version; pyproject.toml takes it from here."""
+"""The package's version, which pyproject.toml reads."""
 
 __version__ = "0.1.0"

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from flint import arb, ctx
-from numpy.testing import assert_allclose
 from scenes import NAMED
 
 import convexrough as cr
@@ -83,40 +82,3 @@ def cerruti(scene: cr.Scene) -> np.ndarray:
                 d = (here - there) / r
                 C[i, j] = ((1 - nu) * np.eye(2) + nu * np.outer(d, d)) / (np.pi * G * r)
     return C
-
-
-def own_displacements(contact: cr.Contact, forces: np.ndarray) -> np.ndarray:
-    """(n, 2) Mindlin: 3 (2 - nu) f P / (8 G a) [1 - (1 - |Q|/(f P))^(2/3)] along Q."""
-    scene, G = contact.scene, contact.scene.material.shear_modulus
-    own = np.zeros_like(forces)
-    for i in np.flatnonzero(contact.loads):
-        limit, size = FRICTION * contact.loads[i], float(np.hypot(*forces[i]))
-        if size > 0:
-            share = min(size / limit, 1.0)
-            share = 1.0 if share > 1 - 1e-14 else share
-            phi = -np.expm1(2 / 3 * np.log1p(-share)) if share < 1 else 1.0
-            most = 3 * (2 - scene.material.poisson_ratio) * limit / (8 * G)
-            own[i] = most / contact.contact_radii[i] * phi * (forces[i] / size)
-    return own
-
-
-def assert_solves(state: VectorShearState, tolerance: float) -> None:
-    """Balance of displacements, the friction law and the direction of slip, from their formulas."""
-    contact = state.contact
-    loaded = contact.loads > 0
-    limit = FRICTION * contact.loads
-    size = lengths(state.forces)
-    assert (size <= limit * (1 + 1e-14)).all()
-    travel = np.hypot(*state.displacement)
-    assert_allclose(state.forces.sum(axis=0), state.force, atol=tolerance * np.hypot(*state.force))
-    moved = np.einsum("ijab,jb->ia", cerruti(contact.scene), state.forces)
-    there = own_displacements(contact, state.forces) + moved + state.slips
-    off = lengths(there - state.displacement)[loaded]
-    assert off.max() <= tolerance * travel
-    slides = lengths(state.slips) > 0
-    assert_allclose(size[slides], limit[slides], rtol=tolerance)
-    cross = state.slips[:, 0] * state.forces[:, 1] - state.slips[:, 1] * state.forces[:, 0]
-    assert (np.abs(cross) <= tolerance * travel * size).all()
-    assert ((state.slips * state.forces).sum(axis=1) >= 0).all()
-    assert (state.stick_radii[slides] == 0).all()
-    assert (state.forces[~loaded] == 0).all()

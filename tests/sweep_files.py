@@ -3,12 +3,9 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -88,15 +85,6 @@ def reported_to(call: Callable[[str], None]) -> Iterator[None]:
     """Call with all that is said while work goes on, as it is said."""
     with logged(lambda record: call(record.getMessage())):
         yield
-
-
-def started(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
-    """The command line as a process of its own, in a folder."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "convexrough", "sweep", *arguments],
-        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, **environment},
-    )  # fmt: skip
 
 
 def numbers(table: cr.SweepTable, *names: str) -> list[Any]:

@@ -52,10 +52,9 @@ class Sloppy:
         return replace(solution, loads=loads, refine=False, trial=None)
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    ("name", "control"), [("paper", "approach"), ("rough, closest", "load"), ("steel", "approach")]
-)
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize("name", NAMED)
 def test_all_agree(name: str, control: str) -> None:
     scene, approach = NAMED[name]
     reference = cr.press(scene, approach=approach)
@@ -294,7 +293,7 @@ def test_command_with_a_log(command: Any, tmp_path: Path) -> None:
     assert all(np.isfinite([float(number) for number in row]).all() for _, *row in steps)
     again = command("compare", "a.toml", "--log", "log.csv")
     assert (again.status, again.out) == (2, "")
-    assert "log.csv: is there already" in again.err
+    assert "log.csv: exists already" in again.err
 
 
 def fail(*_: Any, **__: Any) -> None:
@@ -337,14 +336,6 @@ def test_command_beyond_the_convex_range(command: Any, tmp_path: Path) -> None:
     assert (first["outcome"], first["scope"]) == ("answered", "local")
     assert {row["outcome"] for row in rest} == {"refused"}
     assert all("too dense for a convex program" in row["message"] for row in rest)
-
-
-def test_command_with_wrong_input(command: Any, tmp_path: Path) -> None:
-    assert command("compare", "none.toml").status == 2
-    (tmp_path / "a.toml").write_text(scene_text(normal="approach = nan"))
-    ran = command("compare", "a.toml")
-    assert (ran.status, ran.out) == (2, "")
-    assert "a.toml: [normal] approach: found nan" in ran.err
 
 
 @pytest.mark.sample(2)

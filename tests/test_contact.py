@@ -21,7 +21,6 @@ from scenes import (
     rough,
     scattered,
 )
-from scipy.optimize import brentq
 
 import convexrough as cr
 from convexrough.influence import Kind
@@ -59,7 +58,7 @@ def test_the_papers_example(kind: Kind) -> None:
     assert contact.model_error == pytest.approx(0.002, abs=5e-4)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
@@ -145,16 +144,6 @@ def test_a_single_asperity_is_hertz(control: str) -> None:
     assert contact.certificate.scope == "global"
     assert contact.certificate.convexity_number == 0
     assert contact.status[0] == "contact"
-
-
-def test_two_equal_asperities_by_hand() -> None:
-    """k P^(2/3) + P / (pi E* r) = D for both."""
-    scene = cr.Scene(1.0, cr.Asperities([[-1e-3, 0], [1e-3, 0]], 0.01), MATERIAL, geometry="summit")
-    prescribed = 2e-5 - 1e-6 / 2
-    k = (9 / (16 * (1 / (1 + 100)))) ** (1 / 3)
-    load = brentq(lambda p: k * p ** (2 / 3) + p / (np.pi * 2e-3) - prescribed, 0, 1, xtol=1e-25)
-    contact = cr.press(scene, approach=2e-5)
-    assert_allclose(contact.loads, load, rtol=1e-13)
 
 
 @settings(max_examples=15, deadline=None)

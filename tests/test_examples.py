@@ -52,7 +52,7 @@ def load(path: Path) -> Any:
     return module
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "path",
     [path for path in SCRIPTS if path.stem not in ("boundary_elements", "measured_surface")],
@@ -66,7 +66,7 @@ def test_example(path: Path) -> None:
         assert computed == pytest.approx(reference, rel=tolerance, abs=1e-12), name
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_lesson(path: Path, shown: list[int]) -> None:
     """Every claim holds, and a class that runs the script sees its picture in large letters."""

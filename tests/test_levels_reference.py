@@ -27,6 +27,7 @@ def test_both_losses_are_one(name: str) -> None:
         assert abs(state.forces.sum() / (state.f * state.T) - 1) < arb(10) ** -90
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "fraction", "holding"), CASES)
 def test_slopes_are_differences(name: str, fraction: float, holding: Holding) -> None:
     """Central ones, along random directions, to 40 digits."""

@@ -38,7 +38,7 @@ def results() -> dict[str, Any]:
     state, cycle = cr.shear(contact, force=Q), cr.cycle(contact, maximum=Q)
     few = (solvers.Conic(), solvers.BristleQP())
     contacts = cr.press_many([scene, scene], approach=PAPER_APPROACH)
-    surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).detrend("sphere")
+    surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=128).detrend("sphere")
     summits = surface.summits()
     found = (
         surface,

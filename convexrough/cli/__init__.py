@@ -1,3 +1,3 @@
-"""The command line: one file per command, and how all of them take options and speak."""
+"""The command line: a module for each command, and modules for shared options and output."""
 
 from convexrough.cli.program import main as main

@@ -1,4 +1,4 @@
-"""`bench`: speed against error."""
+"""`bench`: measure the time and error of every solver."""
 
 from __future__ import annotations
 

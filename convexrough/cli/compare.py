@@ -26,11 +26,11 @@ from convexrough.errors import FileError, blamed_on
 def compare(scene: Path, solvers: tuple[str, ...], log: Path | None, as_json: bool) -> int:
     """Compare all solvers on one scene: agreement, certificate, time.
 
-    SCS and QOCO also solve the cone program, where they are installed. With --solver, only the
-    named solvers are compared with Newton's method.
+    If SCS and QOCO are installed, they also solve the cone program. With --solver, only the named
+    solvers are compared with Newton's method.
 
-    The exit status is also 3 where a solver refuses the scene, or where two certified results
-    contradict each other, which would be a mistake in the mathematics.
+    The exit status is also 3 if a solver refuses the scene, or if two certified results contradict
+    each other, which would be a mistake in the mathematics or the code.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named
@@ -40,7 +40,7 @@ def compare(scene: Path, solvers: tuple[str, ...], log: Path | None, as_json: bo
 
     chosen = [solver_named(name) for name in solvers] or None
     if log is not None and log.exists():
-        raise FileError(f"{log}: is there already, and stays as it is; name another file")
+        raise FileError(f"{log}: exists already; name another file")
     file = read_scene(scene)
     with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities"):
         comparison = compare_solvers(

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 def check(proof: Path) -> int:
     """Check a proof file in exact arithmetic.
 
-    Exit status: 0 all claims are proved; 1 refused, with the reason; 2 unreadable. The checker is
-    one file that needs only Python: python checker.py PROOF does the same.
+    Exit status: 0 if all claims are proved, 1 if the proof is refused (the reason is printed), 2 if
+    the file is unreadable. The checker is one file that needs only Python: python checker.py PROOF
+    does the same.
     """
     from convexrough import checker
 

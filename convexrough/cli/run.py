@@ -104,7 +104,7 @@ def new(scene: Path) -> int:
 
     template = files("convexrough.run").joinpath("new_scene.toml").read_text(encoding="utf-8")
     if scene.exists() or scene.is_symlink():
-        raise FileError(f"{scene}: is there already, and stays as it is; name another file")
+        raise FileError(f"{scene}: exists already; name another file")
     with replacing(scene) as temporary:
         temporary.write_text(template, encoding="utf-8")
     click.echo(f"written  {scene}")

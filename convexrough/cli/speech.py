@@ -1,4 +1,4 @@
-"""What commands say, where they say it, and the exit status that it deserves."""
+"""Output of commands, and their exit status."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def say(
     units: UnitNames | None = None,
     more: dict[str, Any] | None = None,
 ) -> int:
-    """Print the summary with `more`, or results and `lines`; the exit status that they deserve."""
+    """Print the summary with `more`, or results and `lines`; print warnings; return exit status."""
     from convexrough.run.summary import describe, summarise, warnings
     from convexrough.tabular.units import UnitNames
 
@@ -42,7 +42,7 @@ def say(
 
 
 def echo(summary: dict[str, Any], lines: Iterable[str], as_json: bool) -> None:
-    """Print one object of JSON, or lines."""
+    """Print the summary as a JSON object, or the lines."""
     from convexrough.run.summary import to_json
 
     click.echo(to_json(summary) if as_json else "\n".join(lines))
@@ -54,9 +54,9 @@ def say_aside(*parts: str) -> None:
 
 @contextmanager
 def progress(message: str) -> Iterator[Callable[[str], object]]:
-    """A moving line on standard error while the body runs, if that is a terminal.
+    """Show a status line on standard error while the body runs, if that is a terminal.
 
-    It shows what is said to the logger `convexrough`. Yields what changes the message.
+    The line also shows records of the logger `convexrough`. Yields a function that changes it.
     """
     if not sys.stderr.isatty():
         yield lambda message: None

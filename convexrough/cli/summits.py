@@ -123,22 +123,22 @@ def summits(
     for message in report.warnings_about(scanned):
         say_aside("warning", message)
     if scanned.curve is None:
-        say_aside("hint", "--scene or --radius presses on them: how strong must the pruning be?")
+        say_aside("hint", "use --scene or --radius to press on the summits and choose --prune")
     return DONE if scanned.certified else NOT_CERTIFIED
 
 
 def _claim(path: Path, force: bool) -> None:
-    """Refuse to replace a table unasked, before anything is computed."""
+    """Raise FileError unless this path may be written; called before anything is computed."""
     if path.suffix.lower() != ".csv":
         raise FileError(f"{path}: found {path.suffix or 'no ending'}, expected .csv")
     if path.exists() and not force:
-        raise FileError(f"{path}: is there already; --force replaces it, --out names another")
+        raise FileError(f"{path}: exists already; --force replaces it, --out names another")
     if not path.parent.is_dir():
         raise FileError(f"{path}: no folder {path.parent}")
 
 
 def _written(path: Path, scanned: Scanned, *, figures: bool, **saved: Any) -> list[Path]:
-    """The table that a scene file reads, the curve and the figures beside it."""
+    """Write the table that a scene file reads, the curve and the figures; return the paths."""
     from convexrough.run.results import write_figures, write_tables
     from convexrough.surface.report import curve_columns, summit_columns
 

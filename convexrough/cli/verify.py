@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 def claim_options(command: Command) -> Command:
     """Options for the questions of `verify` and for reading files."""
-    called = "Header or number (from 1) of the column of load, x, y, ..."
+    called = "Header or number (from 1) of the column with load, x, y, ..."
     for option in (
         click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML."),
         force_option,
@@ -68,7 +68,7 @@ def claim_options(command: Command) -> Command:
 
 
 def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: Any) -> Manner:
-    """How the options say that files are read."""
+    """The settings for reading files, from the options."""
     from convexrough.checks import finite
     from convexrough.tabular.table import KINDS, named_columns
     from convexrough.verdict.claims import Manner
@@ -137,7 +137,7 @@ def verify(
     alone = [Path("proof.json")] if proof and out is None else []
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not force:
-            raise FileError(f"{each}: is there already; --force replaces it")
+            raise FileError(f"{each}: exists already; --force replaces it")
     with ExitStack() as stack:
         stack.enter_context(_reported(junit))
         file = read_scene(scene)
@@ -150,7 +150,7 @@ def verify(
             echo({"read": lines}, lines, as_json)
             return DONE
         new = stack.enter_context(results_folder(out, force=force)) if out is not None else None
-        with progress(f"judging the loads of {len(file.scene):,} asperities"):
+        with progress(f"checking the loads of {len(file.scene):,} asperities"):
             with blamed_on(scene):
                 problem = file.problem()
             found = verify_files(
@@ -181,7 +181,7 @@ def verify(
 
 @contextmanager
 def _reported(path: Path | None) -> Iterator[None]:
-    """Errors of the body, which are written as JUnit XML before they go on."""
+    """Write errors of the body as JUnit XML, and raise them again."""
     from convexrough.verdict.report import junit
 
     try:
@@ -195,7 +195,7 @@ def _reported(path: Path | None) -> Iterator[None]:
 def _written(
     folder: Path, summary: dict[str, Any], found: Verified, units: UnitNames
 ) -> list[Path]:
-    """verdict.json, verdict.csv, and a figure."""
+    """Write verdict.json, verdict.csv and the figures; return the paths."""
     from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
     from convexrough.run.results import write_figures, write_json, write_tables
     from convexrough.verdict.report import asperity_columns

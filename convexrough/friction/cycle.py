@@ -308,7 +308,7 @@ def cycles(
     checks.exactly_one("maximum", maximum, "displacement", displacement)
     if displacement is not None:
         if minimum is not None:
-            expected = "none beside a displacement, whose cycles are symmetric"
+            expected = "none: the cycle of a displacement is symmetric"
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
         heights = [levels.load - levels.displaced(x) for x in amplitudes]

@@ -216,11 +216,11 @@ def points_of(scene: Scene, loads: ArrayLike, forces: ArrayLike) -> list[Point]:
     Q = checks.array("forces", forces)
     if len(P) == 0 or len(P) != len(Q):
         found = f"{len(P)} loads and {len(Q)} forces"
-        raise InputError("loads, forces", found=found, expected="as many of both, at least one")
+        raise InputError("loads, forces", found=found, expected="equal numbers, at least one")
     bare = (P == 0) & (Q != 0)
     if bare.any():
         k = int(np.argmax(bare))
-        expected = "0, as the load is 0 there: shear must be gone before contact is lost"
+        expected = "0 at a load of 0: shear must end before contact is lost"
         raise InputError(f"forces[{k}]", found=Q[k], expected=expected)
     for k in np.flatnonzero(np.abs(Q) > f * P).tolist():
         checks.bearable(f"forces[{k}]", float(Q[k]), float(f * P[k]))

@@ -1,6 +1,6 @@
-"""Hard scenes by name, each with its answer to 50 digits, for anybody's solver.
+"""Hard scenes by name, each with its answer to 50 digits, to test any solver.
 
-`convexrough gallery --export DIR` writes them as files of qpsolvers, Clarabel and CBF.
+`convexrough gallery --export DIR` writes them as files for qpsolvers, Clarabel and CBF readers.
 """
 
 from convexrough.gallery.any_size import Manufactured, manufactured

@@ -1,4 +1,4 @@
-"""Contacts of any size, made from their answer: loads and gaps first, heights from them."""
+"""Contacts of any size with a known answer: heights are computed from chosen loads and gaps."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from convexrough.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Manufactured(Record):
-    """A contact made from its answer. The heights that make it exact are rounded to float64, and
+    """A contact with a known answer. Its heights are rounded to float64, and
 
         cr.certify(made.scene, made.loads, approach=made.approach)
 
-    bounds the effect and proves the statuses.
+    bounds the effect of this rounding and proves the statuses.
 
-    approach : [length] to press by
-    loads    : (n,) [force] with zeros where open;  gaps : (n,) [length]
+    approach : [length] the prescribed approach
+    loads    : (n,) [force] 0 where open;  gaps : (n,) [length] 0 where touching
     """
 
     scene: Scene
@@ -35,10 +35,10 @@ class Manufactured(Record):
 
 
 def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufactured:
-    """`count` asperities on a hexagonal lattice, about this part of them in contact.
+    """A contact of `count` asperities on a hexagonal lattice; a part `touching` of them touches.
 
     Contact radii are random from 0.1 to 0.45 of the spacing, tip radii from 4 to 8 of it, and gaps
-    up to the largest indentation. `seed` draws them; other versions of numpy may draw others.
+    up to the largest indentation. Other versions of numpy may give other numbers for a `seed`.
 
     >>> made = cr.gallery.manufactured(500)
     >>> proof = cr.certify(made.scene, made.loads, approach=made.approach)

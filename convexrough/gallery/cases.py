@@ -25,11 +25,11 @@ from convexrough.scene.scene import Scene
 #: Scenes and answers, a line for each case; `tests/gallery_answers.py` writes it.
 DATA = "cases.json"
 
-#: Of every case except those in other units; statuses under shear do not depend on it.
+#: Friction and material of all cases; only cases in other units have another contact modulus.
 FRICTION = 0.5
 MATERIAL = Material(contact_modulus=1.0, poisson_ratio=0.3)
 
-#: How many times the shear turns in a history.
+#: Number of shear forces in a history before the last.
 REVERSALS = 100_000
 
 
@@ -37,9 +37,9 @@ REVERSALS = 100_000
 class Checked(Record):
     """Comparison of loads or forces with the answer. Indices are those of the scene's asperities.
 
-    wrongly_open   : (m,) without a given load, and touching (for shear forces: loaded)
-    wrongly_loaded : (m,) with a given load, and open
-    error          : largest error, over the largest number of the answer
+    wrongly_open   : (m,) asperities that touch and have no given load (or shear force)
+    wrongly_loaded : (m,) asperities that are open and have a given load (or shear force)
+    error          : largest error, over the largest load or force of the answer
     within         : the largest error allowed
     """
 
@@ -60,18 +60,18 @@ class HardCase(Record):
     """A hard scene, with an answer that is known to 50 digits.
 
     Digits are strings: "0" is exact, all others are right to one unit of the 50th. The answer is
-    that of the scene whose data are the given float64 numbers. It exists and is the only one near
-    it, by an interval Newton step; that there is no other anywhere, `cr.certify` says.
+    that of the scene whose data are the given float64 numbers. An interval Newton step proves that
+    it exists and is the only one nearby; `cr.certify` says whether it is the only one of all.
 
     family, why : the difficulty
-    approach [length], load [force] : the prescribed one; the other one is None
+    approach [length], load [force] : one of them is prescribed; the other is None
     loads, gaps : (n,) digits [force], [length]
     exact_approach, exact_load : digits [length], [force]
-    shear_force : [force] that the contact is sheared by, once
-    history     : (m,) [force] instead, the shear forces until then; empty where it is sheared once
-    forces, slips : (n,) digits [force], [length] of that; empty where an asperity would be dragged
-        along, and the theorem of Ciavarella and Jaeger gives no answer
-    displacement  : digits [length], both bodies; "" there
+    shear_force : [force] the shear force at the end
+    history     : (m,) [force] a sequence of shear forces that ends with it; empty for one from rest
+    forces, slips : (n,) digits [force], [length] under `shear_force`; empty if an asperity would be
+        dragged along, where the theorem of Ciavarella and Jaeger gives no answer
+    displacement  : digits [length] of the relative displacement of the bodies, or ""
 
     >>> case = cr.gallery.case("grazing-gap-1e-9")
     >>> case.check(cr.press(case.scene, **case.control).loads).right
@@ -99,12 +99,12 @@ class HardCase(Record):
 
     @property
     def control(self) -> dict[str, Any]:
-        """What `cr.press`, `cr.certify` and `cr.verify` take: the approach or the load."""
+        """The approach or the load, as an argument of `cr.press`, `cr.certify` and `cr.verify`."""
         return {"approach": self.approach} if self.load is None else {"load": self.load}
 
     @cached_property
     def touching(self) -> NDArray[np.bool_]:
-        """(n,) which asperities touch."""
+        """A mask (n,) of the asperities that touch."""
         return frozen(np.array([digits != "0" for digits in self.loads]))
 
     def check(self, loads: ArrayLike, *, within: float = 1e-6, floor: float = 0.0) -> Checked:
@@ -118,9 +118,9 @@ class HardCase(Record):
         return _judged(given, self.loads, claimed, self.touching, within)
 
     def check_shear(self, forces: ArrayLike, *, within: float = 1e-6) -> Checked:
-        """Shear forces (n,) [force] along the shear force, as `check`; at the end of a history."""
+        """Compare shear forces (n,) [force], at the end of a history, with the answer."""
         if not self.forces:
-            found = "a case in which one is dragged along by the others"
+            found = "a case in which an asperity is dragged along by the others"
             raise InputError("forces", found=found, expected="a case with an answer in shear")
         given = checks.array("forces", forces, length=len(self))
         return _judged(given, self.forces, given != 0, self.touching, within)
@@ -133,7 +133,7 @@ def _judged(
     touching: NDArray[np.bool_],
     within: float,
 ) -> Checked:
-    """Subtracted exactly, as some answers are nearer to each other than float64 numbers."""
+    """The comparison, with exact differences: some loads are closer than float64 numbers."""
     exact = [Fraction(each) for each in digits]
     apart = max(abs(Fraction(float(a)) - b) for a, b in zip(given, exact, strict=True))
     largest = max(map(abs, exact))
@@ -146,7 +146,7 @@ def _judged(
 
 
 def names(*wanted: str) -> tuple[str, ...]:
-    """Names of all cases, or of those wanted, by their own names or those of their families.
+    """The names of all cases, or of the cases and families in `wanted`.
 
     >>> cr.gallery.names("few", "clustered")
     ('one', 'one-under-load', 'two-equal', 'clustered')
@@ -206,10 +206,10 @@ def _cases() -> dict[str, Any]:
 
 
 def _reversals(kind: str) -> list[float]:
-    """Shear forces over the last one; each is wiped out by that.
+    """Shear forces as multiples of the last one, which erases the memory of all others.
 
     "random" : up to 0.9 of it, some repeated, some 0
-    "nested" : each turn inside the one before, so that all are remembered until the last
+    "nested" : each range lies inside the one before, so that all are remembered until the last
     """
     if kind == "nested":
         turns = [(-0.9 if k % 2 else 0.9) * (1 - k / REVERSALS) for k in range(REVERSALS)]

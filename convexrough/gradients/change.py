@@ -113,7 +113,7 @@ def contact_change(contact: Contact, direction: Direction) -> ContactChange:
     checks.instance("direction", direction, Direction)
     for name in ("friction", "force"):
         if (given := getattr(direction, name)) != 0.0:
-            expected = "0: a contact depends on neither friction nor force; states change by both"
+            expected = "0: a contact does not depend on it; use the change of a friction state"
             raise InputError(name, found=given, expected=expected)
     top = levels(contact).top
     return _pressed(contact, direction, _Bent.of(top, direction), top)[0]
@@ -124,7 +124,7 @@ def _pressed(
 ) -> tuple[ContactChange, _Moved]:
     """The changes of the contact and of its level."""
     if direction.load is not None and direction.approach is not None:
-        found, expected = "both", "at most one of the two, as only one is held"
+        found, expected = "both", "at most one of the two"
         raise InputError("load, approach", found=found, expected=expected)
     by_load = control_held(contact, None) == "load"
     if direction.load is not None or direction.approach is not None:

@@ -224,7 +224,7 @@ class Gradient(Table, Plottable):
         numbers, and for a base without a smooth reference.
         """
         if self.maximum is None:
-            expected = "the gradient of a cycle, whose loss a smooth sphere's stands beside"
+            expected = "the gradient of the loss of a cycle"
             raise InputError("normalised", found="another number", expected=expected)
         number, scene = self.number, self.contact.scene
         reference = smooth_reference(scene, self.contact.load)
@@ -281,6 +281,6 @@ def control_held(contact: Contact, holding: Holding | None) -> Holding:
 def levels(contact: Contact) -> Levels:
     """The levels of a contact. Raises InputError if its load is 0."""
     if contact.load == 0.0:
-        expected = "a contact that carries some load: without, nothing has a derivative"
+        expected = "a contact with a load: at the load 0 there is no derivative"
         raise InputError("contact", found="no load", expected=expected)
     return contact.cached(levels_of)

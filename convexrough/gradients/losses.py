@@ -75,7 +75,7 @@ def path_gradient(
     along = Along.of(sheared.known, Fraction(path.start), steps, path.loads, path.forces)
     sliding = [load == abs(T) for load, T in zip(along.loads, along.heights, strict=True)]
     if path.load_constant and any(sliding):
-        expected = "forces below f P: where all slide, a history has no derivative"
+        expected = "forces below f P: in gross sliding a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
     return _gradient(sheared, along, holding, paths=not path.load_constant)
 

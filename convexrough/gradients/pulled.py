@@ -129,8 +129,7 @@ def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball
     offsets = level.problem.exact.offsets
     first = offsets.upper >= offsets.lower.max()
     if np.count_nonzero(first) > 1:
-        expected = "a force below f P: there several asperities slide last, together, and which "
-        expected += "of them does depends on the direction of a change"
+        expected = "a force below f P: where several asperities slide last there is no derivative"
         raise InputError("force", found="gross sliding", expected=expected)
     zero = Ball.exact(np.zeros(len(offsets)))
     moved = where(first, zero - weight, zero)

@@ -71,7 +71,7 @@ class Frictional:
         """The level L = P - |Q| / f."""
         height = abs(self.known.height(force))
         if height == self.known.load and holding == "approach":
-            expected = "a force below f P: with the approach held f P may fall below the force"
+            expected = "a force below f P: at constant approach f P may fall below the force"
             raise InputError(what, found=f"{float(force)}: gross sliding", expected=expected)
         return self.known.at(self.known.load - height)
 
@@ -165,7 +165,7 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
         parts = [Part(low, indentations=only * (f * unit / slope))]
         total = (top.load - low.load) * f * unit
     elif np.count_nonzero(first) > 1:  # all of these slide at f P
-        expected = "one that slides before others do, or last and alone"
+        expected = "one that slides before another, or last and alone"
         found = f"{asperity}, which slides last, together with others"
         raise InputError("asperity", found=found, expected=expected)
     number = Number.of(contact, top, parts, {"load": f, "friction": total / f})
@@ -193,7 +193,7 @@ def _just_touching(sheared: Frictional, place: int) -> tuple[Level, Ball]:
     reach = 2.0 * left / float(slope.lower) if slope.positive else np.inf
     level, slope = at(Ball.around(load.mid, reach))
     if not left <= float(slope.lower) * reach:
-        raise ProofError("where the asperity starts to slide is not proved: its order is in doubt")
+        raise ProofError("the onset is not proved: the indentation may fall as the load rises")
     return level, slope
 
 
@@ -223,7 +223,7 @@ def _wider(level: Level, which: Indices) -> Level:
 def _checked(contact: Contact, weights: Mapping[str, Any]) -> Iterator[Any]:
     """The given weights, checked: numbers, and (n,) of asperities; 0 for those not given."""
     if all(value is None for value in weights.values()):
-        expected = "at least one: weights on what is to be differentiated"
+        expected = "weights of at least one of these results"
         raise InputError(", ".join(weights), found="none", expected=expected)
     for name, value in weights.items():
         if name in ("load", "approach", "displacement"):

@@ -1,4 +1,4 @@
-"""Elastic coupling between asperities, as an operator that knows its own rounding error."""
+"""Elastic coupling between asperities: operators with bounds on their rounding errors."""
 
 from convexrough.influence.choice import KINDS, couple
 from convexrough.influence.coupling import Influence, Kind

@@ -1,4 +1,4 @@
-"""Which operator a scene needs: the cheapest exact one, unless one is asked for by name."""
+"""The choice of a compliance operator: the cheapest exact one, unless one is named."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from convexrough.scene.scene import Scene
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-#: Up to so many asperities the matrix costs less than anything else, ...
+#: Largest number of asperities for which the matrix is always cheapest. It affects speed only.
 FEW_ASPERITIES = 512
 
-#: ... and up to so many off a lattice. Both were timed on two cores: speed is all they decide.
+#: The same for asperities that are not on a lattice. Both were timed on two cores.
 FEW_SCATTERED = 3000
 
 
 def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None) -> Influence:
-    """The coupling among some of a scene's asperities; scale = 1 / (pi E*) in their units.
+    """The compliance operator of some of a scene's asperities; scale = 1 / (pi E*) in their units.
 
-    kind : None for the cheapest: a matrix for few asperities, else transforms on a lattice where
-        they lie on one, else on a mesh
+    kind : None for the cheapest: a matrix for few asperities, else Fourier transforms, on a lattice
+        if the asperities lie on one, else on a mesh
 
-    Raises InputError for an unknown kind, a lattice where there is none, and too many asperities
-    for the memory.
+    Raises InputError for an unknown kind, for "lattice" without a lattice, and for more asperities
+    than fit in memory.
     """
     if kind is not None and kind not in KINDS:
         raise InputError("influence", found=repr(kind), expected=f"one of {', '.join(KINDS)}")
@@ -57,12 +57,12 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
 
 
 def _inverse(layout: Layout) -> Array:
-    """(n, n) 1 / r_ij of a small layout, which all its scenes share."""
+    """1 / r_ij (n, n) of a small layout; all scenes with this layout share it."""
     return frozen(inverse_distances(layout.points, layout.points))
 
 
 def _sums(layout: Layout) -> MatrixSums:
-    """Sums over all points of a layout, of which scenes take what they need."""
+    """Sums over all points of a layout; each scene restricts them to its asperities."""
     return MatrixSums(Pair.exact(layout.points))
 
 

@@ -1,4 +1,4 @@
-"""A box of sites of a lattice, and convolutions on it by Fourier transforms of known rounding."""
+"""Convolutions on a box of lattice sites by Fourier transforms, with bounds on their rounding."""
 
 from __future__ import annotations
 
@@ -13,24 +13,25 @@ from numpy.typing import NDArray
 from convexrough import threads
 from convexrough.arrays import Array, Indices
 
-#: Roundoffs, relative in the 2-norm, of one pass of a transform with this radix p: 4.5 for the
+#: Roundoffs, relative in the 2-norm, of one pass of a transform, by its radix p: 4.5 for the
 #: twiddle factors and the products with them, and sqrt(p) ((p - 1) / 2 + 4) for the sums of p terms
 #: (1 for p = 2). Radices 4 and 8 cost less than two and three passes of radix 2. "One pass" of
 #: docs/theory/operators-lattice.md, "Rounding".
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
-#: Columns are transformed some at a time: so many bytes of each row, what a cache holds.
+#: Columns are transformed in groups: this many bytes of each row, so that they fit in the cache.
 ROW = 512
 
-#: Rows of a kernel that are laid out together hold about so many numbers: what a cache holds.
+#: Rows of a kernel are computed in groups of about this many numbers, which fit in the cache.
 LAID_OUT = 2**17
 
 
-#: What kernels are at differences of sites, of rows i and columns j, and of known squared lengths
-#: [spacing^2]: arrays (len(i), len(j)).
+#: A function of differences of rows i, differences of columns j and their squared lengths
+#: [spacing^2]; it returns the values of some kernels there, arrays (len(i), len(j)).
 Values = Callable[[Indices, Indices, Array], Sequence[Array]]
 
-#: From the waves of some fields, in some columns, to those of as many fields; both in place or not.
+#: A function of the transforms of some fields, in a slice of columns; it returns the transforms of
+#: equally many fields, and may change its arguments.
 Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 
 
@@ -38,9 +39,10 @@ Mix = Callable[[list[NDArray[Any]], slice], list[NDArray[Any]]]
 class SiteBox:
     """A box of sites, and convolutions on it.
 
-    shape  : (rows, columns) of sites;  basis : (2, 2) rows b1 and b2, in units of the spacing: so
-        single precision holds the kernel whatever the scene's units
-    extent : [spacing] no two sites that matter are further apart
+    shape  : (rows, columns) of sites
+    basis  : (2, 2) rows b1 and b2 in units of the spacing, so that the kernel fits in single
+        precision for any units of the scene
+    extent : [spacing] upper bound on the distance of two occupied sites
     """
 
     shape: tuple[int, int]
@@ -49,10 +51,10 @@ class SiteBox:
 
     @cached_property
     def padded(self) -> tuple[int, int]:
-        """The size of the transforms: no two differences of sites that matter share a place in it.
+        """The size of the transforms, in which no two differences of occupied sites coincide.
 
-        So it is with twice the box, as no difference has so many rows or columns; and where any
-        period i b1 + j b2 is longer than twice the extent.
+        Twice the box is enough, as no difference has so many rows or columns. A smaller size is
+        enough if every period i b1 + j b2 is longer than twice the extent.
         """
         from scipy.fft import next_fast_len  # 0.1 s to import: only where there is a lattice
 
@@ -72,7 +74,7 @@ class SiteBox:
 
     @property
     def workers(self) -> int:
-        """Threads."""
+        """The number of threads for the transforms."""
         return threads.worthwhile(self.padded[0] * self.padded[1])
 
     @cached_property
@@ -81,7 +83,7 @@ class SiteBox:
         return float(sum(_pass_roundoffs(length) for length in self.padded))
 
     def kernel(self, power: int, dtype: Any) -> Kernel:
-        """1 / |i b1 + j b2|^power for every difference of sites that matter, 0 for none."""
+        """1 / |i b1 + j b2|^power for every difference (i, j) of occupied sites; 0 at (0, 0)."""
 
         def values(i: Indices, j: Indices, squares: Array) -> list[Array]:
             with np.errstate(divide="ignore"):
@@ -95,7 +97,7 @@ class SiteBox:
         return self.kernels(values, dtype)[0]
 
     def kernels(self, values: Values, dtype: Any, *, odd: bool = False) -> list[Kernel]:
-        """Kernels K(-d) = K(d), or -K(d) if odd, from their values at differences of sites."""
+        """Kernels with K(-d) = K(d), or -K(d) if odd, from their values at differences of sites."""
         from scipy import fft
 
         rows, columns = self.padded
@@ -104,7 +106,7 @@ class SiteBox:
         block = max(1, LAID_OUT // columns)
         blocks = [slice(start, min(start + block, last)) for start in range(0, last, block)]
         halves: list[NDArray[Any]] = []
-        sums: dict[int, list[Array]] = {}  # by block, of each kernel and of its squares
+        sums: dict[int, list[Array]] = {}  # by block: sums of each kernel and of its squares
 
         def transform(taken: slice) -> None:
             i = np.arange(taken.start, taken.stop)
@@ -117,7 +119,7 @@ class SiteBox:
                 sums[taken.start].append(weights @ np.stack((each.sum(axis=1), squares), axis=1))
                 halves[k][taken] = fft.rfft(each.astype(dtype, copy=False), axis=1)
 
-        transform(blocks[0])  # says how many kernels there are
+        transform(blocks[0])  # this first block shows how many kernels there are
         threads.each(transform, blocks[1:], self.workers)
         whole_sums = np.sum([sums[taken.start] for taken in blocks], axis=0)
         found = []
@@ -127,9 +129,9 @@ class SiteBox:
         return found[::-1]
 
     def _laid_out(self, values: Values, taken: slice) -> list[Array]:
-        """Values at differences of sites, in some rows of the padded box; 0 for none.
+        """Values at differences of sites, in some rows of the padded box; 0 where there are none.
 
-        In each place stands the shortest difference of two sites of the box that falls on it.
+        Each place has the value for the shortest difference of two sites that maps to it.
         """
         shape = taken.stop - taken.start, self.padded[1]
         squares = np.full(shape, np.inf)
@@ -142,7 +144,7 @@ class SiteBox:
             found = found or [np.zeros(shape) for _ in each]
             for whole, part in zip(found, each, strict=True):
                 np.copyto(whole[within, places], part, where=nearer)
-        if not found:  # no difference falls on these rows
+        if not found:  # no difference maps to these rows
             nowhere = np.zeros(0, dtype=np.intp)
             found = [np.zeros(shape) for _ in values(nowhere, nowhere, np.zeros((0, 0)))]
         if self.extent < np.inf:
@@ -152,11 +154,11 @@ class SiteBox:
         return found
 
     def _spectrum(self, half: NDArray[Any], dtype: Any, odd: bool) -> NDArray[Any]:
-        """The transform of a kernel, or its imaginary part, from those of its first rows."""
+        """The transform of a kernel (or its imaginary part) from the transforms of its rows."""
         from scipy import fft
 
         last = (self.padded[0] - 1) // 2
-        if last:  # row -i is row i read backwards
+        if last:  # row -i of an even kernel is row i reversed
             np.conj(half[last:0:-1], out=half[-last:])
             if odd:
                 np.negative(half[-last:], out=half[-last:])
@@ -170,7 +172,7 @@ class SiteBox:
         return spectrum
 
     def _images(self, taken: slice) -> Iterator[tuple[slice, slice, Indices, Indices]]:
-        """Differences i, j of two sites of the box, and the rows and columns that they fall on."""
+        """Differences i, j of two sites of the box, and the rows and columns that they map to."""
         (rows, columns), (height, width) = self.shape, self.padded
         right, left = np.arange(columns), np.arange(1 - columns, 0)
         for shift in (0, height):
@@ -194,8 +196,8 @@ class SiteBox:
     def convolve(self, field: NDArray[Any], spectrum: NDArray[Any]) -> NDArray[Any]:
         """The convolution of a field (rows, columns) with a kernel, on the box.
 
-        The field may be filled up with columns of zeros, to the padded width at most: then nothing
-        is copied, and those columns of the result mean nothing.
+        The field may have extra columns of zeros up to the padded width, which saves a copy; these
+        columns of the result are meaningless.
         """
 
         def multiply(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
@@ -214,11 +216,12 @@ class SiteBox:
         return 1.01 * roundoff * ((2 * self.loss + 4) * kernel.total + spectral)
 
     def bound_each(self, kernel: Kernel, roundoff: float) -> float:
-        """Bound on each component of that error, relative to the 2-norm of the field: (2) there.
+        """Bound on each component of the error of `convolve`, relative to the field's 2-norm.
 
-        What the two forward transforms lose reaches a component through the other's 2-norm, and
-        the inverse transform loses at most so much of the mean modulus of what it adds up, which
-        is at most the product of both.
+        (2) of docs/theory/operators-lattice.md, "Rounding". An error of one forward transform
+        reaches a component multiplied by the 2-norm of the other transform. The error of the
+        inverse transform is relative to the mean modulus of its terms, which is at most the product
+        of both 2-norms.
         """
         inverse = float(np.sqrt(2.0)) * self.loss
         return 1.01 * roundoff * (2 * self.loss + inverse + 4) * kernel.norm
@@ -226,7 +229,7 @@ class SiteBox:
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """A kernel that is even, so that its transform is real, or odd, so that it is imaginary.
+    """An even kernel, whose transform is real, or an odd kernel, whose transform is imaginary.
 
     spectrum : the transform, or its imaginary part;  total, norm : the kernel's sum and 2-norm
     """
@@ -239,10 +242,10 @@ class Kernel:
 def through_waves(
     fields: Sequence[NDArray[Any]], padded: tuple[int, int], workers: int, mix: Mix
 ) -> list[NDArray[Any]]:
-    """Fields of which the waves are what `mix` makes of the waves of some fields.
+    """The fields whose transforms `mix` computes from the transforms of the given fields.
 
-    Fields (rows, columns) are filled up with zeros to the padded size; of what comes of it these
-    rows are returned, in all columns.
+    The given fields (rows, columns) are padded with zeros. The results have the same number of
+    rows, and all padded columns.
     """
     from scipy import fft
 
@@ -263,14 +266,14 @@ def through_waves(
 
 
 def in_blocks(half: NDArray[Any]) -> Iterator[slice]:
-    """Columns that are transformed together."""
+    """Slices of the columns that are transformed together."""
     width, step = half.shape[1], max(1, ROW // half.itemsize)
     for start in range(0, width, step):
         yield slice(start, min(start + step, width))
 
 
 def _least(sites: int, twice: int, length: float) -> int:
-    """The fewest places along one direction: no period of them is as short as `length`."""
+    """The fewest places in a direction whose period exceeds `length` sites; at most `twice`."""
     return twice if length >= twice else max(sites, int(length) + 1)
 
 
@@ -280,12 +283,12 @@ def _pass_roundoffs(length: int) -> int:
         while length % radix == 0:
             length //= radix
             total += cost
-    assert length == 1  # what next_fast_len gives
+    assert length == 1  # next_fast_len returns only products of these radices
     return total
 
 
 def neighbours(box: SiteBox) -> Iterator[tuple[float, int, int]]:
-    """Differences of two sites, one of each pair +-, by increasing distance."""
+    """Distances and differences (i, j) of two sites, nearest first; (-i, -j) is left out."""
     rows, columns = box.shape
     reach = 1
     done = 0.0

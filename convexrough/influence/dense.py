@@ -1,4 +1,4 @@
-"""The coupling as a stored matrix: exact, for some thousands of asperities."""
+"""The compliance operator as a stored matrix, for up to some thousands of asperities."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from convexrough.influence.coupling import (
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.roundoff import ROUNDOFF
 
-#: Numbers of a coupling elsewhere that are kept: few, as it is made anew as fast as many are read.
+#: Largest coupling to other points that is cached: a larger one is recomputed as fast as read.
 KEPT = 2**16
 
 
 def fits_densely(count: int) -> None:
-    """Refuse what the matrix of all pairs, and the copies that a solution needs, cannot hold."""
+    """Raise InputError if the matrix of all pairs, with the copies a solver needs, is too large."""
     checks.fits_in_memory("asperities that could touch", count, 5 * 8, power=2)
 
 
 def dense_matrix(points: Array, scale: float) -> Array:
-    """(n, n) A_ij = scale / r_ij, zero on the diagonal."""
+    """The matrix (n, n) with A_ij = scale / r_ij, zero on the diagonal."""
     fits_densely(len(points))
     matrix = inverse_distances(points, points)
     matrix *= scale
@@ -44,8 +44,8 @@ def dense_matrix(points: Array, scale: float) -> Array:
 def entry_error(point_error: float, nearest: float) -> float:
     """Relative error of a computed scale / r, for r at least `nearest`.
 
-    Each end has an error of at most sqrt(2) point_error, so the distance has an error of at most
-    x r and 1/r a relative one of at most x / (1 - x).
+    Each point has an error of at most sqrt(2) point_error, so the distance has an error of at most
+    x r, and 1 / r a relative error of at most x / (1 - x).
     """
     x = 2.0 * np.sqrt(2.0) * point_error / nearest if point_error > 0 else 0.0
     moved = x / (1.0 - x) if x < 1 else np.inf
@@ -53,7 +53,7 @@ def entry_error(point_error: float, nearest: float) -> float:
 
 
 def by_pairs(points: Array, values: Array) -> Array:
-    """(n, 2) sum_j (c_i - c_j) v_j / r_ij^3, pair by pair: the odd sums of `slopes`."""
+    """sum_j (c_i - c_j) v_j / r_ij^3 (n, 2) for points c, summed pair by pair."""
     total = np.empty_like(points)
     rows = max(1, 2**22 // max(1, len(points)))
     for start in range(0, len(points), rows):
@@ -73,7 +73,7 @@ class DenseInfluence:
     scale       : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
     point_error : [length] bound on the error of each coordinate of the points
     entry_error : bound on the relative error of each A_ij
-    sums        : P -> sum_j P_j / r_ij with many more digits, of the points as pairs
+    sums        : the map from P to sum_j P_j / r_ij, with many more digits
     """
 
     points: Array
@@ -103,7 +103,7 @@ class DenseInfluence:
         sums: MatrixSums,
         point_error: float = 0.0,
     ) -> DenseInfluence:
-        """Where the matrix (n, n) is known."""
+        """The operator whose matrix (n, n) is known."""
         largest = float(matrix.max(initial=0.0))
         nearest = scale / largest if largest > 0 else np.inf
         return cls(points, scale, matrix, point_error, entry_error(point_error, nearest), sums)
@@ -112,7 +112,7 @@ class DenseInfluence:
         return len(self.points)
 
     def apply(self, loads: Array) -> Array:
-        """A P, summed in blocks of about sqrt(n) so that rounding grows as sqrt(n), not n."""
+        """A P, summed in blocks of about sqrt(n) terms: rounding grows as sqrt(n), not as n."""
         size = self._block
         if len(self) <= size:
             return np.asarray(self.matrix @ loads)
@@ -122,7 +122,7 @@ class DenseInfluence:
         return total
 
     def rounding(self, loads: Array) -> Rounding:
-        """The error of a sum of m terms in any order is at most m roundoffs of their magnitudes.
+        """The error of a sum of m terms is at most m roundoffs times the sum of their sizes.
 
         (Higham, Accuracy and Stability of Numerical Algorithms, section 4.2.)
         """
@@ -130,7 +130,7 @@ class DenseInfluence:
         return Rounding(1.01 * (terms * ROUNDOFF + self.entry_error), 0.0, 0.0)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        inverse = self.matrix / self.scale  # 1 / r: powers of the scale may be too small
+        inverse = self.matrix / self.scale  # 1 / r: powers of the scale may underflow
         raised = inverse * inverse
         for _ in range(power - 2):
             raised *= inverse
@@ -176,16 +176,16 @@ class DenseInfluence:
         return max(64, int(np.ceil(np.sqrt(len(self)))))
 
     def _loss(self, power: int) -> float:
-        """Relative error of a sum of powers."""
+        """Relative error of a sum of powers of 1 / r."""
         return 1.01 * ((len(self) + 6) * ROUNDOFF + power * self.entry_error)
 
 
 @dataclass(frozen=True, eq=False)
 class DenseCoupling:
-    """Displacements elsewhere, row by row; nothing is stored.
+    """Displacements at other points, computed row by row; a large matrix is not stored.
 
     points  : (n, 2) [length] the asperities
-    targets : (m, 2) [length] where the displacements are asked for
+    targets : (m, 2) [length] the other points
     """
 
     points: Array
@@ -215,7 +215,7 @@ class DenseCoupling:
         return inverse_distances(self.targets, self.points)
 
     def _rows(self) -> Iterator[tuple[slice, Array]]:
-        """1 / r in blocks of rows; kept where it is all one small block."""
+        """1 / r in blocks of rows; a single small block is cached."""
         if len(self.points) * len(self.targets) <= KEPT:
             yield slice(None), self._whole
             return

@@ -1,4 +1,4 @@
-"""How negative the coupling of the points of a lattice can be.
+"""A lower bound on the eigenvalues of the coupling of points on a lattice.
 
 docs/theory/operators-lattice.md, "The symbol". Loads v on some sites of a lattice have
 sum_{i != j} v_i v_j / r_ij >= min f  sum v_i^2,  with the symbol f(k) of all sites, k a wave vector
@@ -6,8 +6,8 @@ sum_{i != j} v_i v_j / r_ij >= min f  sum v_i^2,  with the symbol f(k) of all si
 
     f(k) = sum_d cos(k d) erfc(alpha |d|) / |d| + (2 pi / V) sum_G E(|k + G|) - 2 alpha / sqrt(pi)
 
-over all d but 0 of the lattice, with cells of area V, and all G of its dual. Terms of the second
-sum that are left out are positive.
+over all lattice vectors d except 0 and all G of the dual lattice; V is the area of a cell. Omitted
+terms of the second sum are positive.
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ import numpy as np
 
 from convexrough.arrays import Array
 
-#: How far the bound may be below the least value found: what is lost of it, for speed.
+#: Largest distance of the bound below the least value found. A smaller one takes more time.
 TOLERANCE = 1e-3
 
-#: Lattices whose cells are longer than this many of their shortest vectors are given up: they take
-#: many terms.
+#: Ratio of the longer to the shorter basis vector above which no bound is computed: the sums have
+#: too many terms.
 LONGEST = 50.0
 
-#: alpha |d| from which erfc is left out, 3e-17 of it; the same of the dual, where that is allowed.
+#: alpha |d| beyond which erfc (below 3e-17) is omitted, and |k + G| / 2 alpha likewise.
 REACH = 6.0
 
-#: What the terms left out and the rounding of some hundred terms below 10 can amount to.
+#: Bound on the omitted terms and on the rounding of some hundred terms below 10.
 LOST = 1e-9
 
-#: Cells along each direction of the dual that are looked at first, and halvings of them at most.
+#: Number of cells along each direction of the dual at first, and largest number of halvings.
 FIRST, MOST_HALVINGS = 8, 12
 
-#: From the middle of a cell to those of its quarters, in sizes of these.
+#: Vectors from the middle of a cell to the middles of its quarters, in units of a quarter's size.
 QUARTERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]) / 2.0
 
 
 def least_symbol(basis: Array) -> float:
-    """No more than the least of f, for a reduced basis (2, 2) whose shorter vector has length 1.
+    """A lower bound on f for a reduced basis (2, 2) whose shorter vector has length 1.
 
-    Cells of the dual are halved until the bound on f in all of them is within the tolerance of the
-    least value found. -inf where the cells of the lattice are too long.
+    Cells of the dual are halved until the bounds on f in all of them are within the tolerance of
+    the least value found. The result is -inf if the longer vector exceeds `LONGEST`.
     """
     if np.hypot(*basis.T).max() > LONGEST:
         return -np.inf
@@ -63,7 +63,7 @@ def least_symbol(basis: Array) -> float:
 
 @dataclass(frozen=True)
 class _Symbol:
-    """The terms of f that count."""
+    """The terms of f that are not omitted."""
 
     alpha: float
     area: float  # V
@@ -74,7 +74,7 @@ class _Symbol:
 
     @classmethod
     def of(cls, basis: Array) -> _Symbol:
-        """With the alpha that both sums need about as many terms for."""
+        """The terms for an alpha with which both sums have about equally many terms."""
         area = abs(float(np.linalg.det(basis)))
         alpha = float(np.sqrt(np.pi / area))
         dual = np.asarray(2.0 * np.pi * np.linalg.inv(basis).T, dtype=np.float64)
@@ -84,12 +84,13 @@ class _Symbol:
         return cls(alpha, area, dual, sites[distances > 0], distances[distances > 0], images)
 
     def over(self, cells: Array, size: float) -> tuple[Array, Array]:
-        """(m,) f in the middle of some cells of the dual, and lower bounds on it in all of each.
+        """f (m,) in the middles c of cells of the dual, and lower bounds on f in each cell (m,).
 
-        f(c) - |grad f(c)| rho - bend rho^2 / 2  within rho of c, where no second derivative is
-        below -bend; or the first sum at its least, and E where it is: it falls.
+        The bound is the larger of two: f(c) - |grad f(c)| rho - bend rho^2 / 2 within a distance
+        rho of c, where no second derivative is below -bend; and the least value of the first sum
+        plus the second sum with E, which decreases, at the largest distances.
 
-        cells : (m, 2) middles, in parts of g1 and g2;  size : of each, in these parts
+        cells : (m, 2) middles c in units of g1 and g2;  size : side of the cells in these units
         """
         from scipy.special import erfc
 
@@ -113,7 +114,7 @@ class _Symbol:
         return values, np.fmax(taylor, falling)
 
     def _image(self, q: Array) -> tuple[Array, Array]:
-        """(2 pi / V) E(q), and how fast it falls."""
+        """(2 pi / V) E(q), and minus its derivative."""
         from scipy.special import erfc
 
         share, x = 2.0 * np.pi / self.area, q / (2.0 * self.alpha)
@@ -123,13 +124,13 @@ class _Symbol:
 
 
 def _points(basis: Array, radius: float) -> Array:
-    """(n, 2) all points i b1 + j b2 no further from 0 than this, and some more."""
+    """The points i b1 + j b2 (n, 2) within this radius of 0."""
     i, j = (np.arange(-n, n + 1) for n in _counts(basis, radius))
     points = np.stack(np.meshgrid(i, j, indexing="ij"), axis=-1).reshape(-1, 2) @ basis
     return np.asarray(points[np.hypot(*points.T) <= radius * (1.0 + 1e-9)])
 
 
 def _counts(basis: Array, radius: float) -> list[int]:
-    """How many times b1 and b2 a point within the radius can be away, at most."""
+    """Upper bounds on |i| and |j| for points i b1 + j b2 within this radius."""
     columns = np.linalg.inv(basis).T
     return [int(np.ceil(radius * float(np.hypot(*column)))) for column in columns]

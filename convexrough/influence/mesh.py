@@ -1,4 +1,4 @@
-"""A square mesh of nodes with the softened kernel on it, and interpolation from it to points.
+"""A square mesh with the softened kernel, and interpolation between its nodes and points.
 
 Derived in docs/theory/operators-mesh.md, "A mesh and near pairs".
 """
@@ -17,10 +17,10 @@ from convexrough.influence.softened import Softened, twofold_lagrange
 from convexrough.influence.splitting import Splitting
 from convexrough.numbers.pairs import Pair
 
-#: Points of one block at most: what keeps sums short, and a matrix product in the cache.
+#: Largest number of points in a block: sums stay short, and a matrix product fits in the cache.
 BLOCK = 256
 
-#: Points weighed together: what a cache holds.
+#: Number of points whose weights are computed together: they fit in the cache.
 PLACES = 2**12
 
 
@@ -29,15 +29,15 @@ class Mesh(SiteBox):
     """A box of square cells, with the softened kernel."""
 
     def softened(self, kernel: Softened) -> Kernel:
-        """L for every difference of two nodes."""
+        """The softened kernel L for every difference of two nodes."""
         return self.kernels(lambda i, j, squares: [kernel.smooth(squares)], np.float64)[0]
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
-    """W: from nodes of a mesh to points, as a product of two factors (n, width), x and y.
+    """The interpolation W from nodes to points, a product of two factors (n, width), x and y.
 
-    patches : points from and to, and the first node in x and y, of each block
+    patches : of each block its first point, the point after its last, and its first node in x and y
     """
 
     x: NDArray[Any]
@@ -63,7 +63,7 @@ class Interpolation:
         return cls(x, y, patches, shape)
 
     def to_nodes(self, loads: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
-        """W^T P on the mesh; of the sizes of the weights if `absolute`."""
+        """W^T P on the mesh; with the absolute values of the weights if `absolute`."""
         field = np.zeros(self.shape, dtype=loads.dtype)
         x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
         width = x.shape[1]
@@ -74,7 +74,7 @@ class Interpolation:
         return field
 
     def from_nodes(self, field: NDArray[Any], absolute: bool = False) -> NDArray[Any]:
-        """W of a field on the mesh."""
+        """W times a field on the mesh (n,); with absolute values of the weights if `absolute`."""
         result = np.empty(len(self.x), dtype=field.dtype)
         x, y = (np.abs(self.x), np.abs(self.y)) if absolute else (self.x, self.y)
         width = x.shape[1]
@@ -86,7 +86,7 @@ class Interpolation:
 
 
 def twofold_weights(order: Order, splitting: Splitting, some: slice) -> tuple[Pair, Pair]:
-    """(n, width) weights of some points in x and y, each set where its stencil is."""
+    """The weights (n, width) of some points in x and y, 0 outside the stencil of each point."""
     stencil = np.arange(splitting.kernel.order)
     factors = []
     for k in (0, 1):

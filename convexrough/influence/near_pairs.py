@@ -1,4 +1,4 @@
-"""Near pairs of points, found block by block, and what the smooth part leaves to them."""
+"""Near pairs of points, found block by block, with the part of 1 / r^q that is not smooth."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from convexrough.influence.coupling import squared_distances
 from convexrough.influence.splitting import Splitting
 from convexrough.numbers.pairs import Pair, two_sum
 
-#: Pairs looked at together, and how many such pieces are held at once.
+#: Number of pairs processed together, and number of such pieces in memory at once.
 PIECE, BATCH = 2**17, 32
 
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """Points in the order of the blocks of the mesh that they are in.
+    """Points sorted by the block of the mesh that contains them.
 
-    places : (n,) the points in order;  points : (n, 2) [length] in that order
-    tails  : (n, 2) [length] what these lack, or None
-    cells  : (n, 2) mesh cells;  shares : (n, 2) where in its cell each is, from 0 to 1
-    keys   : of blocks with points, in order;  starts : (blocks + 1,) their points
+    places : (n,) original indices of the sorted points;  points : (n, 2) [length] the sorted points
+    tails  : (n, 2) [length] their low parts, or None
+    cells  : (n, 2) mesh cells;  shares : (n, 2) position of each point in its cell, from 0 to 1
+    keys   : numbers of the blocks with points, sorted;  starts : (blocks + 1,) their first points
     shape  : rows and columns of blocks
     """
 
@@ -67,9 +67,10 @@ class Order:
 def _placed(
     points: Array, low: Array, spacing: float, tails: Array | None
 ) -> tuple[Indices, Array]:
-    """Cells, and shares of them that are rounded once: at most half a roundoff off.
+    """The cell of each point, and its position in the cell, rounded once.
 
-    A tail may reach into the cell before: of the outermost points, out of it by a roundoff.
+    A tail may move a point into the previous cell, and an outermost point out of the mesh by a
+    roundoff.
     """
     away = Pair(*two_sum(points, -low))
     if tails is not None:
@@ -81,16 +82,16 @@ def _placed(
     return cells.astype(np.intp), (away.high - cells) + away.low
 
 
-#: Points from and to, and where their neighbours begin and end in the order, row by row of blocks.
+#: A slice of the sorted points, and where their neighbours begin and end in each row of blocks.
 Piece: TypeAlias = tuple[slice, Indices, Indices]
 
 
 @dataclass(frozen=True, eq=False)
 class NearPairs:
-    """S of docs/theory/operators-mesh.md: 1 / r^q less its smooth part, of pairs within the cut.
+    """S of docs/theory/operators-mesh.md: 1 / r^q minus its smooth part, of pairs within the cut.
 
-    upper   : (n, n) sparse, pairs i < j;  own : what each point gets of itself
-    terms   : the most that any sum has;  nearest : [length] the least distance that is not 0
+    upper   : (n, n) sparse, pairs i < j;  own : the diagonal, minus the smooth part at r = 0
+    terms   : largest number of terms in a sum;  nearest : [length] least distance that is not 0
     """
 
     upper: Any
@@ -105,7 +106,7 @@ class NearPairs:
         n = len(order.points)
         pieces = list(_neighbourhoods(order, splitting))
         most = sum((rows.stop - rows.start) * int((b - a).sum()) for rows, a, b in pieces)
-        # About half of them are near; memory is taken when written to, not here.
+        # About half of these pairs are near; memory is allocated only when it is written to.
         checks.fits_in_memory("asperities that could touch", n, 6.0 * most / max(n, 1))
         index: Any = np.int32 if most < 2**31 else np.int64
         where, values = np.empty(most, dtype=index), np.empty(most, dtype=dtype)
@@ -121,7 +122,7 @@ class NearPairs:
                     done, nearest = taken.stop, min(nearest, found.closest)
         starts = np.concatenate(([0], np.cumsum(counts)))
         both = counts
-        for start in range(0, done, 2**24):  # which makes a copy of each
+        for start in range(0, done, 2**24):  # bincount copies its argument
             both = both + np.bincount(where[start : min(start + 2**24, done)], minlength=n)
         upper = csr_array((values[:done], where[:done], starts.astype(index)), shape=(n, n))
         return cls(upper, -splitting.kernel.centre, int(both.max(initial=0)), nearest)
@@ -134,7 +135,7 @@ class NearPairs:
 
 
 class _Pairs(NamedTuple):
-    """Near pairs of some points with later ones, point by point."""
+    """Near pairs of some points with later points, sorted by point."""
 
     rows: slice  # the points
     counts: Indices  # how many pairs each has
@@ -161,9 +162,9 @@ def _pairs(order: Order, splitting: Splitting, piece: Piece) -> _Pairs:
 
 
 def _neighbourhoods(order: Order, splitting: Splitting) -> Iterator[Piece]:
-    """Points, and those of their own and later blocks that can be nearer than the cut.
+    """Points, and the points of the same and of later blocks that can be nearer than the cut.
 
-    Blocks in a row are next to each other in the order, and so are their points.
+    Blocks in a row are consecutive in the order, and so are their points.
     """
     rows, columns = order.shape
     away = 0

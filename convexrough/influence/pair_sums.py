@@ -1,9 +1,9 @@
-"""Sums over pairs of points anywhere: smooth at a distance, by a mesh; pair by pair nearby.
+"""Sums over pairs of arbitrary points: distant pairs by a mesh, near pairs one by one.
 
-1 / r^q is split into a part that is smooth everywhere (`softened`) and the rest, which ends at a
-reach. The first is interpolated from a square mesh and convolved on it by fast Fourier transforms;
-the second is a sparse matrix. Both errors, of interpolation and of rounding, are bounded
-(docs/theory/operators.md).
+1 / r^q is split into a part that is smooth everywhere (`softened`) and a rest that is 0 beyond a
+distance, the reach. The smooth part is interpolated from a square mesh and convolved on it by
+Fourier transforms; the rest is a sparse matrix. The errors of interpolation and of rounding are
+bounded (docs/theory/operators.md).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from convexrough.roundoff import ROUNDOFF
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """P -> sum_j P_j / r_ij^q, and a bound on its error."""
+    """The map from P to sum_j P_j / r_ij^q, with bounds on its errors."""
 
     splitting: Splitting
     order: Order
@@ -57,7 +57,7 @@ class Product:
         return cls(splitting, order, near, weights, mesh, kernel)
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
-        """The sparse part on another thread: both it and the transforms leave Python."""
+        """The sums (n,). A second thread computes the sparse part: both parts release the GIL."""
         ordered = loads[self.order.places]
         if self.weights is None:
             total = self.near.apply(ordered)
@@ -71,16 +71,16 @@ class Product:
         return result
 
     def smooth(self, ordered: NDArray[Any]) -> NDArray[Any]:
-        """W G W^T P."""
+        """The part computed on the mesh: W G W^T P."""
         assert self.weights is not None
         field = self.mesh.convolve(self.weights.to_nodes(ordered), self.kernel.spectrum)
         return self.weights.from_nodes(field)
 
     def interpolation(self, strengths: Array) -> Array:
-        """(n,) bounds on the error of interpolation, for strengths that are not negative.
+        """Bounds (n,) on the error of interpolation, for strengths that are not negative.
 
-        Of pairs within the reach and the sway of their stencils, which all count as the worst; that
-        of the others is relative, and part of `rounding`.
+        They include pairs within the reach plus the `sway` of the stencils, each with the error of
+        the worst pair. The error of other pairs is relative, and part of `rounding`.
         """
         kernel, spacing = self.splitting.kernel, self.splitting.spacing
         if not self.splitting.meshed:
@@ -93,11 +93,11 @@ class Product:
 
     @cached_property
     def interpolation_norm(self) -> float:
-        """Bound on its 2-norm for loads of norm 1: the largest sum over a row."""
+        """Bound on the 2-norm of the error of interpolation for loads of 2-norm 1."""
         return float(self.interpolation(np.ones(len(self.order.points))).max(initial=0.0))
 
     def above(self, strengths: Array) -> Array:
-        """(n,) upper bounds on the sums, for strengths that are not negative."""
+        """Upper bounds (n,) on the sums, for strengths that are not negative."""
         total = self.apply(strengths)
         rounding = self.rounding(strengths)
         total += rounding.of(total) + self.interpolation(strengths)
@@ -105,7 +105,7 @@ class Product:
 
     @cached_property
     def _rounding(self) -> tuple[float, float]:
-        """Of everything but transforms and interpolation nearby, relative and in the 2-norm.
+        """Rounding outside the transforms: relative, and per 2-norm of the loads.
 
         docs/theory/operators-mesh.md, "Errors", "Rounding".
         """
@@ -117,7 +117,7 @@ class Product:
         return 1.01 * relative, 1.01 * own
 
     def rounding(self, loads: Array) -> Rounding:
-        """Of `apply` in float64, without interpolation between points near to each other."""
+        """Bound on the error of `apply` in float64, without that of `interpolation`."""
         relative, own = self._rounding
         norm, each = own * float(np.linalg.norm(loads)), own * float(np.abs(loads).max(initial=0.0))
         if self.weights is not None:
@@ -130,7 +130,7 @@ class Product:
             from_mesh += max(soft.roundoffs, soft.beyond_roundoffs) * ROUNDOFF  # of each L
             transforms = mesh.bound(kernel, ROUNDOFF) + from_mesh * kernel.total
             norm += self._stretch * (transforms * field + to_mesh * kernel.total * sizes)
-            # One by one: Cauchy's inequality for a row of G, and the sum of a row of |W|.
+            # For each component: Cauchy's inequality for a row of G, and the sum of a row of |W|.
             transforms = mesh.bound_each(kernel, ROUNDOFF) + from_mesh * kernel.norm
             growth = lebesgue(soft.order) ** 2
             each += growth * (transforms * field + to_mesh * kernel.norm * sizes)
@@ -138,7 +138,7 @@ class Product:
 
     @property
     def _weighing(self) -> tuple[float, float]:
-        """Rounding of sums with W, to the mesh and from it; adding zeros costs none."""
+        """Relative rounding of products with W^T and with W; adding zeros is exact."""
         order, width = self.splitting.kernel.order, self.splitting.width
         weights = 2.0 * WEIGHT_ROUNDOFFS + 2.0
         overlaps = (-(-width // self.splitting.block)) ** 2
@@ -163,9 +163,9 @@ class Product:
 
 
 def within(points: Array, strengths: Array, distance: float) -> Array:
-    """(n,) upper bounds on the sums of strengths within a distance of each point, its own included.
+    """Upper bounds (n,) on the sum of all strengths within a distance of each point.
 
-    By cells of a quarter of the distance, and a little for the rounding of places.
+    The sums are over square cells with sides of a quarter of the distance.
     """
     parts = 4
     side = distance * (1.0 + 1e-9) / parts

@@ -1,7 +1,7 @@
-"""The coupling among asperities anywhere: by a mesh and a sparse matrix, with proved errors.
+"""The compliance operator of arbitrary points: a mesh and a sparse matrix, with error bounds.
 
-What happens on the mesh, and the bounds, are in `pair_sums`, `mesh`, `near_pairs`, `splitting` and
-`softened`; docs/theory/operators-mesh.md, "A mesh and near pairs", derives them.
+`pair_sums`, `mesh`, `near_pairs`, `splitting` and `softened` contain the method and the bounds;
+docs/theory/operators-mesh.md, "A mesh and near pairs", derives them.
 """
 
 from __future__ import annotations
@@ -27,29 +27,29 @@ from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 from convexrough.scene.neighbours import crowding, separations
 
-#: Error of a product, relative to its own size, that is left to interpolation: all that is of
-#: sharp sums, which are known to 1e-16.
+#: Relative error of a product that interpolation may cause. It is nearly all of the error of
+#: `sums`, which are accurate to 1e-16.
 TOLERANCE = 5e-17
 
-#: The same where loads are in single precision, and for sums that need not be sharp.
+#: The same for loads in single precision, and for `falloff`.
 SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
 
-#: Up to so many asperities are summed up by their matrix: as fast as a mesh, and to 27 digits.
+#: Largest number of asperities whose `sums` use a matrix: it is as fast as a mesh, to 27 digits.
 FEW = 1500
 
-#: Up to so many pairs (asperity, other point) are coupled one by one: a heuristic, for speed only.
+#: Largest number of pairs (asperity, other point) that `onto` couples one by one; for speed only.
 FEW_PAIRS = 10**8
 
 
 @dataclass(frozen=True, eq=False)
 class ScatteredInfluence:
-    """The coupling among asperities anywhere.
+    """The compliance operator of asperities at arbitrary points.
 
     points      : (n, 2) [length]
     scale       : 1 / (pi E*) in the problem's units: A_ij = scale / r_ij
     point_error : [length] bound on the error of each coordinate of the points
-    tails       : (n, 2) [length] what the points lack, or None; see `Scene.contact_tails`
-    tolerance   : error of interpolation in a product, relative to its size
+    tails       : (n, 2) [length] low parts of the points, or None; see `Scene.contact_tails`
+    tolerance   : relative error of a product that interpolation may cause
     """
 
     points: Array
@@ -85,7 +85,7 @@ class ScatteredInfluence:
         )
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """With bounds on the errors of a coarser mesh added."""
+        """Computed by a coarser mesh, whose error bounds are added."""
         product = self._square if power == 2 else self._cube
         return product.above(strengths) * self._stretched(power)
 
@@ -127,7 +127,7 @@ class ScatteredInfluence:
         return False
 
     def sums(self, loads: Pair) -> Ball:
-        """By the mesh, or of few points by their matrix."""
+        """Computed by the mesh, or for few points by their matrix."""
         found = self._sums(loads)
         if isinstance(self._sums, MatrixSums) or self._unknown == 0.0:
             return found
@@ -146,7 +146,7 @@ class ScatteredInfluence:
         return coarse_inverse(self.points, self.scale, root)
 
     def _stretched(self, power: int) -> float:
-        """How much higher 1 / r^q can be for what is known of the points."""
+        """The factor by which 1 / r^q can be higher because of the errors of the points."""
         moved = entry_error(self._unknown, self._double.near.nearest)
         return float((1.0 + moved) ** power) * (1.0 + 1e-6)
 
@@ -172,13 +172,13 @@ class ScatteredInfluence:
 
     @property
     def _unknown(self) -> float:
-        """[length] bound on the error of each coordinate, with the tails."""
+        """Bound on the error [length] of each coordinate, with the tails."""
         return known(self.points, self.tails, self.point_error)[1]
 
 
 @dataclass(frozen=True, eq=False)
 class ScatteredCoupling:
-    """From the first asperities of an operator to all others."""
+    """The map from loads on the first asperities of an operator to displacements of the others."""
 
     joint: ScatteredInfluence
     sources: int

@@ -1,4 +1,4 @@
-"""An approximate inverse of I + W A W for asperities anywhere, for conjugate gradients.
+"""An approximate inverse of I + W A W for arbitrary points, to precondition conjugate gradients.
 
 Derived in docs/theory/operators-mesh.md, "Approximate inverse".
 """
@@ -13,18 +13,18 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Smoother
 from convexrough.influence.dense import dense_matrix
 
-#: Nodes of the coarse mesh that a smoother solves on, about; and too few touching points for one.
-#: Heuristics: conjugate gradients take more steps where they are wrong, to the same answer.
+#: Approximate number of nodes of the coarse mesh, and fewest touching points for which it is used.
+#: Heuristics: they change the number of steps of conjugate gradients, not the answer.
 COARSE, FEW_TOUCHING = 1000, 200
 
 
 def coarse_inverse(points: Array, scale: float, root: Array) -> Smoother | None:
-    """(I + T K T^t)^-1, where T K T^t is W A W as seen from a coarse mesh.
+    """(I + T K T^t)^-1 in single precision, where T K T^t approximates W A W by a coarse mesh.
 
-    T = W S interpolates linearly to touching points from the nodes around them, and K is
-    1 / (pi E* r) between nodes with shells of half the spacing on its diagonal, so that it is
-    positive definite (docs/theory/convexity.md). So is the inverse then, whatever the points: by
-    Woodbury's identity it is I - T (K^-1 + T^t T)^-1 T^t. In single precision.
+    T = W S, where S interpolates linearly to touching points from the nodes around them. K is
+    1 / (pi E* r) between nodes, with shells of half the spacing on its diagonal: it is positive
+    definite (docs/theory/convexity.md), and so is the inverse for any points. By Woodbury's
+    identity the inverse is I - T (K^-1 + T^t T)^-1 T^t.
     """
     from scipy.linalg.lapack import dpotrf, dpotri, spotrs
     from scipy.sparse import csr_array
@@ -49,7 +49,7 @@ def coarse_inverse(points: Array, scale: float, root: Array) -> Smoother | None:
         return None
     small, coarse, coupling = (each.astype(np.float32) for each in (T, factor, K))
     w = root[touching].astype(np.float32)
-    # A W r: its long waves by the nodes, and short ones as if signs were random within a cell.
+    # Estimate of |A W r|: long waves by the nodes, short waves as if signs in a cell were random.
     counts = np.bincount(nodes.ravel(), weights.ravel() / np.repeat(root[touching], 4))
     per_cell = max(len(touching) / len(places), 1.0)
     rough = scale / spacing * np.sqrt(np.pi * per_cell * np.log(per_cell))
@@ -67,7 +67,7 @@ def coarse_inverse(points: Array, scale: float, root: Array) -> Smoother | None:
 
 
 def _coarse_spacing(points: Array, most: int) -> float:
-    """[length] of a square mesh of which about so many cells hold points."""
+    """The spacing [length] of a square mesh in which about this many cells contain points."""
     low, widest = points.min(axis=0), float(np.ptp(points, axis=0).max())
     spacing = widest
     while True:
@@ -80,7 +80,7 @@ def _coarse_spacing(points: Array, most: int) -> float:
 
 
 def _linear(points: Array, spacing: float) -> tuple[Indices, Array, Array]:
-    """(n, 4) nodes around each point and weights of linear interpolation; (nodes, 2) [length]."""
+    """The nodes around each point and their weights, both (n, 4), and all nodes (m, 2) [length]."""
     away = (points - points.min(axis=0)) / spacing
     cells = away.astype(np.intp)
     shares = away - cells

@@ -1,8 +1,8 @@
 """The sums of `pair_sums` to more digits, for the one product of a certificate.
 
-docs/theory/operators-mesh.md. What goes to the mesh, through it and back is multiplied in slices:
-first ones of so few bits that their products are exact, and small rests. What is left is
-interpolation.
+docs/theory/operators-mesh.md. The products to the mesh, on it and from it are computed in slices:
+first slices have so few bits that their products are exact, and the rests are small. The remaining
+error is mostly that of interpolation.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair, two_product, two_sum
 from convexrough.roundoff import ROUNDOFF
 
-#: Bits of a float64 number, and of first slices where at most 16 units are added up.
+#: Bits of a float64 number, and bits of first slices in sums of at most 16 units.
 DIGITS, BITS = 53, 24
 
-#: Patches looked at together: what a cache holds.
+#: Number of patches processed together: they fit in the cache.
 PATCHES = 64
 
 LowWeights: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 class Slices(NamedTuple):
-    """Numbers as sums of two: first ones of few bits, and all of the rest."""
+    """Numbers as sums of a first slice of few bits and a rest."""
 
     first: Array
     second: Array
@@ -54,7 +54,7 @@ class Slices(NamedTuple):
 def in_slices(
     product: Callable[[Array, Array], Array], a: Slices, b: Slices
 ) -> tuple[Array, Array]:
-    """A bilinear product: of the first slices, which is exact, and of what else there is."""
+    """A bilinear product in two parts: that of the first slices, which is exact, and the rest."""
     left = product(a.first, b.second)
     left += product(a.second, b.first + b.second)
     return product(a.first, b.first), left
@@ -62,9 +62,9 @@ def in_slices(
 
 @dataclass(frozen=True)
 class SoftValues:
-    """unit L between nodes of a mesh.
+    """The softened kernel times a unit, unit L, between nodes of a mesh.
 
-    near : by i^2 + j^2 within the reach;  distances : beyond
+    near : values within the reach, by i^2 + j^2;  distances : values beyond, 1 / r
     """
 
     near: Pair
@@ -90,7 +90,7 @@ class SoftValues:
 
 
 def _within_reach(kernel: Softened, spacing: float, unit: float) -> Pair:
-    """unit L(spacing sqrt(s)), s = 0, 1, ... below the reach."""
+    """unit L(spacing sqrt(s)) for s = 0, 1, ... at distances below the reach."""
     step = Fraction(spacing) ** 2
     nodes = math.ceil(Fraction(kernel.reach) ** 2 / step)
     return soft_values(
@@ -99,7 +99,7 @@ def _within_reach(kernel: Softened, spacing: float, unit: float) -> Pair:
 
 
 class MeshSums:
-    """sum_j P_j / r_ij for exact points, by the mesh of a product."""
+    """The sums sum_j P_j / r_ij for exact points, by the mesh of a product."""
 
     def __init__(self, product: Product) -> None:
         mesh, unit = product.mesh, 2.0 ** math.floor(math.log2(product.splitting.spacing))
@@ -136,7 +136,7 @@ class MeshSums:
 
 
 def _low_weights(product: Product) -> LowWeights:
-    """What weights in x and y are more than float64 holds of them."""
+    """The low parts of the weights in x and y, in single precision."""
     shape = len(product.order.places), product.splitting.width
     x, y = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.float32)
     for start in range(0, len(x), PLACES):
@@ -169,7 +169,7 @@ def _to_nodes(product: Product, lows: LowWeights, ordered: Pair) -> tuple[Pair, 
 def _from_nodes(
     product: Product, lows: LowWeights, on_mesh: Ball
 ) -> tuple[Array, Array, float, float]:
-    """W of values on the mesh: whole numbers, what is left, their unit, and the rounding in it."""
+    """W times values on the mesh: whole numbers, rests, their unit, and an error bound in it."""
     high, low = (np.asarray(each).reshape(product.mesh.shape) for each in on_mesh.mid)
     scale = 2.0 ** -np.ceil(np.log2(np.abs(high).max() + 1e-300))
     values = Slices.of(Pair(high * scale, low * scale), BITS)
@@ -182,7 +182,7 @@ def _from_nodes(
             lines = Slices.of(Pair(*in_slices(np.matmul, across.some(rows), nodes)), BITS)
             here = slice(some.start + rows.start, some.start + rows.stop)
             exact[here], left[here] = in_slices(_row_by_row, lines, along.some(rows))
-    # Sums of weights are below 4 in size; those of second slices, p of them, below p 2^-BITS.
+    # Sums of |weights| are below 4; sums of the second slices of p weights are below p 2^-BITS.
     kernel, width = product.splitting.kernel, product.splitting.width
     rounding = 12 * kernel.order * (width + 8) * ROUNDOFF * 2.0**-BITS + 32 * TWOFOLD_WEIGHT
     return exact / unit, left / unit, unit / scale, rounding / unit
@@ -191,7 +191,7 @@ def _from_nodes(
 def _weighed(
     product: Product, lows: LowWeights
 ) -> Iterator[tuple[slice, list[tuple[slice, slice, slice]], Pair, Pair]]:
-    """The points of some patches; of each its rows among these, and nodes; and the weights."""
+    """Points of some patches; the rows and nodes of each patch; the weights in x and in y."""
     assert product.weights is not None
     weights, width = product.weights, product.splitting.width
     for k in range(0, len(weights.patches), PATCHES):
@@ -206,7 +206,7 @@ def _weighed(
 
 
 def _met(product: Product) -> int:
-    """The most points that have a node in their stencil."""
+    """The largest number of points that have the same node in their stencils."""
     assert product.weights is not None
     order, counts = product.splitting.kernel.order, np.zeros(product.weights.shape, dtype=np.intp)
     np.add.at(counts, tuple(product.order.cells.T), 1)
@@ -217,7 +217,7 @@ def _met(product: Product) -> int:
 
 
 def _relative(product: Product) -> float:
-    """Of pairs far apart, and of places in cells that are rounded once."""
+    """Relative error of distant pairs by interpolation, and by the rounding of places in cells."""
     kernel, spacing = product.splitting.kernel, product.splitting.spacing
     return kernel.far_error(spacing) + kernel.moved(2.0 * ROUNDOFF * spacing)
 

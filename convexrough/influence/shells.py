@@ -1,4 +1,4 @@
-"""Shells about asperities that do not overlap: what makes the coupling positive semidefinite.
+"""Radii of shells about asperities that do not overlap: with them the coupling is semidefinite.
 
 The lemma is proved in docs/theory/convexity.md, "Why (2) is not convex as it stands".
 """
@@ -13,10 +13,10 @@ from convexrough.roundoff import SAFETY
 
 
 def shells(influence: Influence) -> Array:
-    """(n,) 1 / (pi E* s_i) of radii s_i with s_i + s_j <= r_ij: half the nearest distances.
+    """1 / (pi E* s_i) (n,) with s_i half the distance to the nearest neighbour: s_i + s_j <= r_ij.
 
-    With them A + diag(shells) is positive semidefinite (docs/theory/convexity.md). A single
-    asperity has no neighbour; infinite where rounding leaves no shell.
+    A + diag(shells) is positive semidefinite (docs/theory/convexity.md). A shell is 0 for a single
+    asperity, and infinite where rounding leaves no distance.
     """
 
     def about(separations: Array) -> Array:
@@ -27,13 +27,12 @@ def shells(influence: Influence) -> Array:
 
 
 def fitted_shells(influence: Influence, radii: Array, share: float) -> Array:
-    """`shells` that fit contact radii a (n,) [length] where neighbours differ in size.
+    """`shells` adapted to contact radii a (n,) [length] of neighbours that differ in size.
 
-    docs/theory/certificate.md, "Which box", 3:
-
-    s_i = share a_i / c + (1 - share) d_i / 2  with c the crowding, the largest (a_i + a_j) / r_ij,
-    and d_i the distance to the nearest neighbour: each part keeps s_i + s_j <= r_ij, so their
-    mean does. Then every a_i / s_i is at most c / share.
+    docs/theory/certificate.md, "Which box", 3: the radii are
+    s_i = share a_i / c + (1 - share) d_i / 2, where c is the crowding, the largest
+    (a_i + a_j) / r_ij, and d_i the distance to the nearest neighbour. Both a_i / c and d_i / 2
+    satisfy s_i + s_j <= r_ij, so their mean does. Every a_i / s_i is at most c / share.
     """
     crowding = influence.crowding(radii) * (1.0 + SAFETY + 2.0 * influence.entry_error)
     s = (1.0 - share) * influence.separations() / 2.0

@@ -1,9 +1,10 @@
-"""Products on a box of sites to as many digits as are asked for, by exact convolutions.
+"""Products on a box of sites to any number of digits, by exact convolutions.
 
-docs/theory/operators-lattice.md. Loads and kernel are cut into slices: whole numbers of units that
-shrink by the same power of two from one slice to the next, and a small rest. The products of all
-slices that share a unit are a level; the error of a level computed by transforms is below a half,
-so rounding makes it exact. The rest beside these levels is small, and so is its error.
+docs/theory/operators-lattice.md. Loads and kernel are cut into slices of whole numbers and a small
+rest; the unit shrinks by the same power of two from one slice to the next. All products of slices
+that have the same unit are summed as a level. A level computed by Fourier transforms has an error
+below one half, so that rounding to whole numbers makes it exact. The rest is small, and so is its
+error.
 """
 
 from __future__ import annotations
@@ -26,15 +27,15 @@ from convexrough.roundoff import ROUNDOFF
 SURE = 0.45
 
 #: Number of slices, and the number of sites of a box above which there is one more: on 6.6 million
-#: sites, three slices prove loads to 7e-13 of the largest, and four to 3e-15.
+#: sites, three slices prove loads to 7e-13 of the largest load, and four to 3e-15.
 SLICES, LARGE = 3, 2**22
 
-#: Whole numbers of at most so many bits are cut off at once: float64 holds them with a rest.
+#: Largest number of bits in a slice: float64 holds these and a rest.
 MOST_BITS = 48
 
 
 class Values(Protocol):
-    """An even kernel of size 1 at most, at differences of sites.
+    """An even kernel of size at most 1, as a function of differences of sites.
 
     error : bound on the relative error of each value
     """
@@ -43,16 +44,16 @@ class Values(Protocol):
     def error(self) -> float: ...
 
     def at(self, i: Indices, j: Indices) -> Pair:
-        """(len(i), len(j)) values."""
+        """The values (len(i), len(j))."""
         ...
 
 
 @dataclass(frozen=True)
 class Distances:
-    """1 / |i b1 + j b2| for whole i and j; 0 for no difference.
+    """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0.
 
-    gram : three slices (3, 3) of b1 b1, 2 b1 b2 and b2 b2, the first two of so few bits that their
-        sums over i^2, i j and j^2 are exact
+    gram : three slices (3, 3) of b1 b1, 2 b1 b2 and b2 b2; the first two slices have so few bits
+        that their sums with i^2, i j and j^2 are exact
     """
 
     gram: Array
@@ -60,7 +61,7 @@ class Distances:
 
     @classmethod
     def of(cls, basis: list[list[Fraction]], largest: int) -> Distances:
-        """For i and j below the largest.
+        """The distances for |i| and |j| below `largest`.
 
         basis : reduced, in a unit that is at most its shortest length and more than half of it
         """
@@ -76,8 +77,8 @@ class Distances:
                 slices[s, k] = float(part)
                 value, finest = value - part, finest / 2 ** (bits - 1)
             slices[2, k] = float(value)
-        # The third slices, 2^(above - 2 bits) at most, lose four roundoffs of i^2 + |i j| + j^2 in
-        # all; on a reduced basis r^2 is at least a third of that.
+        # The third slices are at most 2^(above - 2 bits). Their sums lose at most four roundoffs of
+        # i^2 + |i j| + j^2; on a reduced basis r^2 is at least a third of that.
         return cls(slices, PAIR_ROUNDOFF + 12 * ROUNDOFF * 2.0 ** (above - 2 * bits))
 
     def at(self, i: Indices, j: Indices) -> Pair:
@@ -94,9 +95,10 @@ class Distances:
 
 
 def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
-    """Whole numbers v_1, v_2, ... and a rest, the last:  values = sum 2^-(bits + s more) v_{s+1}.
+    """Whole numbers v_1, v_2, ... and last a rest, with  values = sum 2^-(bits + s more) v_{s+1}.
 
-    Below 2^bits max |values|, then 2^(more - 1) at most; the rest is rounded once.
+    |v_1| is at most about 2^bits max |values|, the others at most 2^(more - 1); the rest is rounded
+    once.
     """
     high, low = values.high * 2.0**bits, values.low * 2.0**bits
     slices = []
@@ -110,11 +112,12 @@ def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
 
 @dataclass(frozen=True, eq=False)
 class Sliced:
-    """A kernel on a box, in slices of which the transforms are kept: for any loads.
+    """A kernel on a box in slices, whose transforms serve for any loads.
 
-    unit    : [length] a power of two, by which the values are divided
-    kernels : of the slices, 2^-(bits + t more) of K_{t+1};  error : that of the values
-    budget  : the most that both norms of two slices may multiply to
+    unit    : [length] the unit of distances, a power of two
+    kernels : the slices K_1, K_2, ...; the unit of K_{t+1} is 2^-(bits + t more)
+    error   : relative error of the values
+    budget  : upper limit on the product of the 2-norms of a slice of loads and one of the kernel
     """
 
     box: SiteBox
@@ -127,27 +130,27 @@ class Sliced:
 
     @classmethod
     def of(cls, box: SiteBox, values: Values, norm: float, unit: float, count: int) -> Sliced:
-        """norm : about the 2-norm of the kernel, over all differences of two sites."""
+        """Slices of the kernel; norm : about its 2-norm over all differences of two sites."""
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
         sites = math.sqrt(float(rows * columns))
         budget = SURE / ((count - 1) * each_loss(box, count))
-        # The norms of all slices of the kernel, and so those of loads, are to be about the same.
+        # All slices of the kernel should have about the same norm, and so should those of loads.
         most = math.sqrt(budget * places / sites)
         bits = min(max(math.floor(math.log2(0.95 * most / max(norm, 1.0))), 1), MOST_BITS)
         more = min(1 + math.floor(math.log2(budget / (places * sites)) / 2.0), MOST_BITS)
         while True:
             kernels = _kernels(box, values, bits, more, count)
             largest = max(each.norm for each in kernels[:-1])
-            # Of any loads, further slices are 2^(more - 1) at most.
+            # For any loads, slices after the first are at most 2^(more - 1).
             if count == 2 or largest * 2.0 ** (more - 1) * sites <= budget:
                 return cls(box, unit, kernels, bits, more, values.error, budget)
             more -= 1
 
     def sums(self, loads: Pair, at: Indices, change: Array, error: float) -> Ball:
-        """(n,) sum_j g_ij P_j / unit, and what is known beside it, to within an error.
+        """The sums (n,) of g_ij P_j / unit, g the kernel, plus a known `change` with an `error`.
 
-        at : (n,) places of the loads, in the box as wide as the transforms
+        at : (n,) places of the loads, in a box with as many columns as the transforms
         """
         count = len(self.kernels)
         top = float(np.abs(loads.high).max(initial=0.0))
@@ -178,11 +181,11 @@ class Sliced:
             return Pair(total.high * unit, total.low * unit) + Pair.exact(change[some])
 
         unit = size / self.unit
-        left = behind = 0.0  # of norms, as `_levels`
+        left = behind = 0.0  # bounds by norms, as in `_levels`
         for kernel, norm in zip(self.kernels, sizes[::-1], strict=True):
             behind = behind * 2.0**-self.more + norm
             left += kernel.norm * behind
-        # By Cauchy's inequality, of the values and of pairs.
+        # The errors of the values and of operations on pairs, by Cauchy's inequality.
         whole = 1.01 * self.norm * float(np.linalg.norm(shares.high))
         radius = each_loss(self.box, count) * left * units[-1]
         radius += (self.error + count * PAIR_ROUNDOFF) * whole
@@ -191,12 +194,12 @@ class Sliced:
 
     @property
     def norm(self) -> float:
-        """The 2-norm of the kernel, and a little."""
+        """An upper bound on the 2-norm of the kernel."""
         norms = (k.norm * 2.0 ** -(t * self.more) for t, k in enumerate(self.kernels))
         return 2.0**-self.bits * sum(norms)
 
     def _cut(self, shares: Pair) -> tuple[list[Array], int]:
-        """Slices of loads of which all levels are exact, and the bits of the first."""
+        """Slices of loads for which all levels are exact, and the bits of the first slice."""
         count = len(self.kernels)
         most = self.budget / max(1.0, *(each.norm for each in self.kernels[:-1]))
         guess = math.floor(math.log2(most / float(np.linalg.norm(shares.high))))
@@ -206,7 +209,7 @@ class Sliced:
         return cut(shares, bits, self.more, count), bits
 
     def _levels(self, waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
-        """Those of whole numbers, and the sum of all that is left."""
+        """The transforms of the levels of whole numbers, and of the sum of all other products."""
         spectra = [kernel.spectrum[:, each] for kernel in self.kernels]
         last = len(waves) - 1
         levels = []
@@ -225,10 +228,10 @@ class Sliced:
 
 
 def each_loss(box: SiteBox, count: int) -> float:
-    """Of a component of a level, over both 2-norms: (2) of docs/theory/operators-lattice.md.
+    """Bound on the error of a component of a level, relative to the product of the 2-norms.
 
-    Twice `count` and 6 roundoffs instead of 4: up to so many sums of loads and of products are
-    added up before the inverse transform, and the last slices are rounded.
+    (2) of docs/theory/operators-lattice.md, with 2 `count` + 6 roundoffs instead of 4: up to
+    `count` products are added up before the inverse transform, and the last slices are rounded.
     """
     return 1.01 * ROUNDOFF * ((2.0 + math.sqrt(2.0)) * box.loss + 2.0 * count + 6.0)
 

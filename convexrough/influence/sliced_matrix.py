@@ -1,9 +1,9 @@
-"""Sums of P_j / r_ij by a matrix, to some 27 digits, through BLAS.
+"""Sums of P_j / r_ij by a matrix, to some 27 digits, with products by BLAS.
 
-Entries and loads are cut into slices. First slices are multiples of one unit for each row and block
-of columns, and have so few bits that their products add up without rounding, in any order: all sums
-are below 2^53 units. So it is with products of first and second slices. What is left is some 2^-48
-of the whole, and ordinary sums of it lose 2^-101.
+Entries and loads are cut into slices. The first slices are multiples of one unit for each row and
+block of columns, with so few bits that sums of their products stay below 2^53 units and are exact
+in any order. The same holds for products of first with second slices. The rest is some 2^-48 of the
+whole, and its rounding some 2^-101.
 """
 
 from __future__ import annotations
@@ -22,32 +22,33 @@ from convexrough.numbers.balls import TINY, UP, Ball
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, rounded, two_square, two_sum
 from convexrough.roundoff import ROUNDOFF
 
-#: Columns that share a unit, and bits of the first and second slice of an entry.
+#: Number of columns that share a unit; bits of the first and of the second slice of an entry.
 BLOCK, FIRST, SECOND = 128, 24, 23
 
-#: More bits of a first slice of loads are of no use.
+#: Largest number of bits in a first slice of loads; more would not reduce the error.
 MOST_BITS = 30
 
-#: Rows of a matrix that is kept: its slices take 0.4 GB.
+#: Largest number of rows of a matrix that is cached: its slices take 0.4 GB.
 KEPT = 4096
 
-#: A matrix of so many rows, or of twice what is wanted, is made wholly: more may be wanted of it.
+#: A whole matrix is computed, instead of a part, if it has at most this many rows, or twice as many
+#: as the part: other parts may be needed.
 SMALL = 128
 
-#: Entries looked at together where a matrix is made: what a cache holds.
+#: Number of entries computed together: they fit in the cache.
 PIECE = 2**15
 
-#: Where the points span 1: nothing is known of a larger 1 / r, as squares may underflow.
+#: Bound on 1 / r for points that span 1: of a larger one, r^2 may underflow.
 LARGEST = 2.0**300
 
 
 @dataclass(frozen=True, eq=False)
 class SlicedMatrix:
-    """Rows of 1 / r_ij as first + second + rest; 0 where two points are one.
+    """Rows of 1 / r_ij as first + second + rest; 0 where two points coincide.
 
-    blocks : of columns, and the bits that a first and a second slice of their loads may have
-    losses : (3 blocks, m) what a product loses by the largest load, what two slices leave of it,
-        and what one slice leaves of it, in each block
+    blocks : the columns of each block, and the bits that a slice of their loads may have
+    losses : (3 blocks, m) errors of a product per unit of, in each block, the largest load, the
+        largest rest of a load after two slices, and the largest rest after one slice
     """
 
     slices: tuple[Array, Array, Array]
@@ -56,7 +57,7 @@ class SlicedMatrix:
 
     @classmethod
     def of(cls, points: Pair, rows: slice, point_error: float = 0.0) -> SlicedMatrix:
-        """For points (n, 2) that span about 1, each off by a distance `point_error` at most."""
+        """The rows for points (n, 2) that span about 1, each known to a distance `point_error`."""
         here, n = points.at(rows), len(points.high)
         m, starts = len(here.high), range(0, n, BLOCK)
         slices = (np.empty((m, n)), np.empty((m, n)), np.empty((m, n)))
@@ -93,7 +94,7 @@ class SlicedMatrix:
         return cls(slices, blocks, losses.reshape(-1, m) * UP)
 
     def restricted(self, which: Indices) -> SlicedMatrix:
-        """For some of the points, in this order: shorter sums lose no more."""
+        """The matrix of some of the points, in increasing order; its errors are no larger."""
         first, second, rest = (part.take(which, 0).take(which, 1) for part in self.slices)
         stops = np.searchsorted(which, [columns.stop for columns, _ in self.blocks]).tolist()
         columns = (slice(*edges) for edges in pairwise([0, *stops]))
@@ -101,7 +102,7 @@ class SlicedMatrix:
         return SlicedMatrix((first, second, rest), blocks, self.losses.take(which, 1))
 
     def __matmul__(self, loads: Pair) -> tuple[Array, Array, Array]:
-        """The products with loads (..., n) of 1 at most, (..., m): high and low, and the error."""
+        """High and low parts (..., m) of products with loads (..., n) up to 1, and error bounds."""
         sums, rests, left_over = [], [], []
         for columns, bits in self.blocks:
             a, b, c = (part[:, columns].T for part in self.slices)
@@ -124,9 +125,9 @@ class SlicedMatrix:
 
 
 class MatrixSums:
-    """sum_j P_j / r_ij among points (n, 2), each coordinate off by `point_error` at most.
+    """sum_j P_j / r_ij among points (n, 2), each coordinate known to within `point_error`.
 
-    Slices of up to `KEPT` rows are kept; of more they are made anew each time, in parts.
+    The slices of up to `KEPT` rows are cached; larger matrices are computed anew for each product.
     """
 
     def __init__(self, points: Pair, point_error: float = 0.0) -> None:
@@ -135,14 +136,14 @@ class MatrixSums:
         self.which: Indices | None = None
 
     def restricted(self, which: Indices) -> MatrixSums:
-        """Among some of the points."""
+        """The sums among some of the points."""
         part = MatrixSums(self.points.at(which), self.point_error)
         if len(which) and (which[1:] > which[:-1]).all():
             part.whole, part.which = self, which
         return part
 
     def __call__(self, loads: Pair) -> Ball:
-        """(..., n) for loads (..., n)."""
+        """The sums (..., n) for loads (..., n)."""
         if loads.high.size == 0:
             return Ball.exact(loads)
         with np.errstate(all="ignore"):
@@ -174,14 +175,14 @@ class MatrixSums:
 
     @cached_property
     def _of_whole(self) -> bool:
-        """Whether to take it out of a larger matrix: of one that is there, or small."""
+        """True if the matrix is cut out of a larger one, which is cached or small enough."""
         if self.whole is None or (n := len(self.whole.points.high)) > KEPT:
             return False
         return "_matrix" in vars(self.whole) or n <= max(SMALL, 2 * len(self.points.high))
 
     @cached_property
     def _scale(self) -> int:
-        """The power of two that the points span."""
+        """The exponent of the power of two by which the points are divided, so that they span 1."""
         if self._of_whole:
             assert self.whole is not None
             return self.whole._scale
@@ -193,29 +194,29 @@ class MatrixSums:
 
 
 def _unit(largest: Array) -> Array:
-    """Of a first slice of entries up to this."""
+    """The unit of first slices of entries up to this size."""
     return np.asarray(np.ldexp(2.0**-FIRST, np.frexp(largest)[1]))
 
 
 def _most(values: Array) -> Array:
-    """(..., 1) the largest size along the last axis."""
+    """The largest absolute values (..., 1) along the last axis."""
     return np.asarray(np.abs(values).max(axis=-1, initial=0.0, keepdims=True))
 
 
 def inverse_distances(points: Pair, others: Pair) -> Pair:
-    """(m, n) 1 / r_ij to 2^-98 of themselves; 0 where two points are one."""
+    """1 / r_ij (m, n) to a relative error of 2^-98; 0 where two points coincide."""
     return squared_distances(points.at(np.s_[:, None]), others).inverse_root()
 
 
 def squared_distances(points: Pair, others: Pair) -> Pair:
-    """r^2 of points along the last axis."""
+    """Squared distances r^2; the last axis of the points is x, y."""
     x, y = (_square(points.at(np.s_[..., k]), others.at(np.s_[..., k])) for k in (0, 1))
     square, rest = two_sum(x.high, y.high)
     return Pair(square, rest + (x.low + y.low))
 
 
 def _square(here: Pair, there: Pair) -> Pair:
-    """Squared differences of one coordinate; float64 numbers leave fewer terms."""
+    """Squared differences of one coordinate; differences of float64 numbers take fewer terms."""
     if here.low.any() or there.low.any():
         apart = here - there
     else:

@@ -1,8 +1,7 @@
-"""How to split 1 / r^q, and where to interpolate its smooth part: the cheapest that is accurate.
+"""The choice of the splitting of 1 / r^q and of the mesh for its smooth part.
 
-docs/theory/operators-mesh.md, "Choice of p, h and a". All numbers here are heuristics: what
-they choose costs more or less, and its error, a little more or less than the tolerance, is bounded
-anyway.
+docs/theory/operators-mesh.md, "Choice of p, h and a". All numbers here are heuristics: they affect
+the cost, and how near the error is to the tolerance, but the error is bounded for any choice.
 """
 
 from __future__ import annotations
@@ -16,27 +15,27 @@ from convexrough.arrays import Array
 from convexrough.influence.coupling import squared_distances
 from convexrough.influence.softened import Softened
 
-#: Numbers of nodes to interpolate from, in each direction.
+#: Candidates for p, the number of nodes for interpolation in each direction.
 ORDERS = range(4, 30, 2)
 
-#: Points whose sums, over so many more, stand for those of all when parameters are chosen.
+#: Sums at SAMPLE points, over MORE points, are used to estimate those at all points.
 SAMPLE, MORE = 32, 2**15
 
-#: Nearest points that do not count for the size of a sum.
+#: Number of nearest points that are left out of the estimate of a sum.
 NEAREST = 8
 
-#: [ns] estimates, for two cores: a node's transforms; a pair, its share of the assembly included;
-#: a point's interpolation for each number of its dense row, squared.
+#: Estimated times [ns] on two cores: of the transforms per node; per pair, with its assembly; of
+#: interpolation per point and squared width of its stencil.
 NODE_COST, PAIR_COST, ROW_COST = 60.0, 6.0, 0.3
 
 
 @dataclass(frozen=True)
 class Splitting:
-    """How to split and where to interpolate.
+    """A splitting of 1 / r^q, and a mesh.
 
-    kernel  : q, p and a
+    kernel  : the softened kernel, with q, p and a
     spacing : h [length] of the mesh
-    block   : mesh cells to a side of what is interpolated at once
+    block   : side of the blocks that are interpolated together, in mesh cells
     """
 
     kernel: Softened
@@ -45,7 +44,7 @@ class Splitting:
 
     @classmethod
     def choose(cls, points: Array, power: int, tolerance: float) -> Splitting:
-        """The cheapest that is expected to keep the error of a product to the tolerance."""
+        """The cheapest splitting whose error in a product is likely to be within the tolerance."""
         n = len(points)
         extent = np.ptp(points, axis=0) if n else np.zeros(2)
         best, least = cls(Softened(power, 2, np.inf), 1.0, 1), PAIR_COST * n * n / 2
@@ -72,26 +71,26 @@ class Splitting:
 
     @property
     def meshed(self) -> bool:
-        """Whether there is a smooth part at all."""
+        """True if there is a smooth part."""
         return bool(np.isfinite(self.kernel.reach))
 
     @property
     def cut(self) -> float:
-        """[length] the distance from which on nothing is left to do pair by pair."""
+        """The distance [length] beyond which no pair is summed individually."""
         return self.kernel.cut(self.spacing)
 
     @property
     def width(self) -> int:
-        """Nodes to a side that the points of one block need."""
+        """Side of the square of nodes that the points of one block need."""
         return self.block + self.kernel.order - 1
 
 
 class _Sums(NamedTuple):
-    """How large sums over all points are, from some points and more of them."""
+    """Estimates of sums over all points, from a sample."""
 
-    distances: Array  # of these pairs, by size
-    share: float  # these pairs for each of all points
-    size: float  # of a sum of 1 / r^q
+    distances: Array  # of the pairs in the sample, sorted
+    share: float  # number of pairs in the sample per point
+    size: float  # median of the sums of 1 / r^q
 
     @classmethod
     def of(cls, points: Array, power: int) -> _Sums:
@@ -99,18 +98,18 @@ class _Sums(NamedTuple):
         some, more = points[np.resize(chosen, SAMPLE)], points[chosen[-MORE:]]
         distances, share = np.sqrt(squared_distances(some, more)), len(more) / len(points)
         ordered = np.sort(distances.ravel())
-        # But for the nearest few: one close pair is not to stand for all.
+        # Without the few nearest pairs: one close pair must not decide the estimate.
         nearest = float(ordered[min(int(NEAREST * SAMPLE * share), ordered.size - 1)])
         sums = (np.maximum(distances, nearest) ** -power).sum(axis=1)
         return cls(ordered, SAMPLE * share, float(np.median(sums)) / share)
 
     def around(self, distance: float) -> float:
-        """Points within a distance of one, on average."""
+        """The mean number of points within a distance of a point."""
         return float(np.searchsorted(self.distances, distance)) / self.share
 
 
 def _spacing(kernel: Softened, sums: _Sums, tolerance: float) -> float:
-    """[length] h at which (1) of docs/theory/operators-mesh.md leaves just the tolerance."""
+    """The spacing h [length] at which (1) of docs/theory/operators-mesh.md equals the tolerance."""
     spacing = kernel.reach / (2.0 * kernel.order)
     for _ in range(4):
         counted = 1.8 * sums.around(kernel.reach + kernel.sway(spacing))
@@ -121,6 +120,6 @@ def _spacing(kernel: Softened, sums: _Sums, tolerance: float) -> float:
 
 
 def _block(order: int, nodes_per_point: float) -> int:
-    """Some tens of points to a block, but no row of the interpolation too empty."""
+    """The side of a block with some tens of points, limited to p / 2 to 2 p cells."""
     wanted = int(np.ceil(np.sqrt(48.0 * nodes_per_point)))
     return int(np.clip(wanted, order // 2, 2 * order))

@@ -151,7 +151,7 @@ def _closed(slips: Array) -> Array:
     """(m, n, 2) whole-number slips whose sum over vertices is the same at every asperity."""
     largest = float(np.abs(slips).max())
     if not largest > 0:
-        raise SolverError("the program was answered without a mechanism", solver="shakedown")
+        raise SolverError("the solver found no slips", solver="shakedown")
     slips = np.round(slips * (STEPS / largest))
     net = slips.sum(axis=0)
     together = np.round(net.mean(axis=0))

@@ -153,7 +153,7 @@ def shakedown(
         given = "one point" if len(q) else "none"
         raise InputError("force_amplitudes", found=given, expected=expected)
     if kind != "exact" and np.any(p):
-        expected = 'none: only "exact" holds where the normal load varies'
+        expected = 'none, as the kind is not "exact": the normal load must be constant'
         raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)
     contact = press(scene, load=P0, influence=influence)
     limit = partial(
@@ -279,6 +279,6 @@ def _alike(what: str, values: ArrayLike, count: int) -> Array:
     if np.ndim(values) == 0:
         return frozen(np.full(count, float(given[0])))
     if len(given) != count:
-        expected = f"{count}, as many as of force_amplitudes"
+        expected = f"{count}, one for each of force_amplitudes"
         raise InputError(what, found=f"{len(given)} values", expected=expected)
     return given

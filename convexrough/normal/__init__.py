@@ -1,1 +1,1 @@
-"""Pressing: the normal problem, what a prescribed load implies, and the certificate."""
+"""The normal contact problem, bounds from a prescribed load, and the certificate."""

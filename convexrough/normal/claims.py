@@ -23,9 +23,9 @@ SUSPICIOUS = 1e-3
 class Claim(ABC):
     """Claimed forces, one per asperity, and the statuses that they imply.
 
-    one, many : what the forces are called;  proved : what is proved right, and
-    kinds     : how it can be wrong: attributes with the indices, and the same in words
-    claims    : what is claimed where `claimed` is true, and where not
+    one, many : names of a force and of the forces;  proved : name of the claimed set
+    kinds     : ways in which a status can be wrong: attributes with indices, and their descriptions
+    claims    : the statuses that are claimed where `claimed` is True and where it is False
     within : largest error allowed, as a fraction of the largest force; None: as accurate as needed
         to prove every status from the forces alone
     total_prescribed : [force] None where it is not prescribed
@@ -88,13 +88,13 @@ class Claim(ABC):
 
     @property
     def holds(self) -> bool:
-        """All that is claimed is proved right, every force is near enough, the total agrees."""
+        """True if all claimed statuses are proved, all forces near enough, and the total agrees."""
         wrong = len(self.wrongly_claimed) + len(self.undecided)
         return not wrong and self.near_enough and self.total_holds
 
     @property
     def wrongly_claimed(self) -> Indices:
-        """(m,) of every kind."""
+        """Indices (m,) of asperities whose claimed status is proved wrong, of every kind."""
         return np.concatenate(list(self.wrong.values()))
 
     @cached_property
@@ -121,7 +121,7 @@ class Claim(ABC):
 
     @property
     def near_enough(self) -> bool:
-        """Every force is proved near enough."""
+        """True if every force is proved to be near enough to the solution."""
         return self.decided_alone if self.within is None else not len(self.off)
 
     @property

@@ -74,9 +74,9 @@ class Data(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class NormalProblem:
-    """The asperities of a scene that could touch, and what is prescribed. In own units.
+    """The asperities of a scene that could touch, and what is prescribed, in the problem's units.
 
-    candidates    : (n,) their indices in the scene; all others carry nothing in any solution
+    candidates    : (n,) their indices in the scene; all others carry no load in any solution
     coefficients  : (n,) k of the local law
     offsets       : (n,) d_i = D_i - D0
     offset_errors : (n,) bound on the rounding error of D_i, without that of D0
@@ -214,9 +214,9 @@ class NormalProblem:
         influence: Kind | None = None,
         highest: float | None = None,
     ) -> NormalProblem:
-        """Screen, scale and couple. `approach` [length] or `load` [force], exactly one.
+        """The problem of a scene. `approach` [length] or `load` [force] is given, exactly one.
 
-        influence : how to couple; None for the cheapest exact way
+        influence : compliance operator; None for the cheapest exact one
         highest   : [length] an upper bound on the approach under this load, where one is known;
             else `highest_approach` finds one
         """
@@ -256,7 +256,7 @@ class NormalProblem:
         )
 
     def restricted(self, which: Indices) -> NormalProblem:
-        """The problem of some of the candidates: all others carry nothing."""
+        """The problem of some of the candidates; all others carry no load."""
         return replace(
             self,
             candidates=self.candidates[which],
@@ -303,7 +303,7 @@ class NormalProblem:
         return local + displacement - self.offsets - approach
 
     def residual(self, loads: Array, approach: float, displacement: Array | None = None) -> float:
-        """How far the contact law is from holding: max |g_i| where loaded, else max(-g_i, 0).
+        """The residual of the contact law: the largest |g_i| where loaded and -g_i elsewhere.
 
         displacement : A P, if known
         """

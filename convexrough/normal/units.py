@@ -1,4 +1,4 @@
-"""The units that a normal problem and its friction are solved in."""
+"""The problem's own units, in which normal problems and friction are solved."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Units:
 
     @property
     def local(self) -> float:
-        """What a local coefficient k is multiplied by: force^(2/3) / length, a power of two."""
+        """The factor force^(2/3) / length of a local coefficient k, a power of two."""
         return 2.0 ** round(math.log2(self.force) * 2 / 3) / self.length
 
     @classmethod

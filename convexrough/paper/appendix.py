@@ -1,18 +1,17 @@
-"""The source paper's appendix [A1]-[A15], as a comparison: slip from the fields at the surface.
+"""The source paper's appendix [A1]-[A15], for comparison: slips from the surface displacements.
 
-The forces and stick discs are Ciavarella and Jaeger's, of `shear`. But what an asperity slips by is
-read off the surface displacement u at its centre, the sum of [A3] and [A4] over all asperities: the
-mean of u over the asperities that still stick in part ("adhered") stands for the displacement of
-the deep points, and slip is what u at a sliding asperity falls short of it.
+Forces and stick discs are those of `shear` (Ciavarella and Jaeger). The slip of an asperity follows
+from the surface displacement u at its centre, the sum of [A3] and [A4] over all asperities. The
+mean of u over the asperities that do not slide ("adhered") approximates the displacement of distant
+points. The slip of a sliding asperity is the difference of this mean and its own u.
 
-An adhered asperity is displaced with the deep points, so u should be the same at all of them. It is
-not quite: at Poisson's ratio 0 because here each force is spread over its disc and there it acts at
-a point, and at any other because displacement reaches further along the shear than across it, which
-Ciavarella and Jaeger average. So slips differ around a ring of asperities, and may be backwards;
-over hexagonal and square rings they sum to the same at every Poisson's ratio, but for the factor
-c_t of all displacements.
+In theory u is the same at all adhered asperities. The computed values differ slightly, because
+[A3] and [A4] spread each force over a disc and `shear` uses point forces, and, unless Poisson's
+ratio is 0, because displacements decay more slowly along the shear than across it, which `shear`
+averages. So slips differ around a ring of asperities and may be backwards. Their sums over
+hexagonal and square rings do not depend on Poisson's ratio, except for the factor c_t.
 
-Nothing here is certified. Displacements and energies are both bodies', twice the source's.
+Nothing here is certified. Displacements and energies are for both bodies, twice the paper's.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from convexrough.sphere import mindlin
 
 
 def displacements(state: ShearState) -> Array:
-    """(n,) [length] surface displacement along the shear at each loaded asperity; nan elsewhere."""
+    """(n,) [length] surface displacement along the shear at each loaded asperity; nan at others."""
     contact = state.contact
     touching = np.flatnonzero(contact.loads)
     found = np.full(len(contact.loads), np.nan)
@@ -38,10 +37,10 @@ def displacements(state: ShearState) -> Array:
 
 
 def slips(state: ShearState) -> Array:
-    """(n,) [length] mean displacement of the adhered less a sliding asperity's own; else 0.
+    """(n,) [length] slips of sliding asperities, 0 for others; forward slip has the sign of Q.
 
-    Signed as the shear where forwards. At |Q| = f P none adheres: the last asperity to slide, which
-    is displaced furthest, then stands for them.
+    At |Q| = f P no asperity adheres. The largest displacement, that of the last asperity to slide,
+    then replaces the mean.
     """
     u, adhered, sliding = displacements(state), _adhered(state), _sliding(state)
     slips = np.zeros(len(u))
@@ -52,19 +51,19 @@ def slips(state: ShearState) -> Array:
 
 
 def scatter(state: ShearState) -> float:
-    """Standard deviation over mean of the displacement of the adhered, which should be 0.
+    """Standard deviation over mean of the displacements of adhered asperities, in theory 0.
 
-    nan where nothing is displaced, or none adheres.
+    The result is nan if nothing is displaced or no asperity adheres.
     """
     u = displacements(state)[_adhered(state)]
     return float(u.std() / abs(u.mean())) if u.any() else float("nan")
 
 
 def energies(state: ShearState) -> Array:
-    """(n,) [force length] lost at each asperity by a steady cycle between Q and -Q.
+    """(n,) [force length] energy lost at each asperity per steady cycle between Q and -Q.
 
-    W_i e(|Q_i| / (f P_i)) + 4 f P_i |s_i|, with W_i = 9 (2 - nu) f^2 P_i^2 / (5 G a_i); a slip
-    backwards counts as negative.
+    It is W_i e(|Q_i| / (f P_i)) + 4 f P_i |s_i|, with W_i = 9 (2 - nu) f^2 P_i^2 / (5 G a_i), the
+    function e of `mindlin.loss` and the slip s_i; a backward slip counts as negative.
     """
     contact, scene = state.contact, state.contact.scene
     friction = checks.friction(scene.friction)
@@ -77,9 +76,9 @@ def energies(state: ShearState) -> Array:
 
 
 def cycle_energy(contact: Contact, maximum: float, minimum: float | None = None) -> float:
-    """Energy lost per steady cycle between two shear forces [force length].
+    """[force length] energy lost per steady cycle between two shear forces [force].
 
-    The sum of `energies` at Q = (maximum - minimum) / 2; the minimum defaults to -maximum.
+    It is the sum of `energies` at Q = (maximum - minimum) / 2; the minimum defaults to -maximum.
     """
     limit = checks.friction(contact.scene.friction) * contact.load
     upper = float(checks.bearable("maximum", maximum, limit))

@@ -1,4 +1,4 @@
-"""Curves of the source paper's figures: asperity forces (Fig. 7) and energy (Fig. 9)."""
+"""The source paper's figures with curves: asperity forces (Fig. 7) and energy (Fig. 9)."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from convexrough.plots.style import (
     title,
 )
 
-#: Amplitude Q / (f P) at which the paper reads off its Fig. 9 that the curves cross: "about".
+#: Amplitude Q / (f P) at which the curves of the paper's Fig. 9 cross, by the paper "about" this.
 READ_CROSSING = 0.37
 
 
 def forces_figure(found: PaperStates, scale: Scale) -> Figure:
-    """Force and displacement of the first asperity of each ring, from Q = 0 to f P."""
+    """The figure of force and displacement of the first asperity of each ring, for Q = 0 to f P."""
     figure = Figure(figsize=(DOUBLE, 3.2), layout="constrained")
     left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     firsts = {name: int(ring[0]) for name, ring in found.named.items()}
@@ -61,7 +61,7 @@ def forces_figure(found: PaperStates, scale: Scale) -> Figure:
 
 
 def _letters(axes: Axes, names: list[str], heights: Array) -> None:
-    """The name of each curve right of its end, moved apart where they would collide."""
+    """Write the name of each curve right of its end, without overlaps."""
     low, high = axes.get_ylim()
     apart = 0.055 * (high - low)
     order = np.argsort(heights)
@@ -80,7 +80,7 @@ def _letters(axes: Axes, names: list[str], heights: Array) -> None:
 
 
 def loss_figure(found: PaperStates, scale: Scale) -> Figure:
-    """Energy per cycle against amplitude, rough and smooth; a zoom on where the curves cross."""
+    """The figure of energy per cycle against amplitude, rough and smooth, with a zoom."""
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     whole, zoom = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     energy = scale.energy(max(each.loss for each in found.cycles))
@@ -113,7 +113,7 @@ def loss_figure(found: PaperStates, scale: Scale) -> Figure:
 
 
 def cross(amplitude: Array, rough: Array, smooth: Array) -> float | None:
-    """Where the two curves drawn first change places, by their ratio; None where they do not."""
+    """The first amplitude at which the two plotted curves cross; None if they do not."""
     ratio = rough[1:] / smooth[1:] - 1.0
     (before,) = np.nonzero(ratio[:-1] * ratio[1:] < 0)
     if len(before) == 0:

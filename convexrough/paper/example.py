@@ -1,8 +1,8 @@
 """The source paper's example and its published numbers.
 
 Dini and Hills, "Frictional Energy Dissipation in a Rough Hertzian Contact", Journal of Tribology
-131 (2009), doi 10.1115/1.3063697: a hexagonal array of asperities with one under the centre,
-lengths in units of the sphere's radius and pressures in units of the contact modulus.
+131 (2009), doi 10.1115/1.3063697: a hexagonal array of asperities with one under the centre.
+Lengths are in units of the sphere's radius, pressures in units of the contact modulus.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ RINGS = {"F": 1, "E": 6, "D": 6, "C": 6, "B": 12, "A": 6}
 
 
 def scene() -> cr.Scene:
-    """The example, with every asperity that the sphere's undeformed surface would reach."""
+    """The scene, with every asperity that the undeformed sphere overlaps."""
     asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
     return cr.Scene(1.0, asperities, material, friction=0.5, geometry="summit")
 
 
 def results() -> list[Result]:
-    """Pressed, sheared to half of gross sliding, and cycled at the amplitudes the paper shows."""
+    """The results of pressing, shearing and cycling at the amplitudes that the paper shows."""
     parts = [0.1, 0.37, 0.5]
     stages = (Normal(approach=APPROACH), Shear(fractions=parts), Cycle(maximum_fraction=parts))
     contact = cr.press(scene(), approach=APPROACH)
@@ -40,7 +40,7 @@ def results() -> list[Result]:
 
 
 def crossover(contact: cr.Contact) -> float:
-    """Q_max / (f P) at which a rough cycle begins to cost more than a smooth one."""
+    """The Q_max / (f P) above which a cycle of the rough contact loses more than a smooth one."""
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
     limit = 0.5 * contact.load
@@ -53,10 +53,7 @@ def crossover(contact: cr.Contact) -> float:
 
 
 def compare(found: list[Result]) -> dict[str, Any]:
-    """The paper's numbers and the computed ones, by the names that `summary.json` uses.
-
-    The paper's number is None where it prints none.
-    """
+    """The paper's numbers (None if not printed) and the computed ones, by names."""
     pressed, sheared, cycled = found
     contact, named = pressed.contact, lettered(pressed.contact)
     onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)
@@ -90,7 +87,7 @@ def _pair(paper: Any, computed: Any) -> dict[str, Any]:
 
 
 def table(comparison: dict[str, Any]) -> list[str]:
-    """Aligned lines: quantity, what the paper says, what is computed."""
+    """The lines of a table of quantities, the paper's values and the computed ones."""
     rows = [("quantity", {"paper": "paper says", "computed": "computed"}, "")]
     rows.append(("asperities in contact", comparison["contacts"], ""))
     for name, ring in comparison["rings"].items():
@@ -100,7 +97,7 @@ def table(comparison: dict[str, Any]) -> list[str]:
         ("sliding at Q/(fP) = 0.5", comparison["sliding_at_half"], ""),
         ("  their ring", comparison["sliding_ring_at_half"], ""),
         ("first to slide at Q/(fP)", comparison["first_slide"], ""),
-        ("rough costs more beyond", comparison["crossover"], "the paper reads a graph"),
+        ("rough loses more beyond", comparison["crossover"], "read from a graph in the paper"),
         ("loss W/W0 at 0.5, rough", comparison["loss_at_half"], ""),
         ("loss W/W0 at 0.5, smooth", comparison["smooth_loss_at_half"], ""),
     ]

@@ -17,16 +17,16 @@ Columns = dict[str, NDArray[Any]]
 
 
 def figure_data(contact: cr.Contact, found: PaperStates | None = None) -> dict[str, Columns]:
-    """The numbers behind the paper's Figs. 3 to 9, name -> columns; forces as fractions of f P.
+    """The numbers behind the paper's Figs. 3 to 9: names of tables, with their columns.
 
-    found : what they are read off, where it is known; else it is computed
+    found : the states and paths of the figures, if already computed
     """
     found = found or PaperStates.of(contact)
     return _at_half(found) | _loading(found)
 
 
 def _at_half(found: PaperStates) -> dict[str, Columns]:
-    """Figs. 3 to 6: the pressure, and the state at half of gross sliding."""
+    """The tables of Figs. 3 to 6: the pressure, and the state at half of gross sliding."""
     contact, half = found.contact, found.half
     smooth = cr.smooth(contact.scene, load=contact.load)
     x = np.linspace(-1.3, 1.3, 2001) * smooth.contact_radius
@@ -73,7 +73,7 @@ def _at_half(found: PaperStates) -> dict[str, Columns]:
 
 
 def _loading(found: PaperStates) -> dict[str, Columns]:
-    """Figs. 7 to 9: first loading, the loop at half of gross sliding, and energies."""
+    """The tables of Figs. 7 to 9: first loading, loops at half of gross sliding, and energies."""
     path, loop = found.path, found.loop
     smooth = cr.smooth(found.contact.scene, load=found.contact.load)
     return {
@@ -100,5 +100,5 @@ def _loading(found: PaperStates) -> dict[str, Columns]:
 
 
 def _of_each_ring(what: str, named: dict[str, Indices], values: Array) -> Columns:
-    """A column for the first asperity of each ring; values (points, n)."""
+    """Columns for the first asperity of each ring, from values (points, n)."""
     return {f"{what}_{name}": values[:, ring[0]] for name, ring in named.items()}

@@ -1,4 +1,4 @@
-"""The counterparts of Figs. 3 to 9 of the source paper (Dini & Hills 2009)."""
+"""Figures like Figs. 3 to 9 of the source paper (Dini and Hills 2009)."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ def paper_figures(
     length_unit: str = "",
     force_unit: str = "",
 ) -> Figures:
-    """The figures of the paper's example, or of any contact whose asperities stand in rings.
+    """The figures of the paper's example, or of any contact with asperities in rings.
 
     "fig3_pressure"   : contact pressure
-    "fig4_rings"      : rings of asperities, those that slide at Q / (f P) = 0.5, and the
-        force from which each ring slides (the first of its asperities)
-    "fig5_traction"   : shear traction at 0.5, overall and on the central asperity
-    "fig6_section"    : traction and f * pressure along y = 0, with the smooth sphere's
+    "fig4_rings"      : rings of asperities, those that slide at Q / (f P) = 0.5, and the force at
+        which the first asperity of each ring starts to slide
+    "fig5_traction"   : shear traction at 0.5, of all asperities and on the central one
+    "fig6_section"    : traction and f * pressure along y = 0, also of the smooth sphere
     "fig7_asperities" : force and displacement of an asperity of each ring from Q = 0 to f P
     "fig8_loops"      : hysteresis loops at 0.5: rough and smooth contact, single asperities
-    "fig9_energy"     : energy per cycle against amplitude, rough and smooth, and where they cross
+    "fig9_energy"     : energy per cycle against amplitude, rough and smooth, and their crossing
 
     Rings have letters as in the paper: A is the outermost.
 
-    found : what they show, where it is known; else it is computed
+    found : the states and paths of the figures, if already computed
     """
     if not contact.loads.any():
         return no_contact("fig3_pressure", "fig4_rings", "fig5_traction", "fig6_section",
@@ -146,9 +146,9 @@ def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure
 
 
 def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) -> None:
-    """Each traction as a stack of discs, from the rim to the stick disc and on to the centre.
+    """Draw each traction as a stack of discs, from the rim to the stick disc and to the centre.
 
-    Radii go by equal steps of the pressure's shape, and of the same shape on the stick disc.
+    Radii have equal steps of Hertz's pressure in the slip annulus, and of its shape in stick discs.
     """
     contact = state.contact
     touching = contact.loads > 0
@@ -172,7 +172,7 @@ def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) 
 
 
 def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
-    """f p and q along y = 0, of the asperities and of the smooth sphere."""
+    """The figure of f p and q along y = 0, of the asperities and of the smooth sphere."""
     contact, sphere = state.contact, smooth(state.contact.scene, load=state.contact.load)
     figure = Figure(figsize=(DOUBLE, 2.9), layout="constrained")
     axes = figure.subplots()

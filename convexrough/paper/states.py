@@ -1,4 +1,4 @@
-"""The states and paths behind the source paper's Figs. 4 to 9, found once for a contact."""
+"""The states and paths of the source paper's Figs. 4 to 9, computed once for a contact."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from convexrough.scene.rings import rings
 #: Q / (f P) of the paper's Figs. 4 to 6 and 8.
 SHARE = 0.5
 
-#: Forces of first loading, close together at gross sliding; amplitudes of the curve of the loss.
+#: Forces Q / (f P) of first loading, denser near gross sliding; and amplitudes of the cycles.
 FRACTIONS = np.union1d(np.linspace(0.0, 1.0, 51), 1.0 - np.linspace(0.0, 1.0, 31) ** 2)
 AMPLITUDES = np.union1d(
     np.concatenate((np.geomspace(1e-3, 0.0125, 6), np.linspace(0.0125, 1.0, 80))),
@@ -24,12 +24,14 @@ AMPLITUDES = np.union1d(
 
 @dataclass(frozen=True, eq=False)
 class PaperStates:
-    """What the figures and their tables show.
+    """The results that the figures and their tables show.
 
+    limit  : [force] f P
     named  : touching asperities by ring, from the axis outwards; the last ring is A
     onsets : (n,) Q / (f P) at which each asperity starts to slide
-    half   : sheared to half of gross sliding;  steady, loop : the cycle between +- that
-    path   : first loading at `fractions`, which hold the onsets;  cycles : at AMPLITUDES
+    half   : state at half of gross sliding;  steady, loop : cycle between plus and minus this force
+    path   : first loading at Q / (f P) = `fractions`, which include the onsets of all rings
+    cycles : steady cycles at AMPLITUDES
     """
 
     contact: cr.Contact
@@ -45,7 +47,7 @@ class PaperStates:
 
     @classmethod
     def of(cls, contact: cr.Contact) -> PaperStates:
-        """Of a pressed contact with friction."""
+        """The results for a pressed contact with friction."""
         limit = checks.friction(contact.scene.friction) * contact.load
         named = lettered(contact)
         onsets = cr.onset_of_sliding(contact) / limit

@@ -1,1 +1,1 @@
-"""A scene file in, result files out."""
+"""Read a scene file, compute its stages and write the results."""

@@ -1,4 +1,4 @@
-"""What `compare` says: for programs, and in aligned lines for people."""
+"""The report of `compare`, as a summary for programs and as aligned lines."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def steps(comparison: Comparison) -> list[list[Any]]:
 
 
 def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
-    """Aligned lines for people."""
+    """The printed report of a comparison, in aligned lines."""
     rows = [_cells(row) for row in summary["compare"]]
     first = summary["compare"][0]
     lines, work = [], unit_of("duality_gap", units)
@@ -57,9 +57,10 @@ def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
         counts = ", ".join(f"{first[status]} {status}" for status in COUNTS if first[status])
         lines.append(f"asperities         {counts}")
     lines += [
-        f"disagreement       with {first['solver']}, over the largest load, as is the load error",
-        f"duality gap        {f'in {work}, ' if work else ''}from the loads alone",
-        "MB                 by which the memory of the process rose while the solver worked",
+        f"disagreement       largest difference from {first['solver']}, over the largest load",
+        "load error         bound on the error of any load, over the largest load",
+        f"duality gap        {f'in {work}, ' if work else ''}computed from the loads alone",
+        "MB                 increase of the memory of the process during the solution",
         "",
         *aligned([HEADING, *rows], left=1),
     ]
@@ -82,7 +83,7 @@ def _cells(row: Summary) -> list[str]:
 
 
 def comparison_warnings(summary: Summary) -> Iterator[str]:
-    """What a user must not overlook."""
+    """Warnings: contradictions, solvers without a solution, and a missing certificate."""
     yield from (f"contradiction: {each}" for each in summary["contradictions"])
     rows = summary["compare"]
     yield from (f"{it['solver']}: {it['outcome']}" for it in rows if it["outcome"] != "answered")

@@ -1,4 +1,4 @@
-"""`run --proof`: what a run computed, as far as a checker can be shown it."""
+"""`run --proof`: a proof of the results of a run."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from convexrough.proof import Proof
 from convexrough.run.stage import Result, limit
 from convexrough.run.stages.cycle import Cycled
 
-#: At friction's limit nothing is left to stick; shear forces nearer to it are left out.
+#: Shear forces above this fraction of the friction limit are left out: all asperities slide there.
 BELOW_LIMIT = 1 - 1e-9
 
 
 def prove_results(results: Sequence[Result]) -> Proof:
-    """Of the contact, of each shear force and of the amplitude of each cycle.
+    """The proof of the contact, of each shear force and of the amplitude of each cycle.
 
     Raises InputError for scenes too large for exact arithmetic, ProofError where nothing is proved.
     """

@@ -1,7 +1,7 @@
-"""The results folder: written under another name beside its place, then renamed.
+"""The results folder, which is written under a temporary name and then renamed.
 
-An existing folder changes only with `force`: files of the earlier run, which its `files.json`
-lists, are replaced by the new ones when these are complete, and other files stay.
+A folder with contents is changed only with `force`: when the new files are complete, they replace
+the files of the earlier run, which `files.json` lists. Other files stay.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 #: Tables with more rows are written as .npz.
 MOST_CSV_ROWS = 100_000
 
-#: What was written, and from what.
+#: The file that lists what was written, from which inputs and by which versions.
 MANIFEST = "files.json"
 
 #: Packages whose versions results may depend on.
@@ -42,12 +42,12 @@ NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
 @contextmanager
 def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
-    """A new folder to write to, which becomes `folder` if all goes well, or vanishes.
+    """A temporary folder, which becomes `folder` if the body succeeds and is removed otherwise.
 
-    force : accept a folder that holds something
-    said  : what `files.json` says besides the names of files
+    force : accept a folder with contents
+    said  : entries of `files.json` besides the names of files
 
-    Raises FileError before anything is computed.
+    Raises FileError, before the body, if `folder` cannot be written or replaced.
     """
     new = unfinished(folder / "results" if folder.is_dir() else folder)
     with file_errors(folder, "hold results"):
@@ -69,7 +69,7 @@ def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
 
 
 def _moved(new: Path, folder: Path) -> None:
-    """Put the new folder in its place; into a folder that is there, file by file."""
+    """Rename the new folder, or move its files into a folder that exists."""
     if not folder.is_dir():
         os.replace(new, folder)
         return
@@ -82,7 +82,7 @@ def _moved(new: Path, folder: Path) -> None:
 
 
 def _earlier(folder: Path) -> list[str]:
-    """The files of an earlier run; none where that cannot be read."""
+    """The files of an earlier run; empty where its list cannot be read."""
     try:
         files = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["files"]
         return [MANIFEST, *map(str, files)]
@@ -91,7 +91,7 @@ def _earlier(folder: Path) -> list[str]:
 
 
 def origin(source: SceneFile) -> Summary:
-    """Where results are from: files read with their hashes, seed, and versions."""
+    """The origin of results: the files read with their hashes, the seed, and versions."""
     return {
         "scene": str(source.path),
         "inputs": dict(source.inputs),
@@ -101,7 +101,7 @@ def origin(source: SceneFile) -> Summary:
 
 
 def versions() -> dict[str, str]:
-    """Of the packages that numbers may depend on."""
+    """The versions of the packages that numbers may depend on."""
     return {name: metadata.version(name) for name in NUMERICAL}
 
 
@@ -177,7 +177,7 @@ def write_figures(
 
 
 def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
-    """Write CSV whose numbers read back the same, or .npz where there are many rows."""
+    """Write CSV whose numbers read back unchanged, or .npz for many rows; return the path."""
     arrays = [np.asarray(values) for values in columns.values()]
     if len(arrays[0]) > MOST_CSV_ROWS:
         path = path.with_suffix(".npz")
@@ -189,7 +189,7 @@ def _write_columns(path: Path, columns: Mapping[str, Any]) -> Path:
 
 
 def write_rows(path: Path, rows: Sequence[Sequence[Any]]) -> Path:
-    """Write CSV, of each float its repr; return the path."""
+    """Write CSV with floats in full precision; return the path."""
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
     return path

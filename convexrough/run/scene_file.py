@@ -1,4 +1,4 @@
-"""Scene files: a TOML file in, a Scene and what to do with it out."""
+"""Scene files: TOML files that describe a scene and what to compute for it."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ if TYPE_CHECKING:
     from convexrough.run.study import Lattice, Study
 
 
-#: Mistakes of a scene file that are shown, more than anybody makes; the rest are counted.
+#: Number of mistakes in a scene file that are reported one by one; further ones are counted.
 MOST_MISTAKES = 50
 
 
-#: Bytes of a scene file; many asperities go into a file of their own.
+#: Largest scene file [bytes]; the positions of many asperities belong in a separate file.
 MOST_BYTES = 2**25
 
-#: What a file of summits may call otherwise.
+#: Columns of a file of summits; the scene file may give other headers for them.
 SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
 
-#: Parts of a dotted key: tomllib takes time and memory with their square.
+#: Most parts of a dotted key: the time and memory of tomllib grow with their square.
 MOST_PARTS = 100
 
 _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
@@ -52,16 +52,16 @@ _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class SceneFile(Record):
-    """What a scene file says: what is pressed, and the stages that start from it.
+    """The contents of a scene file: the scene, and the stages to compute for it.
 
     approach [length] or load [force] : what is prescribed; the other is None
-    highest_approach : [length] upper bound on the approach under the load, where the scene was
-        made to reach as far as that; else None
-    influence : how to couple the asperities; None for the cheapest exact way
-    stages : the tables that compute something, [normal] first, by their names
-    text   : the file itself;  seed : of its random heights and radii, None where there are none
-    convert : numbers whose file names other units are converted
-    inputs : the SHA-256 of each file it was read from, by its path
+    highest_approach : [length] upper bound on the approach under the load, if the extent of the
+        asperities was chosen for it; else None
+    influence : compliance operator; None for the cheapest exact one
+    stages : the tables that compute something, by name; the first is [normal]
+    text   : the file itself;  seed : seed of its random heights and radii, or None
+    convert : whether columns in other units are converted or refused
+    inputs : the SHA-256 of each file that was read, by path
 
     >>> file = cr.read_scene(new_scene)
     >>> contact = file.press()
@@ -94,21 +94,21 @@ class SceneFile(Record):
         )
 
     def press(self) -> Contact:
-        """As the file says. Raises what `press` raises."""
+        """The contact that the file prescribes. Raises what `press` raises."""
         return solve(self.problem(), self.solver)
 
     def compute(self, contact: Contact) -> list[Result]:
-        """The result of each stage, of the pressed contact first."""
+        """The results of all stages; the first is the pressed contact."""
         return [stage.compute(contact) for stage in self.stages.values()]
 
 
 def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = None) -> SceneFile:
     """Read and check a scene file.
 
-    asperities : to press on instead of those of the file
+    asperities : asperities that replace those of the file
 
-    Raises FileError where a file cannot be read or is no TOML, SceneFileError with every mistake in
-    the tables, and InputError for mistakes that show only in building the scene.
+    Raises FileError where a file cannot be read or is not TOML, SceneFileError with every mistake
+    in the tables, and InputError for mistakes found when the scene is built.
 
     >>> file = cr.read_scene(new_scene)  # what `convexrough new` writes
     >>> len(file.scene)
@@ -151,7 +151,7 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
 
 
 def read_units(path: Path) -> UnitNames:
-    """The units that a scene file names. Raises FileError, SceneFileError."""
+    """The units that a scene file names. Raises FileError and SceneFileError."""
     from convexrough.run.study import validate
 
     study, mistakes = validate(parsed(path, read_text(path, MOST_BYTES)))
@@ -161,7 +161,7 @@ def read_units(path: Path) -> UnitNames:
 
 
 def _one_unit(path: Path, own: str, named: str) -> None:
-    """Summits of a map are in the unit of the scene that they are pressed in."""
+    """Raise InputError unless the summits of a map are in the scene's unit of length."""
     if own != named:
         found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
         expected = f'{named}, as in {path}: surface.to_unit("{named}")'
@@ -179,7 +179,7 @@ def digest(path: Path) -> str:
 
 
 def parsed(path: Path, text: str) -> dict[str, Any]:
-    """The tables of a file; FileError where it is no TOML or empty."""
+    """The tables of a file. Raises FileError where it is not TOML, or empty."""
     if key := _DOTTED.search(text):
         line = text.count("\n", 0, key.start()) + 1
         raise FileError(f"{path}: line {line}: a key of more than {MOST_PARTS} parts")
@@ -193,15 +193,15 @@ def parsed(path: Path, text: str) -> dict[str, Any]:
 
 
 def has_sweep(path: Path) -> bool:
-    """Whether a file asks for many scenes."""
+    """True if a scene file has a table [sweep]."""
     text = read_text(path, MOST_BYTES)
     return bool(re.search(r"^\s*\[\s*sweep\b", text, re.M)) and "sweep" in parsed(path, text)
 
 
 class Layouts(NamedTuple):
-    """Where the asperities of a scene are from.
+    """Functions that make asperities.
 
-    summits : reads a file of them;  regular : a pattern, before anything is random
+    summits : reads them from a file;  regular : makes a pattern, without random parts
     """
 
     summits: Callable[..., Asperities]
@@ -221,13 +221,13 @@ READ = Layouts(read_summits, _regular)
 def build_scene(
     path: Path, study: Study, layouts: Layouts = READ, asperities: Asperities | None = None
 ) -> tuple[Scene, float | None]:
-    """The scene of checked tables, and what `SceneFile.highest_approach` says.
+    """The scene of checked tables, and `SceneFile.highest_approach`.
 
-    path    : of the file they are from, for messages and for what paths in it are relative to
-    layouts : where the asperities are from
-    asperities : in place of those of the tables
+    path    : the scene file, for messages; paths in it are relative to its folder
+    layouts : functions that make the asperities
+    asperities : asperities that replace those of the tables
 
-    Raises InputError for mistakes that show only here.
+    Raises InputError for mistakes that the tables alone do not show.
     """
     with _blamed_on(path, "material"):
         stuff = _material(study)
@@ -257,7 +257,7 @@ def build_scene(
 
 
 def _material(study: Study) -> Material:
-    """Of both bodies."""
+    """The material of the contact, from one table or from those of both bodies."""
     from convexrough.run.study import Bodies
 
     def of(body: Any) -> Material:
@@ -274,7 +274,7 @@ def _material(study: Study) -> Material:
 def _lattice(
     layout: Lattice, study: Study, press_on: Callable[[Asperities], Scene], layouts: Layouts
 ) -> tuple[Scene, float | None]:
-    """The scene as far as `within`, or else as far as any asperity could touch."""
+    """The scene up to the distance `within`, or else with all asperities that could touch."""
     tips = layout.tip_radius
     tip_radius = tuple(tips) if isinstance(tips, list) else tips
 
@@ -304,7 +304,7 @@ def _lattice(
 
 @contextmanager
 def _blamed_on(path: Path, table: str) -> Iterator[None]:
-    """Mistakes found while building part of the scene, with file and table named."""
+    """Name the file and the table in the InputErrors of the body."""
     try:
         yield
     except InputError as error:

@@ -11,28 +11,28 @@ from convexrough.run.stages.normal import Pressed, cautions
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
-#: Of the keys of summary.json and the columns of tables.
+#: Version of the keys of summary.json and of the columns of tables.
 SCHEMA = 2
 
 
 def headed(**contents: Any) -> Summary:
-    """What every summary begins with."""
+    """A summary: the schema, the version of the package, and these contents."""
     return {"schema": SCHEMA, "version": __version__, **contents}
 
 
 def summarise(results: Iterable[Result]) -> Summary:
-    """The summary of a run, in the scene's units: of each stage what was found."""
+    """The summary of a run: the result of each stage, in the scene's units."""
     return headed(**{result.name: result.summary() for result in results})
 
 
 def describe(results: Iterable[Result], units: UnitNames) -> list[str]:
-    """Aligned lines for people, of all stages."""
+    """The printed report of all stages, in aligned lines."""
     first, *others = results
     return [*first.lines(units), *(line for it in others for line in ("", *it.lines(units)))]
 
 
 def warnings(results: Iterable[Result], units: UnitNames) -> Iterator[str]:
-    """What a user must not overlook: what is not proved, and where the model ends."""
+    """Warnings: what is not proved, and where the model does not hold."""
     for result in results:
         yield from result.doubts()
         if isinstance(result, Pressed):

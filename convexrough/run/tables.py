@@ -1,4 +1,4 @@
-"""Files that a scene file names: its text, and the table of its asperities."""
+"""Reading of text files, and of the table of asperities that a scene file names."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from convexrough.tabular.units import parsed
 
 
 def read_text(path: Path, most: int) -> str:
-    """The whole of a UTF-8 file of up to `most` bytes, with or without a byte-order mark."""
+    """The text of a UTF-8 file of at most `most` bytes, with or without a byte-order mark."""
     with reading(path), path.open("rb") as file:
         contents = file.read(most + 1)
         if len(contents) > most:
@@ -27,9 +27,9 @@ def read_text(path: Path, most: int) -> str:
 def read_summits(
     path: Path, *, tip_radius: ArrayLike | None, how: Reading = AS_IT_IS
 ) -> Asperities:
-    """Asperities from columns x, y and, where there, height and tip_radius.
+    """Asperities from columns x, y and, if the file has them, height and tip_radius.
 
-    tip_radius : of all, or of each, where the file has no such column; else None
+    tip_radius : one or (n,) [length] if the file has no such column; else None
     """
     table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"), how=how)
     columns = table.columns

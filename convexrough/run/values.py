@@ -1,6 +1,6 @@
-"""What a value in a table of a scene file may be, and how every mistake is told at once.
+"""Types of the values in a scene file, and messages for all mistakes at once.
 
-Only models of tables import this: pydantic takes 0.1 s to import.
+Only modules that define tables import this one: pydantic takes 0.1 s to import.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from convexrough.checks import SIZED, is_sized, nearest
 
-#: Letters of the formulas, and the keys that they stand for.
+#: Symbols that a user may have written as keys, and the keys to suggest for them.
 MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
 MEANT |= {"nu": "poisson_ratio", "R": "radius", "rho": "tip_radius", "f": "coefficient"}
 MEANT |= {"mu": "coefficient", "P": "load", "D": "approach"}
 MEANT |= {"maximum": "maximum_fraction", "minimum": "minimum_fraction"}  # forces in Python
 
-#: A mistake: the key, "" for all of the table, and what is said of it.
+#: A mistake: the key ("" for the whole table) and the message.
 Mistake = tuple[str, str]
 
 

@@ -1,1 +1,1 @@
-"""What is pressed on what: material, asperities, the sphere, and the patterns they stand in."""
+"""The scene: material, asperities and their patterns, and the sphere or another base."""

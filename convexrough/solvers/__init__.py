@@ -1,6 +1,6 @@
-"""Ways to solve the normal problem: settings objects, each with `solve(problem)`.
+"""Solvers of the normal problem: settings objects with a method `solve(problem)`.
 
-Those written elsewhere (Clarabel, CVXPY, OSQP) are imported when first used.
+The libraries Clarabel, CVXPY and OSQP are imported when first used.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ __all__ = [
     "named",
 ]
 
-#: By the name that a scene file, and `press`, know them by.
+#: The solvers by their names in scene files and in `press`.
 SOLVERS: dict[str, Callable[[], Solver]] = {
     "newton": Newton,
     "conic": Conic,
@@ -36,7 +36,7 @@ SOLVERS: dict[str, Callable[[], Solver]] = {
 
 
 def named(solver: Solver | str | None) -> Solver:
-    """The solver itself, the one of that name, or Newton's method for None."""
+    """The given solver, the solver of this name, or Newton's method for None."""
     if solver is None:
         return Newton()
     if isinstance(solver, str) and solver in SOLVERS:

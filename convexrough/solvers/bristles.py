@@ -1,33 +1,33 @@
-"""The contact as one quadratic program: Hertz's law as a row of bristles, through OSQP.
+"""The contact as one quadratic program, with Hertz's law as rows of bristles, solved with OSQP.
 
-The method of dimensionality reduction (Popov and Hess 2015) makes Hertz's energy the value of a
-quadratic program. On |x| <= b lies a row of independent springs, the bristles, with the stiffness
-2 E* per length of the half row and the profile x^2 / R_i above the first to touch:
+In the method of dimensionality reduction (Popov and Hess 2015) Hertz's energy of a load P is the
+value of a quadratic program. A row of independent springs, the bristles, lies on |x| <= b; its half
+has the stiffness 2 E* per length, and the bristle at x touches at the indentation x^2 / R_i:
 
     (3/5) k P^(5/3) = min { integral f^2 / (4 E*) + (x^2 / R_i) f  dx :  f >= 0,  integral f = P },
 
-all over 0 <= x <= b, for every P whose contact radius is at most b; f = 2 E* (delta - x^2 / R_i)+.
-A force constant on each of m equal cells turns x^2 / R_i into its mean over the cell, and the
-minimum into an upper bound on the energy. In own units, with the loads B_i at contact radius b_i,
-their indentation d_i = k B_i^(2/3) and their stiffness h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i),
-and phi_ij the force on cell j if every cell bore as much as it does,
+with integrals over 0 <= x <= b, for every P whose contact radius is at most b. The minimiser at the
+indentation delta is f = 2 E* max(delta - x^2 / R_i, 0). With f constant on each of m equal cells,
+x^2 / R_i becomes its mean over the cell, and the minimum an upper bound on the energy. In the
+problem's units let B_i be the load at the contact radius b_i, d_i = k B_i^(2/3) its indentation,
+h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i) its stiffness, and phi_ij m times the force on cell j:
 
     P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
     c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
 
-P is exact where the contact ends on the edge of a cell, and off by 0.375 B_i b / (b_i m^2) at worst
-in between: second order.
+P is exact where the contact ends on the edge of a cell; in between its error is at most
+0.375 B_i b / (b_i m^2), of second order in 1 / m.
 
-Convexity. With phi_ij = P_i + e_ij, sum_j e_ij = 0, the squares fall apart, and the program is
+Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the squares separate, and the program is
 
     minimise    P'(A + diag(h)) P / 2 + sum_ij h_i e_ij^2 / (2 m) + sum_ij d_i c_j phi_ij / m - D'P
     subject to  P_i + e_ij >= 0,   sum_j e_ij = 0        (and sum P_i = L under load control).
 
 Its matrix is positive definite exactly if A + diag(h) is: the Hessian of the contact energy at the
-upper corner of the box P <= B. No shift is needed, and m does not matter. The box is that of the
-a priori bounds if a Cholesky factorisation finds the matrix positive definite there. Else it is
-cut at b_i = 0.99 (pi/2) s_i, where the shell lemma proves it. Beyond the box the row has no more
-bristles: an answer that gets there is refused.
+upper corner of the box P <= B, for any m. The box is that of the a priori bounds if a Cholesky
+factorisation finds the matrix positive definite there. Otherwise it is cut at
+b_i = 0.99 (pi/2) s_i (s_i: half the distance to the nearest neighbour), where the shell lemma
+proves that the matrix is. The rows end at the box: an answer that reaches a cut face is refused.
 """
 
 from __future__ import annotations
@@ -54,29 +54,29 @@ from convexrough.solvers.programs import (
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: The convexity number S of a box that has to be cut to the convex range. The lemma proves the
-#: matrix definite below 1; the hundredth is a heuristic, so that rounding does not undo it.
+#: The convexity number S of a box that is cut to the convex range. The lemma proves the matrix
+#: definite for S below 1; the margin for rounding is a heuristic.
 LARGEST_S = 0.99
 
-#: What is taken off the diagonal, as a part of it, where Cholesky decides whether the matrix is
-#: definite. A heuristic: far above what rounding does to a factorisation.
+#: The part of the diagonal that is subtracted when Cholesky's factorisation decides whether the
+#: matrix is definite. A heuristic, far above the rounding of a factorisation.
 MARGIN = 0.001
 
-#: A box is not smaller than this part of the largest. A heuristic: of loads as small nothing need
-#: be resolved, and the stiffness of a box, which goes as its load^(-1/3), stays within a hundred.
+#: Smallest box as a part of the largest. A heuristic: such small loads need not be resolved, and
+#: the stiffnesses of boxes, proportional to load^(-1/3), differ by at most a factor of a hundred.
 SMALLEST_BOX = 1e-6
 
 
 @dataclass(frozen=True)
 class BristleQP:
-    """Settings of the bristle program: OSQP (1.0 or newer) with polishing.
+    """A solver of the bristle program with OSQP (1.0 or newer) and polishing.
 
     bristles    : m, over half the contact width of each asperity; the error of the loads is about
         0.4 / m^2 of the largest load
     newton_step : end with one Newton step, which squares the error and costs little
-    tolerance   : OSQP's, absolute and relative, in the problem's units; polishing then solves the
-        equations of the bristles in contact to rounding, where OSQP has found these
-    verbose     : print OSQP's own table of iterations
+    tolerance   : absolute and relative tolerance of OSQP, in the problem's units; if OSQP finds the
+        right bristles in contact, polishing then solves their equations to rounding
+    verbose     : True to print OSQP's table of iterations
 
     Raises TooDenseError where the contact leaves the convex range, and SolverError where OSQP is
     missing or does not solve the program.
@@ -104,7 +104,7 @@ class BristleQP:
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """Loads of the candidates (own units). OSQP starts where it likes: `start` is not used."""
+        """The loads of the candidates in the problem's units. `start` is not used."""
         program = BristleProgram.assemble(problem, self.bristles, self.name)
         loads, approach, iterations = program.through(self.run)
         if self.newton_step:
@@ -114,17 +114,17 @@ class BristleQP:
         return Solution.of(problem, loads, approach, iterations, refine=self.newton_step)
 
     def run(self, program: QuadraticProgram) -> RawAnswer:
-        """OSQP's answer to the program."""
+        """The solution of the program by OSQP, not yet checked."""
         return run_osqp(program, self.name, self.tolerance, self.max_iterations, self.verbose)
 
 
 @dataclass(frozen=True, eq=False)
 class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
-    """The contact law as rows of bristles, in the variables P and e, row by row.
+    """The contact law as rows of bristles; the variables are P (n,), then e (n, m) row by row.
 
-    m       : bristles of each row
-    solver  : the name that errors give
-    box     : (n,) loads B;  cut : (n,) whether the convex range ends there
+    m       : number of bristles in each row
+    solver  : name of the solver, for error messages
+    box     : (n,) loads B;  cut : (n,) True where the box was cut to the convex range
     hessian : (n, n) A + diag(h), positive definite
     """
 
@@ -142,7 +142,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         return cls(problem, m, solver, *_convex_box(problem, solver))
 
     def apply(self) -> QuadraticProgram:
-        """Constrained are phi_ij, then sum_j e_ij / m, then the total load if prescribed."""
+        """The program. Rows of constraints: phi_ij, sum_j e_ij / m, and a prescribed total load."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, n, m = self.problem, len(self.problem), self.m
@@ -169,10 +169,10 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
         )
 
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """A bristle is in contact where h phi exceeds its multiplier.
+        """The loads: a bristle carries a force where h phi exceeds its multiplier.
 
-        The sign of their difference is decided, where phi itself is 0 to the solver's accuracy
-        only. Raises TooDenseError if the answer lies on a face where the convex range was cut.
+        The sign of this difference is clear also where phi is 0 only to the solver's accuracy.
+        Raises TooDenseError if the answer lies on a face where the box was cut.
         """
         problem, n, m = self.problem, len(self.problem), self.m
         P, e = raw.x[:n], raw.x[n:].reshape(n, m)
@@ -188,7 +188,7 @@ class BristleProgram(Reduction[QuadraticProgram, RawAnswer, ProgramAnswer]):
 
 
 def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
-    """The box of loads, where the convex range cuts it, and A + diag(h): positive definite."""
+    """The box of loads, where it is cut to the convex range, and the definite A + diag(h)."""
     approach_bound = problem.approach_bound
     if problem.load is not None:
         trial = hertz.load(problem.smooth_indentation(), problem.coefficients)
@@ -213,7 +213,7 @@ def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.
 
 
 def _positive_definite(problem: NormalProblem, box: Array) -> Array | None:
-    """A + diag(h) on the box; None unless Cholesky finds it so with MARGIN of its diagonal off."""
+    """A + diag(h) on the box; None unless Cholesky's method finds it definite with MARGIN."""
     root = np.sqrt(1.0 / problem.stiffness(box))
     scaled = problem.influence.matrix * root * root[:, None]
     np.fill_diagonal(scaled, 1.0 - MARGIN)

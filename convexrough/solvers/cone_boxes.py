@@ -1,10 +1,9 @@
-"""What every solver of the cone program does around it: choose the boxes, judge what comes back.
+"""What all solvers of the cone program share: the choice of boxes, and the check of the answer.
 
 The lifted program (docs/theory/exact-cones.md) is exact in boxes 0 <= P_i <= B_i whose convexity
-numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most 21/25 (four cones) or 1 (five). Boxes that
-hold the a priori bounds are used where they are small enough. Elsewhere they are cut, and then
-every cut box must turn out to be wide enough: else the five cones are tried, and then the scene is
-refused ("Which box").
+numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most 21/25 (four cones) or 1 (five). A box that
+contains the a priori bound is used if it is small enough, and cut otherwise. If the solution
+reaches a cut face, five cones are tried; if it does so again, the scene is refused ("Which box").
 """
 
 from __future__ import annotations
@@ -25,24 +24,24 @@ from convexrough.solvers.programs import ProgramAnswer
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: An asperity whose a priori bound is this small a part of the largest is left out of the program:
-#: it gets no load, or what the Newton step finds. A heuristic, well below what a solver tells from
-#: nothing; were it ever too large, the contact law would say so: it is checked for all asperities.
+#: Asperities whose a priori bound is below this part of the largest are left out of the program;
+#: only a Newton step can give them a load. A heuristic, well below the accuracy of a solver. If it
+#: were too large, the check of the contact law, which includes all asperities, would fail.
 NEGLIGIBLE = 1e-12
 
-#: Contact radii of a box over those of the a priori bound, where the convex range allows. On the
-#: bound itself an asperity with no neighbours would sit just at t = 1, where the room it has left
-#: and what presses it on are both nothing: interior points lose half their digits there. That it
-#: is a tenth is a heuristic: any more room would do, at the price of a larger S.
+#: Ratio of the contact radius of a box to that of the a priori bound, where the convex range
+#: allows. On the bound itself an asperity without neighbours would be at t = 1, with both the slack
+#: and the multiplier 0: interior-point methods lose half their digits there. The value is a
+#: heuristic: any wider box would do, with a larger S.
 WIDENED = 1.1
 
-#: After a Newton step: the largest max |g| over |D0| + max |d_i| that is accepted. Where the first
-#: step leaves more, a second is taken: few, weakly coupled asperities need it now and then.
+#: With a Newton step: the largest residual max |g| over |D0| + max |d_i| that is accepted. If the
+#: first step leaves more, a second is taken, as few, weakly coupled asperities sometimes need.
 ACCURATE = 1e-13
 
-#: Without one: the largest max |P - P(D - A P)| over max P that is accepted, in square roots of
-#: the tolerance. An energy within the tolerance fixes the loads to its root; the ten is a
-#: heuristic, for the constant that this leaves open.
+#: Without a Newton step: the largest max |P - P(D - A P)| over max P that is accepted, over the
+#: square root of the tolerance. An energy within the tolerance fixes the loads to its square root
+#: times a constant; ten is a heuristic for this constant.
 ROOTS = 10.0
 
 
@@ -50,8 +49,8 @@ class TooDenseError(InputError):
     """Asperities whose contacts leave the convex range, a_i < (pi/2) s_i.
 
     asperities : (m,) their indices in the scene
-    ratios     : (m,) over (pi/2) s_i, the contact radius that each would reach with its
-        neighbours kept in the convex range
+    ratios     : (m,) the contact radius that each asperity would reach with its neighbours kept in
+        the convex range, over (pi/2) s_i; s_i is half the distance to the nearest neighbour
     """
 
     def __init__(self, solver: str, asperities: Indices, ratios: Array, limit: float) -> None:
@@ -70,13 +69,13 @@ class TooDenseError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class ConeBoxes:
-    """Which asperities are in a lifted program, in which boxes, tied by which cones.
+    """The asperities of a lifted program, their boxes, and the form of their cones.
 
     members : (m,) candidates in the program
     loads   : (m,) B_i, the loads at t = 1
     S       : (m,) convexity numbers of the boxes
-    cut     : (m,) whether B_i is below the a priori bound
-    five    : five-cone form;  limit : the largest S that the form can do
+    cut     : (m,) True where B_i is below the a priori bound
+    five    : True for the five-cone form;  limit : largest S for which the form is exact
     """
 
     members: Indices
@@ -88,7 +87,7 @@ class ConeBoxes:
 
     @classmethod
     def choose(cls, problem: NormalProblem, *, five: bool = False) -> ConeBoxes:
-        """A little wider than the a priori bounds, and S_i not above what the form can do."""
+        """Boxes a little wider than the a priori bounds, cut where S_i would exceed the limit."""
         bounds = problem.bounds(problem.approach_bound)
         members = np.flatnonzero(bounds > NEGLIGIBLE * bounds.max())
         bounds, k = bounds[members], problem.coefficients[members]
@@ -100,18 +99,18 @@ class ConeBoxes:
         return cls(members, loads, S, faces < bounds, five, limit)
 
     def energies(self, problem: NormalProblem) -> Array:
-        """(m,) k B^(5/3): times (3/5) t^5 - (S/3) t^6 the one-asperity energy h."""
+        """k B^(5/3) (m,); the energy h of one asperity is this times (3/5) t^5 - (S/3) t^6."""
         energies: Array = problem.coefficients[self.members] * np.cbrt(self.loads) ** 5
         return energies
 
     def to_candidates(self, problem: NormalProblem, loads: Array) -> Array:
-        """(n,) loads (m,) of the members as loads of all candidates, each within its box."""
+        """The loads (n,) of all candidates from those of the members (m,), clipped to the boxes."""
         everywhere = np.zeros(len(problem))
         everywhere[self.members] = np.clip(loads, 0.0, self.loads)
         return everywhere
 
     def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
-        """The error that names the members which are `pressed` on, (m,), 0 where they are not."""
+        """The error for members that reach a cut face; `pressed` (m,) has their ratios, else 0."""
         which = np.flatnonzero(pressed)
         indices = problem.candidates[self.members[which]]
         return TooDenseError(solver, indices, pressed[which], self.limit)
@@ -119,15 +118,15 @@ class ConeBoxes:
 
 @dataclass(frozen=True)
 class ConeSolver(ABC):
-    """Settings of a solver of the cone program, and what all of them do with its answer.
+    """Base class of the solvers of the cone program; it checks their answers.
 
-    newton_step : end with a step of Newton's method, which takes loads from some 1e-8 of the
-        largest to rounding; a second one where the first leaves more than is accepted
+    newton_step : end with a step of Newton's method, which reduces errors of some 1e-8 of the
+        largest load to rounding; a second step follows if the first is not accurate enough
 
-    Accepted is an answer with  max |g_i| <= 1e-13 (|D0| + max |d_i|)  where touching, and overlaps
-    no larger than that where open; without the Newton step, one with
-    max |P - P(D - A P)| <= 10 sqrt(tolerance) max P.  Else SolverError is raised; TooDenseError
-    where the boxes of the convex range do not hold the solution.
+    With Newton steps, touching asperities must have gaps  |g_i| <= 1e-13 (|D0| + max |d_i|)  and
+    open ones no larger overlap. Without, loads must satisfy
+    max |P - P(D - A P)| <= 10 sqrt(tolerance) max P.  Otherwise SolverError is raised, and
+    TooDenseError where the boxes of the convex range do not contain the solution.
     """
 
     tolerance: float = 1e-9
@@ -139,11 +138,11 @@ class ConeSolver(ABC):
     @property
     @abstractmethod
     def formulation(self) -> str:
-        """The name, but for the Newton step."""
+        """The name without the Newton step."""
 
     @abstractmethod
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
-        """What the solver makes of the program in these boxes, not yet judged."""
+        """The loads and the approach that the solver returns for these boxes, not yet checked."""
 
     @property
     def name(self) -> str:
@@ -154,9 +153,9 @@ class ConeSolver(ABC):
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """Loads of the candidates: with four cones, with five where a cut box stops an asperity.
+        """The loads of the candidates, with four cones, or five if the solution reaches a cut face.
 
-        `start` is not used: cone solvers begin in the middle.
+        `start` is not used: the solvers choose their own starting point.
         """
         try:
             return solve_in(self, problem, ConeBoxes.choose(problem))
@@ -165,7 +164,7 @@ class ConeSolver(ABC):
 
 
 def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> Solution:
-    """The answer of one form, if it is the solution of the contact law."""
+    """The checked solution with one form of the cones."""
     most = float(boxes.loads.sum())
     if problem.load is not None and most <= problem.load:  # no state in the boxes carries as much
         pressed = np.cbrt(problem.load / most) * np.where(boxes.cut, boxes.S, 0.0)
@@ -176,7 +175,7 @@ def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> So
 def judged(
     solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes, answer: ProgramAnswer
 ) -> Solution:
-    """The answer as the solution of the contact law, if it is that; else the errors above.
+    """The answer as a solution, checked against the contact law. Raises as `ConeSolver` says.
 
     The sign of D - A P tells open asperities from lightly loaded ones ("What comes back").
     """
@@ -213,10 +212,10 @@ def judged(
 def _pressed_on(
     problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
 ) -> Array:
-    """(m,) contact radius over (pi/2) s_i that an asperity stopped by its box wants; else 0.
+    """The `ratios` (m,) of TooDenseError where a cut face stops an asperity; else 0.
 
-    What presses an asperity on and the room it has left, as parts of what it has in its box, are
-    complementary: one of the two is 0 at the solution, and the smaller one near it.
+    The excess of its indentation over that of its box, and the distance of its load from the face,
+    both relative, are complementary: at the solution one of the two is 0.
     """
     k = problem.coefficients[boxes.members]
     wanted = indentation[boxes.members] / hertz.indentation(boxes.loads, k)
@@ -228,10 +227,10 @@ def _pressed_on(
 def _after_newton_step(
     solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
 ) -> Solution:
-    """One step of Newton's method, or two, from the loads or from what each would bear alone.
+    """One or two steps of Newton's method, from the loads or from `alone`, the loads P(D - A P).
 
-    An error e of the loads is h_i e_i in an asperity's own indentation and A e in D - A P: begin
-    with the better of the two, so that the step starts close also where a load is almost 0.
+    An error e of the loads changes an asperity's own indentation by h_i e_i, and D - A P by A e.
+    Each asperity starts from the more accurate of the two, also where a load is almost 0.
     """
     light = problem.stiffness(loads) > problem.influence.apply(np.ones(len(problem)))
     loads = np.where(light, alone, loads)

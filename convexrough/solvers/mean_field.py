@@ -1,8 +1,8 @@
-"""A start for many asperities: each rides on the mean displacement of its ring about the axis.
+"""A start for many asperities, from the mean displacement of each ring about the axis.
 
-The asperities are sorted into rings, and the load of a ring is taken to be spread evenly over it
-(Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, for any heights and radii). That leaves one
-unknown per ring, the displacement w there, and Newton's method on  w = K P(w).
+The asperities are sorted into rings, and the load of a ring is assumed to be spread evenly over it
+(Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, for any heights and radii). The only unknown of
+a ring is its displacement w, and Newton's method solves  w = K P(w).
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from convexrough.arrays import Array, Indices
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
-#: At most so many rings, and of so many asperities at least: heuristics, good enough for a start.
+#: Largest number of rings, and mean number of asperities in a ring at least. Heuristics.
 RINGS, LEAST = 128, 150
 
-#: Of more asperities than about this, only every so many-eth is looked at.
+#: Approximate number of asperities that are evaluated; of more, an evenly spaced sample is.
 SAMPLE = 50_000
 
-#: What an asperity misses of the even load around it, which it does not cause itself: the
-#: potential of a disc of its share of the area, times this. By Ewald's sums 1.1002 for square and
-#: 1.1061 for hexagonal arrays; for any other layout a heuristic, which a start can bear.
+#: An evenly spread load includes the asperity's own share, which must be subtracted: this factor
+#: times the potential of a disc with the asperity's share of the area. Ewald's sums give 1.1002 for
+#: square and 1.1061 for hexagonal arrays; for other layouts it is a heuristic.
 OWN_SHARE = 1.10
 
 
 def mean_field_indentation(problem: NormalProblem) -> Array:
-    """(n,) indentations of the candidates, negative where open (own units).
+    """Indentations (n,) of the candidates in the problem's units, negative where open.
 
-    Where the rings' displacements are not found, those of a smooth sphere: any start will do.
+    If the displacements of the rings are not found, the indentations are those of a smooth sphere.
     """
     try:
         start = _mean_field(problem)
@@ -52,7 +52,7 @@ def _mean_field(problem: NormalProblem) -> Array:
     share = np.divide(numbers, sampled, out=np.zeros(count), where=sampled > 0)
     areas = np.pi * np.diff(limits)
 
-    # K: displacement of each ring by a unit load spread over each; own part of it taken out.
+    # K: displacement of each ring by a unit load on each ring, without an asperity's own share.
     K = np.diff(_disc(middle[:, None], edges[1:]), axis=1, prepend=0.0)
     K[:, 0] = _disc(middle, edges[1])
     K /= areas
@@ -89,9 +89,9 @@ def _mean_field(problem: NormalProblem) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Rings:
-    """Each asperity between the middles of two rings, and how far from the first to the next.
+    """For each asperity the ring before it, and its relative distance to the next ring.
 
-    It is in both, so that rings do not depend on whether it is on this side of an edge or that.
+    An asperity counts for both rings, so that sums do not jump where it crosses an edge.
     """
 
     first: Indices
@@ -100,19 +100,19 @@ class _Rings:
 
     @classmethod
     def of(cls, places: Array, count: int) -> _Rings:
-        """places : (n,) squared distances, 1 for each ring"""
+        """Asperities at squared distances `places` (n,), in units of the width of a ring."""
         first = np.clip((places - 0.5).astype(np.intp), 0, count - 2)
         return cls(first, places - 0.5 - first, count)
 
     def sums(self, values: Array) -> Array:
-        """(count,) over each ring. Even loads stay even, as none is taken beyond the last ones."""
+        """Sums (count,) over the rings. Outside the middles of all rings the nearest gets all."""
         outer = np.clip(self.share, 0.0, 1.0) * values
         total = np.bincount(self.first, values - outer, self.count).astype(np.float64)
         total[1:] += np.bincount(self.first, outer, self.count)[:-1]
         return total
 
     def between(self, values: Array) -> Array:
-        """(n,) at each asperity, linear between the rings' middles and beyond the last ones."""
+        """Values (n,) at the asperities, interpolated linearly between the rings' middles."""
         return np.asarray(values[self.first] + self.share * np.diff(values)[self.first])
 
 
@@ -128,7 +128,7 @@ def _smooth_contact(problem: NormalProblem) -> tuple[float, float]:
 
 
 def _disc(distance: Array, radius: Array) -> Array:
-    """Integral of 1 / r over a disc, seen at a distance from its centre in its plane."""
+    """The integral of 1 / r over a disc, r from a point at this distance from its centre."""
     from scipy.special import ellipe, ellipk  # 0.1 s to import: only where there are many
 
     r, a = np.broadcast_arrays(distance, radius)

@@ -5,11 +5,11 @@ P_i = (max(delta_i, 0) / k_i)^(3/2) the whole contact law is the square system
 
     F(delta) = delta + A P(delta) - D = 0,
 
-which `convex.newton` solves: the active set is the sign of the answer (docs/theory/newton.md). In
-the convex range a step descends the energy Phi(P(delta)).
+which `convex.newton` solves: an asperity touches where its delta is positive
+(docs/theory/newton.md). In the convex range every step lowers the energy Phi(P(delta)).
 
-Of many asperities only those near the contact take part in the iteration. What the others feel is
-looked at once it has ended; where one of them would touch, it goes on with more.
+For many asperities the iteration includes only those near the contact. When it has ended, the gaps
+of the others are computed; if one of them is negative, the iteration goes on with more asperities.
 """
 
 from __future__ import annotations
@@ -28,28 +28,27 @@ from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
 
-#: Of more candidates than this, only those near the contact are iterated on. Heuristic: any number
-#: leads to the same answer.
+#: Largest number of candidates that are all included in the iteration. It affects speed only.
 ALL_ITERATED = 1000
 
-#: The residual, over |D0| + max |d_i|, that an answer must reach unless it is asked for less.
+#: The residual, over |D0| + max |d_i|, that an answer must reach unless `tolerance` is larger.
 ACCURATE = 1e-12
 
-#: Near the contact: with a gap of at most this part of the largest prescribed approach. Heuristic,
-#: as the asperities left out are checked in the end.
+#: Asperities are near the contact if their gap is at most this part of the largest prescribed
+#: approach. It affects speed only: asperities that are left out are checked at the end.
 MARGIN = 0.03
 
 
 @dataclass(frozen=True)
 class Newton:
-    """Settings of Newton's method on the normal map.
+    """A solver with Newton's method on the normal map.
 
-    tolerance : it stops where  max_i |delta_i + (A P)_i - D_i| <= tolerance (|D0| + max_i |d_i|);
-        0 asks for all that float64 can do
+    tolerance : stop at  max_i |delta_i + (A P)_i - D_i| <= tolerance (|D0| + max_i |d_i|);  0 for
+        the accuracy of float64
 
-    In any case it stops where that residual is small beside what rounding can make of A P, which
-    the certificate has to allow for anyway, or where it is below 1e-12 and a further step does not
-    halve it. Raises SolverError if `max_iterations` steps do not get there.
+    Once that residual is below 1e-12 (|D0| + max_i |d_i|), the method also stops if it is small
+    compared with the rounding of A P, which the certificate includes, or if a step does not halve
+    it. Raises SolverError if `max_iterations` steps are not enough.
     """
 
     tolerance: float = 0.0
@@ -61,9 +60,9 @@ class Newton:
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """Loads of the candidates, from any start that is not negative (own units)."""
+        """The loads of the candidates in the problem's units, from any start without negatives."""
         loads, approach, iterations = self._found(problem, start)
-        if self._refines(problem):  # the iteration ended as soon as what is left was linear
+        if self._refines(problem):  # the iteration ended early for this
             trial = refined_loads(problem, loads).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
@@ -71,7 +70,7 @@ class Newton:
         return replace(answer, refine=not self.tolerance > 0)
 
     def _found(self, problem: NormalProblem, start: Array | None) -> tuple[Array, float, int]:
-        """(n,) loads, the approach and the number of steps."""
+        """The loads (n,), the approach and the number of steps."""
         indentation = _start(problem, start)
         highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
@@ -86,7 +85,7 @@ class Newton:
             iterations += steps
             if len(near) == len(problem):
                 return state.forces, state.approach, iterations
-            # What do the others feel?
+            # The gaps of the asperities that were left out.
             loads, gap = _everywhere(problem, near, state)
             touched = gap < 0
             touched[near] = False
@@ -94,7 +93,7 @@ class Newton:
                 return loads, state.approach, iterations
             indentation = -gap
             indentation[near] = state.unknown
-            touched[near] = True  # none leaves, so that this ends
+            touched[near] = True  # none leaves, so that the loop ends
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
     def _refines(self, problem: NormalProblem) -> bool:
@@ -106,7 +105,7 @@ class Newton:
         near: Indices,
         indentation: Array,
     ) -> tuple[PressingState, int]:
-        """The solution of some of the candidates: all others carry nothing."""
+        """The solution for some of the candidates; all others carry no load."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law = Pressing(part, float(np.abs(problem.offsets).max()))
 
@@ -123,9 +122,9 @@ class Newton:
 
 
 def newton_step(problem: NormalProblem, loads: Array) -> Solution:
-    """One step from loads that another solver found (own units, not negative).
+    """One step from the loads (n,) of another solver, in the problem's units, not negative.
 
-    From an error e it leaves about e^2, and it tells open asperities from lightly loaded ones.
+    An error e of the loads becomes about e^2, and loads of open asperities become exactly 0.
     """
     law = Pressing(problem, float(np.abs(problem.offsets).max()))
     before = law.evaluate(_start(problem, loads))
@@ -135,13 +134,13 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
-    """An indentation to start from: of the given loads, or the best guess there is."""
+    """Indentations to start from: those of the given loads, or `start_indentation`."""
     if loads is None:
         return start_indentation(problem)
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)
 
 
 def _everywhere(problem: NormalProblem, near: Indices, state: PressingState) -> tuple[Array, Array]:
-    """Loads and gaps of all candidates where those that are not near carry nothing."""
+    """Loads and gaps of all candidates; those that are not near carry no load."""
     loads = among_zeros(state.forces, near, len(problem))
     return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)

@@ -13,8 +13,8 @@ from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: Newton's method may end where a step leaves this part of the indentations: corrections by
-#: refinement leave its square. A heuristic.
+#: Newton's method may end at a defect of this part of the indentations: refinement then leaves
+#: about its square. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
 
@@ -34,7 +34,7 @@ class PressingState(NamedTuple):
 class Pressing:
     """The law of contact, for `convex.newton`.
 
-    farthest : max |d_i| over all candidates, of which these may be some
+    farthest : max |d_i| over all candidates, also those that are not in the problem
     """
 
     problem: NormalProblem
@@ -68,7 +68,7 @@ class Pressing:
         energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
         if self.problem.load is not None:  # Phi has the gap less D0
             energy += approach * float(loads.sum())
-        # What delta is at an open asperity does not matter: its gap, or 0 where that is negative.
+        # At an open asperity any delta <= 0 gives the same loads: take minus the gap, or 0.
         touching = loads > 0
         unknown = np.where(touching, indentation, np.minimum(-gap, 0.0))
         defect = np.where(touching, gap, np.minimum(gap, 0.0))
@@ -107,27 +107,27 @@ class Pressing:
         return self.problem.influence.rounding(state.forces).negligible(state.displacement)
 
     def advice(self, state: PressingState) -> str:
-        """By how crowded the contact is where it stopped."""
+        """Advice that depends on the convexity number where the method stopped."""
         number = self.problem.convexity_number(state.forces)
         if number < 1:
             return (
-                f"the energy is convex there (convexity number {number:.3g}): allow more steps, or "
+                f"the energy is convex (convexity number {number:.3g}): allow more steps, or "
                 "start from loads of a neighbouring problem"
             )
         return (
-            f"contacts are so crowded there that the energy need not be convex (convexity number "
+            f"contacts are so crowded that the energy may not be convex (convexity number "
             f"{number:.3g}, convex below 1): use a smaller approach or load, sharper tips, or "
             "asperities further apart"
         )
 
 
 def negligible(indentation: Array) -> float:
-    """2-norm of a defect that is small beside the rounding of the local term alone."""
+    """2-norm of a defect that is small enough for the iteration to end and refinement to follow."""
     return NEGLIGIBLE * float(np.linalg.norm(np.maximum(indentation, 0.0)))
 
 
 def on_constraint(problem: NormalProblem, indentation: Array) -> Array:
-    """Cut to the a priori box (approach control), or shifted to the prescribed total load."""
+    """Indentations limited to the a priori box, or shifted to satisfy the prescribed load."""
     if problem.load is not None:
         return shifted_to_load(indentation, problem.coefficients, problem.load)
     return np.minimum(indentation, problem.approach_bound + problem.offsets)

@@ -1,4 +1,4 @@
-"""Programs in standard form: how a problem becomes one, is solved, and is converted back.
+"""Programs in standard form, their solution by libraries, and conversions to and from problems.
 
 A `Reduction` converts the contact problem to a program, as in cvxpy (Agrawal, Verschueren, Diamond
 and Boyd, J. Control Decis. 5 (2018) 42). A few lines per library run Clarabel, OSQP and the solvers
@@ -27,10 +27,10 @@ Found = TypeVar("Found")
 
 
 class Reduction(ABC, Generic[Data, Raw, Found]):
-    """One problem as a program; its fields are what the way back needs.
+    """A problem as a program; its fields are the data that the conversion back needs.
 
-    A class method `assemble(problem, ...)` makes it, or raises: an error that names the asperities
-    for which the program is not exact, or InputError where it does not fit in memory.
+    A class method `assemble(problem, ...)` makes it. It raises an error that names the asperities
+    for which the program is not exact, or InputError where the program does not fit in memory.
     """
 
     @abstractmethod
@@ -39,17 +39,17 @@ class Reduction(ABC, Generic[Data, Raw, Found]):
 
     @abstractmethod
     def invert(self, raw: Raw) -> Found:
-        """What the problem asks for, in its order and units; residuals come from the problem."""
+        """The answer to the problem, in its order and units, from that to the program."""
 
     def through(self, run: Callable[[Data], Raw]) -> Found:
-        """What the problem asks for, by way of a solver."""
+        """The answer to the problem; `run` solves the program."""
         return self.invert(run(self.apply()))
 
 
 class ConeProgram(NamedTuple):
-    """minimise (1/2) x'P x + q'x,  A x + s = b.
+    """minimise (1/2) x'P x + q'x  subject to  A x + s = b.
 
-    The first entries of s are 0, and all that follow lie three by three in second-order cones,
+    The first entries of s are 0. All others lie in second-order cones of three entries each,
     s_1 >= || (s_2, s_3) ||.
     """
 
@@ -57,7 +57,7 @@ class ConeProgram(NamedTuple):
     linear: Array  # q
     constraints: csc_matrix  # A
     constant: Array  # b
-    equalities: int  # how many entries of s are 0
+    equalities: int  # number of entries of s that are 0
 
     @property
     def cones(self) -> int:
@@ -66,12 +66,12 @@ class ConeProgram(NamedTuple):
     def dual(self) -> ConeProgram:
         """The dual in the same form: minimise (1/2) v'P v + b'z,  P v + A'z = -q,  z in the cones.
 
-        v has the variables that are in P, and comes before z. Entries of z at equalities are free;
-        second-order cones are their own duals. At any feasible point the objective times -1 is a
-        lower bound on that of the program, and the least one is equal to it; the multipliers of the
-        equations are then those x, times -1.
+        The variables are v, one for each variable that is in P, then z. Entries of z at equalities
+        are free; second-order cones are their own duals. At any feasible point minus the objective
+        is a lower bound on the minimum of the program, and the largest such bound equals it. The
+        multipliers of the equations are then -x.
         """
-        from scipy import sparse  # 0.1 s to import: only when it is asked for
+        from scipy import sparse  # takes 0.1 s to import
 
         upper = self.quadratic
         used = np.flatnonzero(upper.diagonal())
@@ -111,19 +111,19 @@ class QuadraticProgram(NamedTuple):
 
 
 class RawAnswer(NamedTuple):
-    """What a solver says of a program in standard form."""
+    """The answer of a solver to a program in standard form."""
 
     x: Array
     multipliers: Array  # of the rows of A
     iterations: int
-    status: str  # on how it ended
+    status: str  # the solver's own status
 
 
 class ProgramAnswer(NamedTuple):
-    """What a program says of a normal problem, not yet judged."""
+    """The answer of a program to a normal problem, not yet checked."""
 
     loads: Array  # of its members, in the problem's order and units
-    approach: float  # the multiplier of the total, under load control
+    approach: float  # from the multiplier of the total load, if that is prescribed
     iterations: int
 
 
@@ -142,7 +142,7 @@ def load_library(package: str, solver: str) -> Any:
 def run_clarabel(
     program: ConeProgram, solver: str, tolerance: float, **settings: object
 ) -> RawAnswer:
-    """Clarabel, an interior-point method. `settings` are others of its own, by its names."""
+    """Solve a cone program by Clarabel, an interior-point method; `settings` are Clarabel's."""
     clarabel = load_library("clarabel", solver)
     chosen = clarabel.DefaultSettings()
     chosen.verbose = False
@@ -159,7 +159,7 @@ def run_clarabel(
 
 
 def _goes_on(info: Any) -> bool:
-    """Log a step of Clarabel, and do not stop it."""
+    """Log a step of Clarabel; return False, so that it continues."""
     residual = max(info.res_primal, info.res_dual, info.gap_rel)
     log_step("clarabel", info.iterations, info.cost_primal, residual)
     return False
@@ -172,7 +172,7 @@ def run_osqp(
     max_iterations: int,
     verbose: bool = False,
 ) -> RawAnswer:
-    """OSQP, a first-order method that then solves the equations of the active set (polishing)."""
+    """Solve a quadratic program by OSQP, a first-order method, with polishing of the active set."""
     osqp = load_library("osqp", solver)
     if int(osqp.__version__.split(".")[0]) < 1:
         what = f"OSQP {osqp.__version__} is too old"
@@ -191,7 +191,7 @@ def run_osqp(
     except osqp.OSQPException as error:
         reasons = {int(status): status.name for status in osqp.SolverStatus}
         reason = reasons.get(error.args[0] if error.args else 0, f"error {error}")
-        if reason == "OSQP_SIGINT":  # OSQP takes the signal for itself
+        if reason == "OSQP_SIGINT":  # OSQP catches the signal itself
             raise KeyboardInterrupt from error
         raise SolverError(
             f"OSQP did not solve the program: {reason}",

@@ -1,4 +1,4 @@
-"""What every solver takes and returns."""
+"""The interface of solvers, and the solution that they return."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from convexrough.record import Record
 class Solution(Record):
     """Loads of the candidates and the approach, in the problem's units.
 
-    residual : how far the contact law is from holding, as in `problem.residual`: with a trial, a
-        bound at the loads of all its digits, rounding counted; else recomputed in float64
-    refine   : whether the loads may be corrected to more digits; False where they are to be judged
-        as the solver left them
-    trial    : these loads to more digits, where the solver has them
+    residual : residual of the contact law, as in `problem.residual`; with a trial, an upper bound
+        on that of the trial's loads
+    refine   : True if the loads may be corrected to more digits; False if they are to be certified
+        as they are
+    trial    : these loads to more digits, if the solver has computed them; else None
     """
 
     loads: Array
@@ -41,14 +41,14 @@ class Solution(Record):
         *,
         refine: bool = True,
     ) -> Solution:
-        """With its residual from the problem, infinite where that is undefined."""
+        """A solution with the residual that the problem computes; infinite if it is undefined."""
         residual = problem.residual(loads, approach)
         residual = np.inf if np.isnan(residual) else residual
         return cls(loads, approach, iterations, residual, refine)
 
 
 class Solver(Protocol):
-    """A frozen settings object. Raises SolverError rather than return a poor answer."""
+    """The interface of solvers: frozen settings. Poor answers are not returned: SolverError."""
 
     @property
     def name(self) -> str: ...

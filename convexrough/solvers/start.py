@@ -1,4 +1,4 @@
-"""Where Newton's method starts from when it is given nothing."""
+"""The default start of Newton's method."""
 
 from __future__ import annotations
 
@@ -11,27 +11,26 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.sphere import hertz
 
-#: Up to so many candidates, one product with A is worth a start. Heuristic: any start leads to the
-#: same answer.
+#: Largest number of candidates whose start uses a product with A. It affects speed only.
 FEW = 1000
 
-#: A rough contact reaches further than the smooth sphere's, in the square of its radius, by about
-#: this: the paper's scene. A heuristic, which a start can bear.
+#: Ratio of the squared contact radii of a rough and a smooth sphere, from the source paper's scene.
+#: A heuristic; it affects speed only.
 WIDER = 1.1
 
 
 def start_indentation(problem: NormalProblem) -> Array:
-    """(n,) indentations of the candidates, negative where open (own units)."""
+    """Indentations (n,) of the candidates in the problem's units, negative where open."""
     if len(problem) > FEW:
         return mean_field_indentation(problem)
     return _on_hertz_pressure(problem)
 
 
 def _on_hertz_pressure(problem: NormalProblem) -> Array:
-    """Each rides on the displacement A P of loads in proportion to the smooth sphere's pressure.
+    """Indentations D - A P for loads P = x^3 s proportional to the smooth sphere's pressure.
 
-    P = x^3 s, s = (1 - r^2 / a^2)^(1/2), of the given total; or, at a given approach, where the
-    energy is least along s:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
+    s = (1 - r^2 / a^2)^(1/2). x follows from a prescribed load, or minimises the energy at a
+    prescribed approach:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
     """
     squares = problem.scene.asperities.distances[problem.candidates] ** 2
     inside = np.maximum(1.0 - squares / (WIDER * _smooth_radius(problem) ** 2), 0.0)
@@ -39,7 +38,7 @@ def _on_hertz_pressure(problem: NormalProblem) -> Array:
     displacement = problem.influence.apply(s)
     prescribed = problem.approach_bound + problem.offsets
     total, work = float(s.sum()), float(s @ prescribed)
-    if not (total > 0 and work > 0):  # nothing where the smooth sphere would touch
+    if not (total > 0 and work > 0):  # no asperity where the smooth sphere would touch
         return problem.smooth_indentation()
     if problem.load is not None:
         return prescribed - problem.load / total * displacement
@@ -51,7 +50,7 @@ def _on_hertz_pressure(problem: NormalProblem) -> Array:
 
 
 def _smooth_radius(problem: NormalProblem) -> float:
-    """[length] a of a smooth sphere: at the approach, or under the load; inf where it is flat."""
+    """Contact radius a [length] of a smooth sphere at the approach or load; inf if it is flat."""
     radius, units = problem.scene.mean_radius, problem.units
     if radius == math.inf:
         return radius

@@ -1,4 +1,4 @@
-"""From a measured surface to asperities: read, detrend, find summits, compare with theory."""
+"""Asperities from measured surfaces: reading, detrending, summits, and comparison with theory."""
 
 from convexrough.surface.boundary_elements import Whole, press_whole
 from convexrough.surface.moments import Moments

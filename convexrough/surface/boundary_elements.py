@@ -1,12 +1,12 @@
-"""A map pressed whole, by boundary elements: what its asperities stand for.
+"""The contact of a whole map by boundary elements, for comparison with its asperities.
 
-Square or oblong pixels of uniform pressure on an elastic half-space, with the contact law over
-pixels instead of asperities:
+Each pixel is a rectangle of uniform pressure p on an elastic half-space. The contact law is
 
-    p >= 0,    g = K p - h >= 0,    p g = 0,
+    p >= 0,    g = K p - h >= 0,    p g = 0
 
-where h is how far the undeformed bodies would overlap at this approach and K is the half-space.
-Pressure only ever pushes the surfaces apart, so a pixel with h <= 0 stays open.
+for each pixel, with the gap g, the overlap h of the undeformed bodies at the approach, and the
+compliance operator K of the half-space. Pressures only increase gaps, so pixels with h <= 0 are
+open.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from convexrough.errors import InputError, SolverError
 from convexrough.record import Along, Table
 from convexrough.surface.surface import Surface
 
-#: Steps of conjugate gradients, and the part of the overlap to which gaps are right.
+#: Largest number of steps of conjugate gradients, and accepted error of gaps over the overlap.
 STEPS, ACCURACY = 2000, 1e-4
 
 
 class HalfSpace:
-    """Pressures on pixels to displacements at their centres, both bodies together.
+    """The operator from pressures on pixels to displacements at their centres, of both bodies.
 
-    A pixel of uniform unit pressure displaces the surface by (1 / (pi E*)) times the integral of
-    1/r over it, which Love (1929) has in closed form. The product with all pixels is a convolution:
-    one Fourier transform on a grid twice as wide, so that nothing wraps around.
+    A pixel of unit pressure displaces the surface by (1 / (pi E*)) times the integral of 1/r over
+    it, in the closed form of Love (1929). The product is a convolution, computed by Fourier
+    transforms on a grid twice as wide, which avoids periodic images.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class HalfSpace:
         self.symbol = fft.rfft2(influence[np.ix_(*steps)], workers=1).real.copy()
 
     def displacement(self, pressure: Array) -> Array:
-        """K p; rows known to be zero, or not wanted, are not transformed."""
+        """The displacements K p. Rows that are zero, or not needed, are not transformed."""
         (rows, columns), (down, across) = self.shape, self.padded
         waves = fft.fft(fft.rfft(pressure, across, axis=1, workers=1), down, axis=0, workers=1)
         waves *= self.symbol
@@ -62,11 +62,12 @@ class HalfSpace:
 
 
 def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float = ACCURACY) -> Array:
-    """The pressure that solves the contact law, by conjugate gradients on the touching pixels.
+    """The pressures that solve the contact law, by conjugate gradients on the touching pixels.
 
-    Polonsky and Keer (Wear 231, 1999) at a given approach: step, cut negative pressures to zero,
-    and let pixels back in where the bodies overlap; the directions start afresh when one comes in.
-    Ends when |g| <= accuracy * max h where p > 0 and g >= -accuracy * max h where p = 0 < h.
+    The method of Polonsky and Keer (Wear 231, 1999) at a given approach: each step sets negative
+    pressures to 0 and adds pixels on which the bodies overlap; after an addition the directions
+    restart. It ends if |g| <= accuracy * max h where p > 0 and g >= -accuracy * max h where
+    p = 0 < h.
     """
     allowed = overlap > 0
     pressure = np.where(allowed, start, 0.0)
@@ -94,20 +95,21 @@ def touch(half_space: HalfSpace, overlap: Array, start: Array, accuracy: float =
     raise SolverError(
         f"pressures not found to {accuracy:g} of the overlap in {STEPS} steps",
         solver="boundary elements",
-        advice="press less deep, or on a smoother map",
+        advice="use a smaller approach, or a smoother map",
     )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Whole(Table):
-    """A map pressed by boundary elements, and its asperities at the same approach.
+    """The contact of a whole map by boundary elements, and of its asperities at the same approach.
 
-    contact   : of the asperities
-    pressures : (ny, nx) [force/length^2] of the pixels
-    loads     : (n,) [force] of the pixels that are nearest to each asperity
-    load [force], area [length^2] : totals;  pieces : number of connected sets of loaded pixels
-    resolution : relative change of the load for pixels of twice the width: about four times the
-        error due to the pixels of the map, where these resolve the tips
+    contact   : contact of the asperities
+    pressures : (ny, nx) [force/length^2] pressures on the pixels
+    loads     : (n,) [force] total load on the pixels nearest to each asperity
+    load, area : [force], [length^2] total load and contact area of the map
+    pieces    : number of connected sets of loaded pixels
+    resolution : relative change of the load for pixels twice as wide. If the pixels resolve the
+        tips, this is about four times the error due to the pixel size
     """
 
     _along: ClassVar[Along] = {("asperity",): ("loads",), ("row", "column"): ("pressures",)}
@@ -121,7 +123,7 @@ class Whole(Table):
     resolution: float
 
     def compared(self) -> list[tuple[str, float, float]]:
-        """What it is, of the asperities, and of the whole map."""
+        """Names of quantities, with the values of the asperities and of the whole map."""
         model = self.contact
         area = float((np.pi * model.contact_radii**2).sum())
         touching = int(np.count_nonzero(model.loads))
@@ -140,10 +142,11 @@ class Whole(Table):
 
 
 def press_whole(surface: Surface, contact: Contact) -> Whole:
-    """Press a map as a contact of its summits was, with every pixel an element.
+    """The contact of a whole map by boundary elements, one per pixel.
 
-    The base is that of the contact's scene about the middle of the map, at the contact's approach.
-    Raises InputError where no pixel touches, or contact reaches the edge of the map.
+    contact : contact of the map's summits; its approach and its base, centred on the map, are used
+
+    Raises InputError if no pixel touches, or if the contact reaches the edge of the map.
 
     >>> scan = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1)
     >>> on_summits = cr.press(cr.Scene(1e4, scan.summits(), cr.Material(1.0, 0.3)), load=10.0)
@@ -178,14 +181,14 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
 
 
 def _places(surface: Surface, every: int) -> tuple[Array, Array]:
-    """x of the columns and y of the rows."""
+    """The coordinates x of columns and y of rows, of every so many pixels."""
     (rows, columns), (dx, dy) = surface.heights.shape, surface.pixel
     x, y = (np.arange(columns) - (columns - 1) / 2) * dx, (np.arange(rows) - (rows - 1) / 2) * dy
     return x[::every], y[::every]
 
 
 def _pressed(surface: Surface, contact: Contact, every: int) -> tuple[Array, float]:
-    """Pressures of every so many pixels along each side, and their load."""
+    """The pressures for every so many pixels along each side, and their total load."""
     x, y = _places(surface, every)
     overlap = contact.approach + surface.heights[::every, ::every]
     for radius, axes in contact.scene.curved:

@@ -1,4 +1,4 @@
-"""The form to remove before finding summits: the plane or the sphere that fits a map best."""
+"""The best-fitting plane or sphere of a map, to be removed before summits are found."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from convexrough.errors import InputError
 Trend = Literal["plane", "sphere"]
 TRENDS: tuple[Trend, ...] = ("plane", "sphere")
 
-#: Gauss's steps to the best sphere, of which a few are enough, and the last one's relative size.
+#: Largest number of Gauss-Newton steps to the best sphere, and the relative step that ends them.
 STEPS, ENOUGH = 50, 1e-12
 
 
 @dataclass(frozen=True, repr=False)
 class Removed:
-    """A plane or sphere that was taken from a map.
+    """A plane or sphere that was subtracted from a map.
 
-    height    : [length] of it at the middle of the map
-    slopes    : along x and y, there
+    kind      : "plane" or "sphere"
+    height, slopes : [length] height, and slopes along x and y, at the middle of the map
     curvature : [1/length] of the sphere, positive for a hill; 0 for a plane
     """
 
@@ -33,7 +33,7 @@ class Removed:
 
     @property
     def radius(self) -> float:
-        """[length] of the sphere, negative for a bowl; infinite for a plane."""
+        """[length] radius of the sphere, negative for a bowl; infinite for a plane."""
         return 1.0 / self.curvature if self.curvature else float("inf")
 
     def __repr__(self) -> str:
@@ -44,18 +44,18 @@ class Removed:
 
 
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
-    """The trend with the least sum of squares of heights above it, and its height at each pixel.
+    """The best least-squares plane or sphere, and its height at each pixel.
 
-    A sphere is
+    A sphere, or a plane with k = 0, is
 
-        z = a + b x + c y + k (x^2 + y^2 + z^2) / 2,
+        z = a + b x + c y + k (x^2 + y^2 + z^2) / 2
 
-    its curvature k / sqrt(1 + b^2 + c^2 - 2 a k), upwards. So z = 2 q / (1 + sqrt(1 - 2 k q)) with
-    q = a + b x + c y + k (x^2 + y^2) / 2, and each of a, b, c, k moves z by its factor over
-    1 - k z. Gauss's method begins at the best paraboloid. Of a plane, k = 0, one step is exact.
-    Lengths are in halves of the map's size.
+    with the curvature k / sqrt(1 + b^2 + c^2 - 2 a k), positive for a bowl. So
+    z = 2 q / (1 + sqrt(1 - 2 k q)) with q = a + b x + c y + k (x^2 + y^2) / 2, and the derivatives
+    of z by a, b, c, k are their factors over 1 - k z. The Gauss-Newton method starts at the best
+    paraboloid; for a plane one step is exact. Lengths are over half the map's size.
 
-    Raises InputError where no sphere fits.
+    Raises InputError if no sphere fits.
     """
     rows, columns = heights.shape
     x = (np.arange(columns) - (columns - 1) / 2) * pixel[0]
@@ -81,11 +81,11 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
             curvature = float(0 - k / np.sqrt(b * b + c * c + 1 - 2 * a * k)) / size
             removed = Removed(kind, level + size * float(q0), slopes, curvature)
             return removed, level + size * z
-    expected = "one that spans the map; a plane always does"
-    raise InputError("detrend", found="no best sphere", expected=expected)
+    expected = 'one that covers the map, or "plane"'
+    raise InputError("detrend", found="no sphere that fits", expected=expected)
 
 
 def _least_squares(factors: list[Array], misfit: Array) -> Array:
-    """By the normal equations: few unknowns, all about 1, and many pixels."""
+    """The least-squares coefficients of the factors, from the normal equations."""
     normal = [[float(np.vdot(one, other)) for other in factors] for one in factors]
     return np.asarray(np.linalg.solve(normal, [float(np.vdot(each, misfit)) for each in factors]))

@@ -14,19 +14,22 @@ from convexrough.errors import InputError
 from convexrough.tabular.table import HOLES, Reading, read_table
 from convexrough.tabular.text import SAMPLE, STYLES, WORKBOOKS, Style, lines_of, sniff, stripped
 
-#: What the third column of a list may be called.
+#: Other names of the column of heights.
 HEIGHTS = ("z", "h")
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
 _LENGTH = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(\S*)")
 
-#: Largest error of a coordinate, in pixels.
+#: Largest accepted distance of a coordinate from the grid, in pixels.
 OFF_GRID = 0.05
 
 
 class HeightGrid(NamedTuple):
-    """Heights as a file has them, holes as nan, and what it says of them; "" and None: nothing."""
+    """The heights in a file, with nan for holes, and the pixel and units that it states.
+
+    pixel : size along x and y, None if not stated;  unit, height_unit : "" if not stated
+    """
 
     heights: Array
     pixel: tuple[float, float] | None = None
@@ -35,13 +38,13 @@ class HeightGrid(NamedTuple):
 
 
 def read_grid(path: Path) -> HeightGrid:
-    """A matrix of heights, a row of the map in each line; or columns x, y and height.
+    """The map in a text file: a matrix of heights, a line for each row; or columns x, y and height.
 
-    Three columns are x, y and height, as no map is three pixels wide. A comment above a matrix may
-    say its width and height with their unit, and the unit of the values.
+    Files with three columns are taken as x, y and height. Comments above a matrix may state its
+    width and height with a unit, and the unit of the values.
 
-    Raises FileError where the file is not text, and InputError with row and column where the
-    numbers are not a map.
+    Raises FileError if the file is not text, and InputError with row and column if its contents are
+    not a map.
     """
     comments: list[str] = []
     body: list[tuple[int, str]] = []
@@ -58,7 +61,7 @@ def read_grid(path: Path) -> HeightGrid:
 
 
 def _style(body: Sequence[tuple[int, str]]) -> Style | None:
-    """How the first lines of a matrix are written; None where they are of a list."""
+    """The number format of a matrix, from its first lines; None if they are those of a list."""
     if not body:
         return None
     style = sniff([line for _, line in body[:SAMPLE]], STYLES)
@@ -68,7 +71,7 @@ def _style(body: Sequence[tuple[int, str]]) -> Style | None:
 
 
 def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array:
-    """The cells of all lines; empty ones, and words such as BAD, are holes."""
+    """The numbers in all lines; empty cells, and words such as BAD, are holes."""
     rows: list[Array] = []
     for number, line in body:
         cells = ["nan" if it.lower() in HOLES else it for it in stripped(style.split(line))]
@@ -89,7 +92,7 @@ def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array
 
 
 def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
-    """The matrix, with what the comments say of its size and units."""
+    """The matrix, with its size and units from comments."""
     said = {}
     for found in filter(None, map(_SAID.fullmatch, comments)):
         said[found[1].lower().rstrip("s")] = found[2]
@@ -105,7 +108,7 @@ def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
 
 
 def _from_list(path: Path) -> HeightGrid:
-    """Columns x, y and height on a full or holed grid, in any order of the rows."""
+    """The map from columns x, y and height, in any order; missing points of the grid are holes."""
     table = read_table(path, required=("x", "y", "height"), unnamed=(("x", "y", "height"),),
                        also={"height": HEIGHTS}, holes=("height",),
                        how=Reading(alike=False))  # fmt: skip
@@ -120,19 +123,19 @@ def _from_list(path: Path) -> HeightGrid:
         found = f"{len(z):,} points of a grid of {heights.size:,}"
         raise InputError("x, y", found=found, expected="a regular grid", where=str(path))
     if len(np.unique(row * heights.shape[1] + column)) < len(z):
-        raise InputError("x, y", found="a place twice", expected="each once", where=str(path))
+        raise InputError("x, y", found="a point twice", expected="each once", where=str(path))
     heights[row, column] = z
     return HeightGrid(heights, (dx, dy), units[0], units[2])
 
 
 def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:
-    """Which line of a grid each value is on, and how far apart these are."""
+    """The number of the grid line of each value, and the spacing of the lines."""
     levels = np.unique(values)
     apart = np.diff(levels)
     if not np.isfinite(levels).all() or len(levels) < 2:
         found = "one value or none" if len(levels) < 2 else "values that are not finite"
-        raise InputError(name, found=found, expected="places on a grid", where=str(path))
-    clear = apart[apart > 1e-3 * apart.max()]  # the others are rounding of the same place
+        raise InputError(name, found=found, expected="coordinates on a grid", where=str(path))
+    clear = apart[apart > 1e-3 * apart.max()]  # smaller differences are rounding errors
     step = float(np.median(clear))
     count = np.rint((levels[-1] - levels[0]) / step)
     step = float(levels[-1] - levels[0]) / count
@@ -140,6 +143,6 @@ def steps(path: Path, name: str, values: Array) -> tuple[Indices, float]:
     number = np.rint(lines)
     if np.abs(lines - number).max() > OFF_GRID:
         worst = float(values[np.argmax(np.abs(lines - number))])
-        expected = f"places {step:g} apart"
+        expected = f"coordinates {step:g} apart"
         raise InputError(name, found=f"{worst:g}", expected=expected, where=str(path))
     return number.astype(np.intp), step

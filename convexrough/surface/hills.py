@@ -1,11 +1,11 @@
-"""The hills of a map: where its maxima are, and how far each stands above the way to a taller one.
+"""The hills of a map: the positions and prominences of its maxima.
 
-Wolf pruning (ISO 25178-2, ISO 16610-85) joins the hill that is least high above its highest saddle
-to the hill beyond that saddle, and begins again, until every hill left is high enough. The least
-high hill always has a taller one beyond its saddle, as that saddle bounds the other hill, too.
-Hence a hill falls exactly if its maximum is less than the threshold above the highest pass on any
-way to a taller maximum: its *prominence*. That is one number per maximum, whatever the threshold,
-and one sort of the passes gives all of them.
+The *prominence* of a maximum is its height above the highest pass on any way to a taller maximum.
+Wolf pruning (ISO 25178-2, ISO 16610-85) merges the hill with the least height above its highest
+saddle into the hill beyond this saddle, and repeats this until all heights exceed a threshold. The
+hill beyond the saddle is always taller, as the saddle bounds it, too. So a hill is merged exactly
+if its prominence is below the threshold. Prominences do not depend on the threshold, and one sort
+of the passes gives all of them.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from convexrough.arrays import Array, Indices
 
-#: A pixel and half of its eight neighbours: every pair of neighbours once, as (row, column) steps.
+#: Steps (row, column) from a pixel to half of its eight neighbours, so each pair is found once.
 PAIRS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
 class Hills(NamedTuple):
-    """The maxima of a map, tallest first.
+    """The maxima of a map, the tallest first.
 
     pixels      : (n, 2) row and column
-    prominences : (n,) [length] above the highest pass to a taller one; of the tallest, above the
-        lowest pixel of the map
+    prominences : (n,) [length] height above the highest pass to a taller maximum; for the tallest,
+        above the lowest pixel of the map
     """
 
     pixels: Indices
@@ -39,8 +39,8 @@ class Hills(NamedTuple):
 def hills(heights: Array) -> Hills:
     """The pixels that are higher than all eight neighbours, and their prominences.
 
-    Pixels of equal height are told apart by their places, so that a plateau is one hill: of its
-    maxima all but one have prominence 0, and these are left out.
+    Pixels of equal height are ordered by position. So all but one maxima of a plateau have the
+    prominence 0; these are left out.
     """
     order = np.argsort(heights, axis=None, kind="stable")
     ranks: Indices = np.empty(heights.shape, dtype=np.intp)
@@ -54,7 +54,7 @@ def hills(heights: Array) -> Hills:
 
 
 def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]:
-    """Maxima, tallest first, and which of them the steepest way up leads to from each pixel."""
+    """The maxima, the tallest first, and for each pixel the maximum that ascent leads to."""
     highest = ndimage.maximum_filter(ranks, size=3, mode="nearest")
     above = order[highest.ravel()]
     while (further := above[above]).size and (further != above).any():
@@ -68,9 +68,9 @@ def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]
 def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest.
 
-    A way between two maxima crosses from hill to hill at pairs of neighbours, and inside a hill it
-    can keep above where it enters. So the hills and the highest crossing of each two are enough,
-    and of these a tree that spans them (Kruskal).
+    A way between two maxima crosses from hill to hill at pairs of neighbours; inside a hill it need
+    not go below the crossing at which it enters. So the graph of hills with the highest crossing of
+    each pair has the same passes, and so has a spanning tree of it (Kruskal).
     """
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))
@@ -82,7 +82,7 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
 
     passes = np.zeros(count, dtype=np.intp)
-    leader = list(range(count))  # of each joined group the tallest, which has the least number
+    leader = list(range(count))  # leads to the tallest hill of each joined group
 
     def tallest(hill: int) -> int:
         while leader[hill] != hill:
@@ -102,7 +102,7 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
 def _crossings(
     ranks: NDArray[np.intp], owners: Indices, step: tuple[int, int]
 ) -> tuple[Indices, Indices, Indices]:
-    """Pairs of neighbours in two hills: the lower number, the higher, and the lower rank."""
+    """Neighbouring pixels of different hills: smaller and larger hill number, and lower rank."""
     (rows, columns), (down, right) = ranks.shape, step
     here = np.s_[: rows - down, max(0, -right) : columns - max(0, right)]
     there = np.s_[down:, max(0, right) : columns - max(0, -right)]

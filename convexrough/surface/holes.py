@@ -1,4 +1,4 @@
-"""Holes of a map, filled as a soap film would."""
+"""Holes of a map, filled by a harmonic function."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from scipy.sparse.linalg import spsolve
 
 from convexrough.arrays import Array
 
-#: Every pair of neighbours along a side, as (row, column) steps.
+#: Steps (row, column) from a pixel to neighbours along a side, so each pair is found once.
 SIDES = ((0, 1), (1, 0))
 
 
 def filled(heights: Array) -> Array:
-    """The map with each hole (nan) the mean of its neighbours: a harmonic function.
+    """The map with each hole (nan) replaced so that it is the mean of its neighbours.
 
-    Such a function has no maximum of its own, so no filled pixel becomes a summit. At the edge of
-    the map the neighbours that are there count. Some pixel must not be a hole.
+    Such a harmonic function has no maximum inside, so no filled pixel becomes a summit. At the edge
+    of the map only existing neighbours count. At least one pixel must not be a hole.
     """
     holes = np.isnan(heights)
     number = np.full(heights.shape, -1)

@@ -1,4 +1,4 @@
-"""Files of instruments, by SurfaceTopography: the only module that knows it."""
+"""Maps in files of instruments, read with the package SurfaceTopography."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from convexrough.surface.grid import HeightGrid
 def read_instrument(
     path: Path, pixel: float | tuple[float, float] | None, unit: str | None
 ) -> HeightGrid:
-    """The first channel of heights of a file in any of the formats that SurfaceTopography knows.
+    """The default channel of heights in a file that SurfaceTopography can read.
 
-    pixel, unit : for formats that do not hold them
+    pixel : used if the file does not state its size;  unit : not used
 
-    Raises FileError where it cannot read the file, or is not installed.
+    Raises FileError if SurfaceTopography cannot read the file or is not installed.
     """
     try:
-        with catch_warnings(action="ignore", category=ImportWarning):  # that there is no MPI
+        with catch_warnings(action="ignore", category=ImportWarning):  # MPI is not installed
             from SurfaceTopography import open_topography
             from SurfaceTopography.Exceptions import ReadFileError
     except ImportError as error:
         advice = "needs SurfaceTopography: pip install SurfaceTopography"
         raise FileError(f"{path}: {advice}") from error
-    path.open("rb").close()  # so that a missing file is named as everywhere
+    path.open("rb").close()  # raises the usual error for a missing file
     try:
         with open_topography(str(path)) as reader:
             channel = reader.default_channel
@@ -40,7 +40,7 @@ def read_instrument(
             topography = reader.topography(**given)
     except ReadFileError as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise FileError(f"{path}: no format that SurfaceTopography knows: {reason}") from error
+        raise FileError(f"{path}: SurfaceTopography cannot read it: {reason}") from error
     if topography.dim != 2:
         raise InputError("file", found="a line scan", expected="a map", where=str(path))
     heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)

@@ -1,4 +1,4 @@
-"""Spectral moments, and what a Gaussian surface would have for summits (McCool 1987)."""
+"""Spectral moments, and the summits of a Gaussian surface with these moments (McCool 1987)."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from convexrough.record import Record
 
 @dataclass(frozen=True, repr=False)
 class Moments(Record):
-    """Moments of the profiles of a surface, and the summits of a Gaussian surface that has them.
+    """Moments of the profiles of a surface, and summits of a Gaussian surface with these moments.
 
     m0 : [length^2] variance of the heights
-    m2 : variance of the slope of profiles, mean of those along x and y
-    m4 : [1/length^2] variance of their second derivative, likewise
-    slope_ratio : rms slope along y over that along x: 1 where no direction is preferred
+    m2 : variance of the slope of profiles, mean over profiles along x and along y
+    m4 : [1/length^2] variance of the second derivative of profiles, the same mean
+    slope_ratio : rms slope along y over that along x; 1 if the surface has no preferred direction
 
-    The formulas (Nayak 1971, McCool 1987) hold for all maxima of an isotropic Gaussian surface that
-    is resolved by its pixels, before any pruning.
+    The formulas (Nayak 1971, McCool 1987) hold for all maxima, before any pruning, of an isotropic
+    Gaussian surface that its pixels resolve.
 
     >>> moments = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=256).moments
     >>> print(f"{moments.bandwidth:.3g} {moments.m2:.4f}")
@@ -36,32 +36,32 @@ class Moments(Record):
 
     @property
     def bandwidth(self) -> float:
-        """Nayak's alpha = m0 m4 / m2^2: 1.5 of one wavelength, more of a broad spectrum."""
+        """Nayak's alpha = m0 m4 / m2^2: 1.5 for one wavelength, more for a broad spectrum."""
         return self.m0 * self.m4 / self.m2**2
 
     @property
     def density(self) -> float:
-        """[1/length^2] maxima per area, m4 / (6 pi sqrt(3) m2)."""
+        """[1/length^2] number of maxima per area, m4 / (6 pi sqrt(3) m2)."""
         return float(self.m4 / (6 * np.pi * np.sqrt(3) * self.m2))
 
     @property
     def mean_curvature(self) -> float:
-        """[1/length] mean over maxima of (k1 + k2) / 2:  (8/3) sqrt(m4 / pi)."""
+        """[1/length] mean curvature (k1 + k2) / 2 of the maxima, (8/3) sqrt(m4 / pi)."""
         return float(8 / 3 * np.sqrt(self.m4 / np.pi))
 
     @property
     def mean_height(self) -> float:
-        """[length] of the maxima, above the mean plane: 4 sqrt(m0 / (pi alpha))."""
+        """[length] mean height of the maxima above the mean plane, 4 sqrt(m0 / (pi alpha))."""
         return float(4 * np.sqrt(self.m0 / (np.pi * self.bandwidth)))
 
     @property
     def height_std(self) -> float:
-        """[length] standard deviation of their heights: sqrt((1 - 0.8968 / alpha) m0)."""
+        """[length] standard deviation of heights of the maxima, sqrt((1 - 0.8968 / alpha) m0)."""
         return float(np.sqrt(max(1 - 0.8968 / self.bandwidth, 0.0) * self.m0))
 
 
 def moments_of(heights: Array, pixel: tuple[float, float]) -> Moments:
-    """By differences of neighbours, as profilers do: waves of a few pixels count too little."""
+    """The moments from differences of neighbours; these underestimate waves of a few pixels."""
     across = [(1, pixel[0]), (0, pixel[1])]
     slopes = [np.mean((np.diff(heights, axis=axis) / step) ** 2) for axis, step in across]
     bends = [np.mean((np.diff(heights, 2, axis=axis) / step**2) ** 2) for axis, step in across]

@@ -1,8 +1,8 @@
-"""How strongly to prune: what is proved of the contact, and how far its model holds, by pruning.
+"""The choice of the pruning: proofs of the contact, and errors of its model, against pruning.
 
-The weaker the pruning, the more summits stand on the shoulders of others. Two summits whose
-contacts overlap are one contact with two bumps, which the model of point forces does not know; and
-summits that crowd keep the energy from being convex, and so the answer from being proved.
+With weak pruning many summits are close to others. If the contacts of two summits overlap they are
+really one contact, which the model of point forces does not describe. Crowded summits also make
+the energy nonconvex, so that the solution cannot be proved.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from convexrough.record import Along, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.surface.summits import Summits
 
-#: Parts of the largest height by which a curve is drawn.
+#: The default prunings of a curve, as fractions of the largest height.
 LEVELS = (0.0, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 
-#: Crowding above which contact discs overlap, and the model error that is too much with it.
+#: Crowding above which contact discs overlap, and the largest model error that is trusted.
 OVERLAP, TOO_FAR = 1.0, 0.05
 
-#: What presses a sphere on asperities.
+#: A function that presses a sphere on asperities.
 Press = Callable[[Asperities], Contact]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Provability(Table, Plottable):
-    """Contacts at stronger and stronger pruning. Arrays are (m,), a value for each pruning.
+    """Contacts with increasing pruning. Arrays are (m,), with a value for each pruning.
 
-    prune, heights : part of Sz, and [length] that a hill must be prominent
-    summits     : how many there are;  contacts, undecided : how many touch, and may or may not
-    scope       : of the certificate; "failed" where no solution was found
-    crowding, model_error : as of `Contact`; nan where no solution was found
+    prune, heights : least prominence of a hill, as a fraction of Sz and as a [length]
+    summits, contacts, undecided : number of summits, of those that touch, and of undecided ones
+    scope       : scope of the certificate; "failed" if no solution was found
+    crowding, model_error : as in `Contact`; nan if no solution was found
     approaches, loads : [length] and [force]
 
     >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(prune=0.0)
@@ -73,13 +73,13 @@ class Provability(Table, Plottable):
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """(m,) all statuses are proved, no discs overlap, and the model error is below 5 %."""
+        """(m,) true if all statuses are proved, no discs overlap, and model errors are <= 5 %."""
         proved = np.isin(self.scope, ("global", "local")) & (self.undecided == 0)
         return frozen(proved & (self.crowding <= OVERLAP) & (self.model_error <= TOO_FAR))
 
     @property
     def trusted_from(self) -> float:
-        """The pruning from which on every stronger one is trusted; nan where the last is not."""
+        """The pruning from which on all are trusted; nan if the strongest is not."""
         doubted = np.flatnonzero(~self.trusted)
         first = int(doubted[-1]) + 1 if len(doubted) else 0
         return float(self.prune[first]) if first < len(self.prune) else float("nan")
@@ -91,11 +91,11 @@ def provability(
     *,
     levels: Sequence[float] = LEVELS,
 ) -> Provability:
-    """Press what is left of the summits at each pruning, and look how far that can be trusted.
+    """Contacts of the remaining summits at each pruning, with their proofs and model errors.
 
-    summits : found with a pruning no stronger than the weakest, such as 0
-    press   : what makes a Contact of asperities, all of which it presses in the same way
-    levels  : prunings, as parts of Sz; those at which nothing is left end the curve
+    summits : found with at most the weakest pruning, such as 0
+    press   : function that returns the Contact of asperities
+    levels  : prunings, as fractions of Sz; the curve ends where no summit is left
 
     >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(prune=0.0)
     >>> material = cr.Material(1.0, 0.3)
@@ -117,9 +117,9 @@ def provability(
 
 
 def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
-    """Pairs (m, 2) of asperities with a crowding (a_i + a_j) / r_ij above a value, and that, (m,).
+    """Pairs (m, 2) of asperities with a crowding above a value, and their crowdings (m,).
 
-    The most crowded first.
+    The crowding is (a_i + a_j) / r_ij, with contact radii a and distance r. The largest are first.
 
     >>> pairs, values = cr.surface.crowded(contact, above=0.5)
     >>> print(len(pairs), f"{values.max() / contact.crowding:.6g}")
@@ -141,10 +141,11 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
 
 
 def model_errors(contact: Contact) -> Array:
-    """(n,) of each asperity what `Contact.model_error` is the largest of; 0 where it is open.
+    """(n,) relative model error of each asperity, 0 if open; the largest is `Contact.model_error`.
 
-    The pressure of a neighbour displaces the surface by a_j^2 / (10 r_ij^2) of P_j / (pi E* r_ij)
-    more than a point force does; in parts of the asperity's own prescribed approach.
+    The Hertz pressure of a neighbour displaces the surface by a_j^2 / (10 r_ij^2) times
+    P_j / (pi E* r_ij) more than a point force does. The sum over neighbours is divided by the
+    asperity's prescribed approach D0 + d_i.
 
     >>> print(f"{cr.surface.model_errors(contact).max() / contact.model_error:.6g}")
     1

@@ -1,4 +1,4 @@
-"""`read`: a surface from a file, by its kind, in one unit of length."""
+"""`read`: a surface from a file, with all lengths in one unit."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from convexrough.tabular.arrays import named_arrays, reading
 from convexrough.tabular.text import WORKBOOKS
 from convexrough.tabular.units import one_unit
 
-#: Names of files that are text.
+#: Suffixes of text files.
 TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 
-#: What the heights are called in an .npz with several arrays.
+#: Names of the heights in an .npz with several arrays.
 HEIGHTS = ("heights", "height", "z")
 
-#: Rms slopes outside of these are of heights and pixels in different units.
+#: Rms slopes outside this range suggest different units of heights and pixels.
 SLOPES = (1e-7, 10.0)
 
-#: Numbers that mark pixels without a height, where they lie farther from all heights than so many
-#: times the range of these; and from which size any number there does.
+#: Numbers that mark holes, and the size from which any number does. Only numbers count that differ
+#: from the median of all other heights by more than FAR times their range.
 MARKS, FAR, HUGE = (-999.0, -9999.0, -99999.0, -32768.0, 9999.0, 99999.0, 32767.0), 10.0, 1e30
 
-#: Relative difference of two pixel sizes that are the same.
+#: Relative difference up to which two pixel sizes count as equal.
 SAME = 1e-6
 
 
@@ -44,22 +44,21 @@ def read(
     detrend: Trend | None = "plane",
     fill: bool = False,
 ) -> Surface:
-    """A surface from .npy, .npz, a matrix or list in text, or what SurfaceTopography reads.
+    """The surface in a file: .npy, .npz, .mat, text, or a format that SurfaceTopography reads.
 
-    pixel  : size of a pixel, or those along x and y, [unit]; needed where the file has none
-    unit   : of the pixel, and of the heights unless `height_unit` is given; needed nowhere. A file
-        that names another is refused. Heights in another known unit are converted
-    detrend : the best "plane" or "sphere" to take away, or None
-    fill   : holes become as high as a soap film; else they are refused. Holes are nan, masked, BAD
-        in text, and marks such as -9999 or 1e38 that lie far from all heights
+    pixel  : [unit] size of a pixel, or sizes along x and y; required if the file states none
+    unit   : unit of the pixel, and of the heights unless `height_unit` is given; optional. A
+        different unit in the file is an error. Heights in another known unit are converted
+    detrend : "plane" or "sphere" to subtract the best one, or None
+    fill   : True to fill holes with a harmonic function; else holes are an error. Holes are nan,
+        masked, BAD in text, and marks such as -9999 or 1e38 far from all heights
 
-    An .npz or .mat holds `heights` and, if it likes, `pixel`, or x and y of the columns and rows,
-    `unit` and `height_unit`. Text is a matrix,
-    with or without Gwyddion's comments on its size, or columns x, y and height on a grid. Other
-    files need the extra `surface`.
+    An .npz or .mat file contains `heights`, and may contain `unit`, `height_unit`, and `pixel` or x
+    and y of the columns and rows. A text file is a matrix, possibly with Gwyddion's comments on its
+    size, or columns x, y and height on a grid. Formats of instruments need the extra `surface`.
 
-    Raises FileError where the file cannot be read, as SurfaceTopography is not installed, say, and
-    InputError where it holds no usable map.
+    Raises FileError if the file cannot be read or SurfaceTopography is needed and not installed;
+    InputError if the file contains no usable map.
 
     >>> np.savez(folder / "scan.npz", heights=np.random.default_rng(1).normal(size=(64, 64)))
     >>> cr.surface.read(folder / "scan.npz", pixel=2.5, unit="µm").size
@@ -70,7 +69,7 @@ def read(
         length = one_unit("unit", unit, grid.unit)
         upwards = one_unit("height_unit", height_unit, grid.height_unit)
         if upwards and not length:
-            expected = f"that of a pixel, as heights are {upwards.name}"
+            expected = f"the unit of the pixel, as heights are in {upwards.name}"
             raise InputError("unit", found="none", expected=expected)
         heights, holes = _mended(grid.heights, fill)
         if upwards and length:
@@ -91,7 +90,7 @@ def _pixel(
 ) -> tuple[float, float]:
     if given is None:
         if found is None:
-            expected = "its size, as the file does not say: pixel=, or --pixel"
+            expected = "its size, which the file does not state: pixel=, or --pixel"
             raise InputError("pixel", found="none", expected=expected)
         return checked_pixel(found)
     if found is None:
@@ -104,7 +103,7 @@ def _pixel(
 
 
 def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
-    """Without holes, and how many there were."""
+    """The heights without holes, and the number of holes filled."""
     marks = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
     if marks.any() and (rest := heights[~marks & ~np.isnan(heights)]).size:
         marks &= np.abs(heights - np.median(rest)) > FAR * np.ptp(rest)
@@ -124,7 +123,7 @@ def _mended(heights: Array, fill: bool) -> tuple[Array, int]:
 
 
 def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | None) -> HeightGrid:
-    """What is in a file, by its kind."""
+    """The map in a file, read according to its suffix."""
     kind = path.suffix.lower()
     with reading(path):
         if kind in TEXT:

@@ -1,4 +1,4 @@
-"""What `summits` says of a surface: for people, for programs, and in tables."""
+"""The results of the command `summits`: printed text, JSON and tables."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ from convexrough.version import __version__
 COLUMNS = ("x", "y", "heights", "tip_radii", "prominences", "largest_curvatures",
            "smallest_curvatures", "eccentricities", "elliptic_loads", "deviations")  # fmt: skip
 
-#: How the units of columns follow from that of length.
+#: Units of columns, from the unit of length.
 LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
 LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature"), "1/{}")
 
-#: Crowded pairs that the terminal names before it says how many more there are.
+#: Largest number of crowded pairs that are printed one by one.
 MOST_LISTED = 10
 
-#: Part of a map's half width from which on contact is too near to its edge.
+#: Fraction of a map's half width beyond which contact causes a warning.
 NEAR_EDGE = 0.9
 
-#: Relative difference of a statistic from that of the moments up to which there is no warning.
+#: Largest relative difference between a statistic and its value by moments without a warning.
 UNLIKE = 0.2
 
 
@@ -51,7 +51,7 @@ class Scanned:
     """A surface, all its summits, those left by pruning, and the result of pressing them.
 
     curve, contact : None if not pressed; contact also if no solution was found
-    whole : the map pressed by boundary elements, or None
+    whole : the whole map by boundary elements, or None
     """
 
     surface: Surface
@@ -65,7 +65,7 @@ class Scanned:
     def of(
         cls, surface: Surface, prune: float, fit: int, press: Press | None, *, whole: bool = False
     ) -> Scanned:
-        """The summits of a surface, pressed where `press` says how; and the whole map if asked."""
+        """The summits of a surface, pressed by `press` if given, and the whole map if `whole`."""
         LOGGER.info("finding summits")
         maxima, summits = surface.summits(0.0, fit), surface.summits(prune, fit)
         if press is None:
@@ -80,12 +80,12 @@ class Scanned:
 
     @property
     def certified(self) -> bool:
-        """Nothing was pressed, or what was is proved."""
+        """True if nothing was pressed, or if the contact is proved."""
         return self.curve is None or (self.contact is not None and self.contact.certificate.holds)
 
 
 def surface_summary(scanned: Scanned) -> dict[str, Any]:
-    """What `--json` prints, in the unit of the map."""
+    """The contents of `--json`, in the unit of the map."""
     surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
     moments, statistics = surface.moments, scanned.maxima.statistics
     summary: dict[str, Any] = {
@@ -130,7 +130,7 @@ def _named(found: object, *names: str) -> dict[str, Any]:
 
 
 def summit_columns(summits: Summits) -> dict[str, Any]:
-    """The table that a scene file reads, with units in its header."""
+    """The columns of summits.csv, with units in its header; a scene file can read them."""
     unit, columns = summits.origin.unit, summits.columns(*COLUMNS)
     named = {
         f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name: values
@@ -140,12 +140,12 @@ def summit_columns(summits: Summits) -> dict[str, Any]:
 
 
 def curve_columns(curve: Provability) -> dict[str, NDArray[Any]]:
-    """The table of the curve, a row for each pruning."""
+    """The columns of the curve, with a row for each pruning."""
     return curve.columns(*Provability._along["level",])
 
 
 def describe_surface(scanned: Scanned) -> list[str]:
-    """Aligned lines for people."""
+    """The printed lines."""
     surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
     unit = f" {surface.unit}" if surface.unit else ""
     rows, columns = origin.shape
@@ -167,9 +167,10 @@ def describe_surface(scanned: Scanned) -> list[str]:
         ("tip radius", f"median {np.median(tips):.4g}{unit}, {tips.min():.4g} to {tips.max():.4g}"
                        f"  (paraboloids over {origin.fit} by {origin.fit} pixels)"),
         ("eccentricity", f"median {np.median(summits.eccentricities):.2f}, largest "
-                         f"{summits.eccentricities.max():.2f}  (as ellipses they would carry up to "
+                         f"{summits.eccentricities.max():.2f}  (elliptic tips would carry up to "
                          f"{100 * (summits.elliptic_loads.max() - 1):.2g} % more)"),
-        ("off a sphere", f"rms, median {off:.2g}{unit}, largest {summits.deviations.max():.2g}"),
+        ("rms misfit", f"median {off:.2g}{unit}, largest {summits.deviations.max():.2g}"
+                       "  (pixels of a tip from its sphere)"),
         ("bandwidth", f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
                       f"m2 {surface.moments.m2:.4g}, m4 {surface.moments.m4:.4g})"),
     ]  # fmt: skip
@@ -189,7 +190,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
 
 
 def _describe_statistics(scanned: Scanned) -> list[str]:
-    """Counted, and expected of a Gaussian surface with the same moments."""
+    """The statistics of the summits, and of a Gaussian surface with the same moments."""
     maxima, left = scanned.maxima.statistics, scanned.summits.statistics
     moments, unit = scanned.surface.moments, scanned.surface.unit
     units = (f" [1/{unit}²]", f" [1/{unit}]", f" [{unit}]", f" [{unit}]") if unit else [""] * 4
@@ -220,7 +221,7 @@ def _describe_curve(curve: Provability, unit: str) -> list[str]:
 
 
 def _describe_crowded(contact: Contact) -> list[str]:
-    """Which summits are in the way of trust."""
+    """The overlapping pairs of summits, and the summits with large model errors."""
     pairs, values = crowded(contact)
     lines = []
     if len(pairs):
@@ -241,14 +242,14 @@ def _describe_crowded(contact: Contact) -> list[str]:
 
 
 def warnings_about(scanned: Scanned) -> Iterator[str]:
-    """What a user should know, in words with numbers."""
+    """The warnings about a surface and its contact."""
     surface, summits, contact = scanned.surface, scanned.summits, scanned.contact
     yield from surface.warnings
     said, found = surface.moments, scanned.maxima.statistics
     if (ratio := max(said.slope_ratio, 1 / (said.slope_ratio or 1e-300))) > 2:
         yield (
             f"slopes along one axis are {min(ratio, 1e6):.3g} times those along the other: the "
-            "moments are those of a surface with no direction, and tips are ridges"
+            "moments assume a surface without a preferred direction, and tips are ridges"
         )
     for name in ("density", "mean_curvature"):
         counted, expected = getattr(found, name), getattr(said, name)
@@ -263,11 +264,11 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
     first = scanned.curve.trusted_from
     if not first <= chosen:
         more = "no pruning is strong enough" if np.isnan(first) else f"--prune {first:g} is"
-        yield f"at a pruning of {chosen:g} the asperity model is not to be trusted; {more}"
+        yield f"at a pruning of {chosen:g} the asperity model cannot be trusted; {more}"
     if contact is not None and not contact.loads.any():
         yield (
-            f"at a pruning of {chosen:g} nothing touches: trust is that of a contact, so press "
-            "deeper, or with a load"
+            f"at a pruning of {chosen:g} nothing touches, so the model is not assessed: use a "
+            "larger approach, or a load"
         )
     if contact is None:
         yield f"at a pruning of {chosen:g} no solution was found"

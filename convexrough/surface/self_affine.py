@@ -1,4 +1,4 @@
-"""Self-affine maps whose spectrum is known: for tests, and to learn on."""
+"""Self-affine maps with known spectra, for tests and examples."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from convexrough.scene.patterns import checked_seed
 from convexrough.surface.moments import Moments
 from convexrough.surface.surface import Surface
 
-#: Pixels of the shortest wave where none is given: tips are resolved.
+#: Default length of the shortest wave in pixels, which resolves tips.
 RESOLVED = 8.0
 
 
 class Waves(NamedTuple):
-    """The waves of a periodic map: one of each pair of opposite wave vectors.
+    """The waves of a periodic map, one for each pair of opposite wave vectors.
 
-    numbers   : (n, 2) whole waves across the map along x and y
-    vectors   : (n, 2) [1/length] 2 pi times those over the size
-    variances : (n,) [length^2] of each wave
+    numbers   : (n, 2) numbers of waves across the map, along x and y
+    vectors   : (n, 2) [1/length] wave vectors, 2 pi times the numbers over the map's size
+    variances : (n,) [length^2] variance of each wave
     """
 
     numbers: Array
@@ -41,18 +41,18 @@ def self_affine(
     cutoff: float | None = None,
     unit: str = "",
 ) -> Surface:
-    """A square periodic map with a self-affine spectrum, white below the roll-off.
+    """A square periodic map with a self-affine spectrum.
 
-    hurst     : Hurst's exponent, from 0 to 1: the spectrum falls as q^(-2 (1 + hurst))
-    rms_slope : root mean square of the slope, |grad z|
-    rolloff   : [length] wave from which on longer ones are no taller
-    seed      : of the phases; amplitudes are not random, so that every map has the same moments
-    pixels    : along each side;  pixel : [length]
-    cutoff    : [length] the shortest wave, 8 pixels unless given
-    unit      : of length, only remembered
+    hurst     : Hurst exponent, from 0 to 1: the spectrum falls as q^(-2 (1 + hurst))
+    rms_slope : root mean square of the slope |grad z|
+    rolloff   : [length] wavelength; the spectrum of longer waves is constant
+    seed      : of the random phases. Amplitudes are not random, so all maps have the same moments
+    pixels    : number along each side;  pixel : [length] size of a pixel
+    cutoff    : [length] shortest wave; default 8 pixels
+    unit      : unit of length, as in `Surface`
 
-    More pixels of the same map, so that pixels * pixel stays, are the same surface seen closer, as
-    long as `cutoff` is the same.
+    Maps with the same size pixels * pixel, seed and `cutoff` are the same surface with different
+    resolution.
 
     >>> surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=256)
     >>> surface.heights.shape
@@ -78,7 +78,7 @@ def self_affine_moments(
     pixel: float = 1.0,
     cutoff: float | None = None,
 ) -> Moments:
-    """The moments of `self_affine`, whose arguments are as there: sums over its waves, exactly.
+    """The exact moments of `self_affine`, with the same arguments.
 
     >>> exact = cr.surface.self_affine_moments(0.8, 0.1, 32.0, pixels=256)
     >>> print(f"{exact.m2:.4f}")
@@ -97,7 +97,7 @@ def _waves(
     pixel: float,
     cutoff: float | None,
 ) -> Waves:
-    """In an order that does not depend on how many pixels there are."""
+    """The waves of a map, in an order that does not depend on the number of pixels."""
     hurst = checks.between("hurst", hurst, 0.0, 1.0)
     rms_slope = checks.positive("rms_slope", rms_slope)
     rolloff, pixel = checks.positive("rolloff", rolloff), checks.positive("pixel", pixel)

@@ -1,4 +1,4 @@
-"""Summits of a map as asperities that remember where they come from."""
+"""Summits of a map as asperities, with data on the map and the fits."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ from convexrough.surface.tips import elliptic_load, fit_tips
 
 @dataclass(frozen=True, repr=False)
 class Origin(Record):
-    """The map that summits are from, and how they were found.
+    """The map that contains the summits, and the settings and counts of the search.
 
-    source, shape, pixel, unit, removed, filled : as those of `Surface`
-    level      : [length] mean height of the map;  max_height : [length] its Sz
-    moments    : of the map
-    prune      : part of Sz that a hill must be prominent;  fit : pixels across a paraboloid
-    maxima     : pixels higher than their eight neighbours
-    pruned     : of those, hills joined to taller ones
-    at_edge    : hills left out as they are too near to the edge of the map
-    without_top : hills left out as their paraboloid has no top
+    source, shape, pixel, unit, removed, filled : as in `Surface`; shape is that of the heights
+    level      : [length] mean height of the map;  max_height : [length] Sz of the map
+    moments    : spectral moments of the map
+    prune      : least prominence of a hill, as a fraction of Sz
+    fit        : pixels across the square of a fitted paraboloid
+    maxima     : number of pixels higher than their eight neighbours
+    pruned     : number of these that were merged into taller hills
+    at_edge    : number left out because they are too near to the edge of the map
+    without_top : number left out because their paraboloid has no top in its square
 
     >>> cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits().origin.maxima
     328
@@ -60,14 +61,14 @@ class Origin(Record):
 
     @property
     def area(self) -> float:
-        """[length^2] of the map where a summit can be."""
+        """[length^2] area of the map without the margin in which no summit is found."""
         rows, columns = self.shape
         margin = 2 * (self.fit // 2)
         return (rows - margin) * self.pixel[1] * (columns - margin) * self.pixel[0]
 
 
 class Statistics(NamedTuple):
-    """Of summits, with the names of `Moments`."""
+    """Statistics of summits, with the names and units of `Moments`."""
 
     density: float
     mean_curvature: float
@@ -77,15 +78,15 @@ class Statistics(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Summits(Table, Asperities, Plottable):
-    """Asperities that are the summits of a map, the tallest first.
+    """Asperities that are the summits of a map, in order of the heights of their maxima.
 
-    positions, tip_radii, heights : of the tops of paraboloids; the tip radius is 1 / sqrt(k1 k2)
-    prominences : (n,) [length] of the maximum above the highest pass to a taller one
-    largest_curvatures, smallest_curvatures : (n,) [1/length] k1 and k2, principal curvatures
-    deviations  : (n,) [length] root-mean-square distance of the pixels from the sphere that
-        stands for the tip
+    positions, tip_radii, heights : of the tops of fitted paraboloids; the tip radius is
+        1 / sqrt(k1 k2)
+    prominences : (n,) [length] height of the maximum above the highest pass to a taller one
+    largest_curvatures, smallest_curvatures : (n,) [1/length] principal curvatures k1 and k2
+    deviations  : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
     pixels      : (n, 2) row and column of the maximum
-    origin      : the map, and what was left out
+    origin      : the map, and the numbers of maxima that were left out
 
     >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits()
     >>> scene = cr.Scene(1e4, summits, cr.Material(1.0, 0.3))
@@ -123,12 +124,12 @@ class Summits(Table, Asperities, Plottable):
 
     @property
     def x(self) -> Array:
-        """(n,) [length]"""
+        """(n,) [length] x of the tops."""
         return self.positions[:, 0]
 
     @property
     def y(self) -> Array:
-        """(n,) [length]"""
+        """(n,) [length] y of the tops."""
         return self.positions[:, 1]
 
     @property
@@ -138,12 +139,12 @@ class Summits(Table, Asperities, Plottable):
 
     @property
     def elliptic_loads(self) -> Array:
-        """(n,) load of the tip with both curvatures over that of its sphere, same indentation."""
+        """(n,) load of the elliptic tip over that of its sphere, at the same indentation."""
         return frozen(elliptic_load(self.largest_curvatures / self.smallest_curvatures))
 
     @property
     def statistics(self) -> Statistics:
-        """Density, curvature and heights, to compare with `origin.moments`."""
+        """The density, curvature and heights of the summits, to compare with `origin.moments`."""
         return Statistics(
             density=len(self) / self.origin.area,
             mean_curvature=float(np.mean(self.largest_curvatures + self.smallest_curvatures) / 2),
@@ -152,9 +153,11 @@ class Summits(Table, Asperities, Plottable):
         )
 
     def pruned(self, prune: float) -> Summits:
-        """Those that are left at a stronger pruning.
+        """The summits that are left at a stronger pruning.
 
-        Raises InputError for a weaker one, and where none is left.
+        prune : least prominence, as a fraction of Sz
+
+        Raises InputError for a weaker pruning, or if no summit is left.
         """
         prune = checks.between("prune", prune, self.origin.prune, 1.0)
         keep = self.prominences >= prune * self.origin.max_height
@@ -171,7 +174,7 @@ class Summits(Table, Asperities, Plottable):
 
 
 def find_summits(heights: Array, found: Hills, origin: Origin, prune: float, fit: int) -> Summits:
-    """`Surface.summits`, of the hills of a map that `origin` describes."""
+    """The result of `Surface.summits`, from the hills of a map that `origin` describes."""
     prune = checks.between("prune", prune, 0.0, 1.0)
     fit = _checked_fit(fit, origin.shape)
     prominent = found.prominences >= prune * origin.max_height
@@ -216,5 +219,5 @@ def _checked_fit(fit: int, shape: tuple[int, int]) -> int:
         raise InputError("fit", found=repr(fit), expected="an odd number of pixels, at least 3")
     if min(shape) < fit:
         found = f"{shape[1]} by {shape[0]} pixels"
-        raise InputError("map", found=found, expected=f"at least the {fit} by {fit} of a fit")
+        raise InputError("map", found=found, expected=f"at least {fit} by {fit}, as fit is {fit}")
     return int(fit)

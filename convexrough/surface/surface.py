@@ -1,4 +1,4 @@
-"""A measured surface: heights over a grid of pixels, and what was removed from them."""
+"""`Surface`: heights over a grid of pixels, and the forms removed from them."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from convexrough.surface.moments import Moments, moments_of
 from convexrough.surface.summits import Origin, Summits, find_summits
 from convexrough.tabular.units import known_unit
 
-#: Pixels longer than wide by more than this show no summits: eight neighbours are none.
+#: Largest ratio of the sides of a pixel; summits are not resolved by longer ones.
 MOST_ASPECT = 10.0
 
-#: A trend that explains more of the variance is named; and pixels along a side that are looked at.
+#: Part of the variance above which a trend causes a warning, and pixels along a side that are used.
 MOST, FITTED = 0.5, 256
 
-#: Part of the largest height that rounding may leave of a map that was all trend.
+#: Heights below this part of the largest, after subtraction of a trend, are rounding errors.
 ROUNDING = 64 * np.finfo(float).eps
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surface(Record, Plottable):
-    """Heights over a grid whose middle is the origin.
+    """Heights over a grid of pixels; the middle of the grid is the origin.
 
-    heights : (ny, nx) [length] x grows with the column, y with the row; taller is positive
-    pixel   : (dx, dy) [length]; one number for squares
-    unit    : of all lengths, "" if unknown
-    removed : what was taken from the heights, in this order
-    filled  : how many pixels were holes
-    source  : the file, or what made it
+    heights : (ny, nx) [length] x grows with the column, y with the row; positive is taller
+    pixel   : (dx, dy) [length], or one number for squares
+    unit    : unit of all lengths, "" if unknown
+    removed : planes and spheres subtracted from the heights, in this order
+    filled  : number of pixels that were holes
+    source  : the file, or a description
 
-    Raises InputError for maps that are constant or have holes, and for pixels more than ten times
-    as long as wide.
+    Raises InputError for maps that are constant or have holes, and for pixels with one side more
+    than ten times the other.
 
     >>> surface = cr.surface.Surface(np.random.default_rng(1).normal(size=(64, 64)), pixel=0.5)
     >>> surface.size
@@ -73,7 +73,7 @@ class Surface(Record, Plottable):
 
     @property
     def size(self) -> tuple[float, float]:
-        """[length] along x and y."""
+        """[length] size of the map along x and y."""
         rows, columns = self.heights.shape
         return columns * self.pixel[0], rows * self.pixel[1]
 
@@ -89,7 +89,7 @@ class Surface(Record, Plottable):
 
     @property
     def rms_slope(self) -> float:
-        """Root mean square of the slope |grad z|, by differences of neighbours."""
+        """Root mean square of the slope |grad z|, from differences of neighbours."""
         return float(np.sqrt(2 * self.moments.m2))
 
     @cached_property
@@ -99,14 +99,14 @@ class Surface(Record, Plottable):
 
     @cached_property
     def hills(self) -> Hills:
-        """Every maximum, and its prominence: what any pruning begins with."""
+        """All maxima and their prominences."""
         return hills(self.heights)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """A plane or sphere that explains most of the variance of the heights, and its remedy.
+        """A warning if a plane or sphere explains most of the variance of the heights.
 
-        Fitted to at most 256 by 256 of the pixels.
+        It is fitted to at most 256 by 256 of the pixels.
 
         >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
         >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3
@@ -135,9 +135,9 @@ class Surface(Record, Plottable):
         yield from (("warning", each) for each in self.warnings)
 
     def detrend(self, kind: Trend = "plane") -> Surface:
-        """The surface without the plane or the sphere that fits it best.
+        """The surface without its best-fitting plane or sphere, which is added to `removed`.
 
-        The last entry of `removed` is that form. Raises InputError where nothing is left.
+        Raises InputError if nothing is left.
 
         >>> ball = cr.surface.Surface(-np.hypot(*np.mgrid[-8:9, -8:9]) ** 2 / 200, pixel=1.0)
         >>> print(ball.detrend("plane").detrend("sphere").removed[1].kind)
@@ -152,9 +152,9 @@ class Surface(Record, Plottable):
         return replace(self, heights=left, removed=(*self.removed, trend))
 
     def to_unit(self, unit: str) -> Surface:
-        """The same surface with all lengths in another unit.
+        """The same surface with all lengths in another unit, such as "nm" or "mm".
 
-        Raises InputError where the unit of this one is not known.
+        Raises InputError if the unit of this surface is unknown.
 
         >>> scan = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, unit="µm")
         >>> print(f"{scan.to_unit('mm').size[0]:g}")
@@ -174,16 +174,17 @@ class Surface(Record, Plottable):
                        unit=into.name, removed=tuple(removed))  # fmt: skip
 
     def summits(self, prune: float = 0.05, fit: int = 3) -> Summits:
-        """The summits, tallest hill first, as asperities about the middle of the map.
+        """The summits of the map as asperities, in order of the heights of their maxima.
 
-        prune : hills less prominent than this part of `max_height` are joined to their taller
-            neighbours: Wolf pruning, ISO 25178-2
-        fit   : pixels across the square about each maximum to which a paraboloid is fitted
+        prune : hills with a prominence below this fraction of `max_height` are merged into taller
+            ones (Wolf pruning, ISO 25178-2)
+        fit   : odd number of pixels across the square about each maximum to which a paraboloid is
+            fitted
 
-        Hills whose maximum is so near to the edge that this square does not fit in the map, and
-        those whose paraboloid has no top in its square, are left out: `origin` counts them.
+        Hills are left out if this square does not lie in the map, or if their paraboloid has no top
+        in the square; `origin` has their numbers.
 
-        Raises InputError for maps smaller than the square, and where no summit is left.
+        Raises InputError for maps smaller than the square, or if no summit is left.
 
         >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(prune=0.05)
         >>> len(summits), summits.origin.pruned
@@ -210,10 +211,10 @@ class Surface(Record, Plottable):
 
 
 def checked_pixel(pixel: float | tuple[float, float]) -> tuple[float, float]:
-    """Both sizes of a pixel, of a shape that has neighbours."""
+    """The sizes (dx, dy) of a pixel, checked."""
     both = pixel if isinstance(pixel, (tuple, list)) else (pixel, pixel)
     if len(both) != 2:
-        raise InputError("pixel", found=f"{len(both)} numbers", expected="one, or that of x and y")
+        raise InputError("pixel", found=f"{len(both)} numbers", expected="one or two")
     dx, dy = (checks.positive("pixel", each) for each in both)
     if max(dx, dy) > MOST_ASPECT * min(dx, dy):
         found = f"{dx:g} by {dy:g}"
@@ -228,7 +229,7 @@ def _checked(heights: ArrayLike) -> Array:
         raise InputError("heights", found=f"shape {grid.shape}", expected=expected)
     if holes := np.count_nonzero(np.isnan(grid)):
         found = f"{holes:,} holes (nan) in {grid.size:,} pixels"
-        raise InputError("heights", found=found, expected="none, or leave to fill them")
+        raise InputError("heights", found=found, expected="none: `read` can fill them")
     if not (good := np.abs(grid) <= checks.LARGEST).all():
         row, column = np.argwhere(~good)[0]
         found = f"{grid[row, column]} in row {row}, column {column}"

@@ -1,4 +1,4 @@
-"""The shape of a tip: a paraboloid through the pixels about a maximum, and what a sphere misses."""
+"""The shape of tips: paraboloids fitted to the pixels about maxima."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from convexrough.arrays import Array, Indices
 
 
 class Tips(NamedTuple):
-    """Paraboloids about maxima, of which those that are not `whole` stand for nothing.
+    """Paraboloids fitted about maxima. Only entries with `whole` true have a meaning.
 
-    offsets    : (n, 2) [length] x and y of the top from the pixel of the maximum
-    heights    : (n,) [length] of the top
-    curvatures : (n, 2) [1/length] principal curvatures there, the larger first
-    deviations : (n,) [length] root-mean-square distance of the pixels from the sphere at the top
-    whole      : (n,) curved downwards in every direction, the top among the pixels
+    offsets    : (n, 2) [length] x and y of the top, relative to the pixel of the maximum
+    heights    : (n,) [length] heights of the tops
+    curvatures : (n, 2) [1/length] principal curvatures, the larger first
+    deviations : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
+    whole      : (n,) true if curved downwards in every direction, with the top among the pixels
     """
 
     offsets: Array
@@ -32,10 +32,10 @@ class Tips(NamedTuple):
 def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across: int) -> Tips:
     """Least-squares paraboloids over `across` by `across` pixels about each maximum.
 
-    pixels : (n, 2) row and column, each at least across // 2 from the edges of the map
-    pixel  : along x and y [length]
+    pixels : (n, 2) row and column of the maxima, at least across // 2 from the edges of the map
+    pixel  : [length] sizes along x and y
 
-    z = z0 + g.r + r.H.r / 2 has its top at -H^-1 g, and there the principal curvatures of -H.
+    z = z0 + g.r + r.H.r / 2 has its top at -H^-1 g; its curvatures are the eigenvalues of -H.
     """
     reach = across // 2
     down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
@@ -65,20 +65,20 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
 
 
 def elliptic_load(ratio: Array) -> Array:
-    """(n,) load of a Hertz contact over that of the sphere of radius 1 / sqrt(k1 k2).
+    """(n,) load of an elliptic tip over that of the sphere of radius 1 / sqrt(k1 k2).
 
-    At the same indentation, on a flat. ratio : (n,) k1 / k2, at least 1
+    Both are Hertz contacts on a flat with the same indentation. ratio : (n,) k1 / k2, at least 1
 
-    With b / a the ratio of the half axes of the contact and K, E elliptic integrals of
-    1 - (b / a)^2,
+    With the ratio b / a of the half axes of the contact and the complete elliptic integrals K, E
+    of the parameter 1 - (b / a)^2,
 
-        k1 / k2 = (E (a/b)^2 - K) / (K - E),
+        k1 / k2 = (E (a/b)^2 - K) / (K - E).
 
-    the indentation is F2 times that of the sphere under the same load, and load grows as
-    indentation^(3/2) (Johnson 1985, eqs 4.26 to 4.28).
+    The indentation is F2 times that of the sphere under the same load (Johnson 1985, eqs 4.26 to
+    4.28), and loads grow as indentation^(3/2).
     """
     flattened = np.array(np.maximum(ratio, 1.0), dtype=np.float64)
-    round_enough = flattened < 1 + 1e-7  # off by less than the square of that
+    round_enough = flattened < 1 + 1e-7  # the error is below the square of 1e-7
     wanted = np.where(round_enough, 2.0, flattened)
 
     def excess(log_axes: Array, wanted: Array) -> Array:

@@ -1,1 +1,1 @@
-"""Many scenes: their enumeration, the measures, the workers, and the table."""
+"""Sweeps over many scenes: their enumeration, measures, workers and tables."""

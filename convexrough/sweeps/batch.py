@@ -1,4 +1,4 @@
-"""What a worker is given: some scenes that follow each other, and what it gives back."""
+"""Batches: consecutive scenes that a worker computes together, and their rows."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from convexrough.sweeps.together import measured_together
 from convexrough.threads import one_thread
 from convexrough.version import __version__
 
-#: Rows are the same, bit for bit, where these are.
+#: With the same versions of these packages rows are the same, bit for bit.
 VERSIONS = {"convexrough": __version__, "numpy": np.__version__, "scipy": scipy.__version__}
 
 Columns = dict[str, NDArray[Any]]
 
-#: Status, message, and what was measured.
+#: Status, message, and measured numbers.
 Row = tuple[str, str, list[float]]
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Scenes that follow each other, and what is measured of them."""
+    """Consecutive scenes of a source, by their numbers, and the columns to measure."""
 
     source: Source
     columns: tuple[Column, ...]
@@ -45,14 +45,14 @@ class BatchRows(NamedTuple):
 
 
 def different(versions: Mapping[str, str]) -> str:
-    """Other versions than those here, in words; "" if they are the same."""
+    """The versions that differ from those of this process, in words; "" if none."""
     said = (f"{name} {versions.get(name)} instead of {here}" for name, here in VERSIONS.items()
             if versions.get(name) != here)  # fmt: skip
     return ", ".join(said)
 
 
 def compute(batch: Batch) -> BatchRows:
-    """The rows of a batch: each depends on its scene alone, and says why where that fails."""
+    """The rows of a batch. Each depends only on its scene; that of a failed scene has the error."""
     with one_thread:
         ask, asked, rows = batch.source.opened(), dict[int, Asked](), dict[int, Row]()
         for number in batch.numbers:
@@ -67,7 +67,10 @@ def compute(batch: Batch) -> BatchRows:
 
 
 def _row(asked: Asked, known: tuple[Numbers, str] | None, columns: tuple[Column, ...]) -> Row:
-    """known : what was measured of it together with others; None where it was not"""
+    """The row of one scene.
+
+    known : its numbers if it was measured together with others, else None
+    """
     try:
         wanted = {column.stage for column in columns}
         found, unsure = known or measured(asked.pressed(), asked.stages, wanted)

@@ -1,4 +1,4 @@
-"""Quantiles of what was measured against what was swept."""
+"""Figures of quantiles of a measured number against a swept key."""
 
 from __future__ import annotations
 
@@ -14,26 +14,27 @@ from convexrough.plots.notebook import Figure
 from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, legend_above
 from convexrough.sweeps.batch import Columns
 
-#: Where the bands end, and the line between them.
+#: Quantiles at the ends of the two bands, and of the line between them.
 AT = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: Points of the other swept keys that have a band each; more are taken together.
+#: Up to so many combinations of the other swept keys have their own bands; more are merged.
 MOST_BANDS = 4
 
-#: A drawn key has as many different values as seeds: they are taken together in bins.
+#: Number of bins for the many values of a random key.
 BINS = 20
 
-#: Colour, line and marker of each band: no two alike in grey.
+#: Colour, line and marker of each band; all differ also in grey.
 LOOKS = ((ROUGH, "-", "o"), (UNSURE, "--", "s"), ("0.25", ":", "^"), ("#4f8a4f", "-.", "D"))
 
 
 def draw_quantiles(
     columns: Columns, measured: str, over: str, others: Sequence[str], axes: Axes | None = None
 ) -> Axes:
-    """Bands from 5 to 95 % and from 25 to 75 %, and the median, of all rows that did not fail.
+    """Axes with the median and bands from 5 to 95 % and 25 to 75 %, of all rows that did not fail.
 
-    columns : these two, `status`, and the other swept keys that are not drawn: a band for each
-        combination of their values if these are few, else one for all together
+    columns : the columns `measured` and `over`, `status`, and the `others`
+    others  : other swept keys that are not random; each combination of their values has its own
+        bands if these are few
     """
     if axes is None:
         axes = Figure(figsize=(0.65 * DOUBLE, 3.0), layout="constrained").subplots()
@@ -51,7 +52,7 @@ def draw_quantiles(
 
 
 def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Columns]]:
-    """The rows of each band, and its name."""
+    """The name and the rows of each band."""
     if others:
         rows = np.array([columns[key] for key in others]).T
         different = np.unique(rows, axis=0)
@@ -82,7 +83,7 @@ def _draw_band(axes: Axes, x: Any, y: Array, name: str, look: tuple[str, str, st
 
 
 def _grouped(x: Any, y: Array) -> tuple[Any, list[Array]]:
-    """y at each x; or at the median of each bin, where there is one for each y or so."""
+    """The values x with all y at each; for many x, the median of each bin with all y in it."""
     different, back = np.unique(x, return_inverse=True)
     if len(different) <= max(BINS, len(y) // 4):
         return different, [y[back == i] for i in range(len(different))]

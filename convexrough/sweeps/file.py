@@ -1,4 +1,4 @@
-"""Sweep files: a scene file and a table of what varies in it, checked value by value."""
+"""Sweep files: a scene file with a table [sweep] of keys that vary, checked value by value."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from convexrough.sweeps.grid import Axis, Draw, Grid, Law
 from convexrough.sweeps.plan import Plan, planned
 from convexrough.sweeps.scenes import Tables
 
-#: Tables whose fractions name columns of the result: they are the same for every scene.
+#: Tables that cannot be swept: their fractions name columns, so they are the same in every scene.
 FIXED = ("shear", "cycle", "history")
 
 WHERE = ("together", "over", "draw")
@@ -35,7 +35,7 @@ def _are_seeds(seeds: int | list[int]) -> bool:
 
 
 def _is_law(table: dict[Law, list[float]]) -> bool:
-    """One law of two numbers that it takes."""
+    """Whether the table has one law with two valid numbers."""
     if len(table) != 1 or not all(len(pair) == 2 for pair in table.values()):
         return False
     [(law, (first, second))] = table.items()
@@ -61,7 +61,7 @@ _KEYS = expected('a table of keys of the scene file, such as "asperities.height_
 
 
 class Keys(FileTable):
-    """The table [sweep]: what varies, and what is measured."""
+    """The table [sweep]: keys that vary, and numbers to measure."""
 
     measure: _Names = Field(default_factory=list)
     seeds: _Seeds | None = None
@@ -71,7 +71,7 @@ class Keys(FileTable):
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Keys that are not to be swept, or twice; of lists taken together, the lengths."""
+        """Mistakes: keys that cannot be swept or are swept twice, and lists of unequal lengths."""
         yield from super().mistakes_between(keys)
         if "measure" not in keys:
             yield "measure", f"missing, expected {_NAMES}"
@@ -104,11 +104,11 @@ class Keys(FileTable):
 
 
 def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = None) -> Plan:
-    """Read and check a sweep file.
+    """The plan of a sweep file, checked.
 
-    measure : instead of what the file measures
+    measure : replaces the list in the file
 
-    Raises FileError where it cannot be read or is no TOML, and SceneFileError with every mistake.
+    Raises FileError if the file cannot be read or is not TOML; SceneFileError with every mistake.
     """
     path = Path(path)
     text = read_text(path, MOST_BYTES)
@@ -120,9 +120,9 @@ def plan_of(
 ) -> Plan:
     """The plan of the tables of a sweep file.
 
-    path : of the file, for messages and for what paths in it are relative to
+    path : of the file, for messages and for relative paths in it
 
-    Raises SceneFileError.
+    Raises SceneFileError with every mistake.
     """
     tables = {name: table for name, table in contents.items() if name != "sweep"}
     table = contents.get("sweep")
@@ -134,7 +134,7 @@ def plan_of(
     keys, mistakes = validate_table("sweep", table, Keys)
     mistakes += _nothing_random(_dict(table), tables)
     if keys is None or mistakes:
-        varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # not as they will be
+        varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # values still missing
         others = validate({name: it for name, it in tables.items() if name not in varied})[1]
         rest = [each for each in others if "missing table" not in each]
         raise SceneFileError(str(path), [*mistakes, *rest])
@@ -158,7 +158,7 @@ def _swept(table: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _nothing_random(table: Mapping[str, Any], tables: Mapping[str, Any]) -> Iterable[str]:
-    """Seeds of nothing random would compute one scene many times."""
+    """The mistake of seeds without anything random: all scenes would be the same."""
     given = {*_dict(tables.get("asperities"))}
     given |= {key.removeprefix("asperities.") for _, key in _swept(table)}
     rough = not given.isdisjoint({"height_std", "tip_radius_cv"})
@@ -170,7 +170,7 @@ def _nothing_random(table: Mapping[str, Any], tables: Mapping[str, Any]) -> Iter
 
 
 def _of_values(grid: Grid) -> tuple[Study | None, list[str]]:
-    """The first scene; every other value is checked in its place, so once."""
+    """The first scene, and the mistakes in all values, each checked once."""
     first = grid.point(0)
     study, mistakes = validate(grid.with_values(*first))
     for where, axes in (("together", grid.together), ("over", grid.over)):

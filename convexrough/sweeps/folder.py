@@ -1,7 +1,7 @@
-"""The folder of a sweep: a manifest that never changes, and parts, each written once and whole.
+"""The folder of a sweep: a manifest that never changes, and parts, each written once as a whole.
 
-A part is a Parquet file of some rows that follow each other, named by its first scene. All have as
-many, so that whoever computes a part, and when, writes the same file.
+A part is a Parquet file of consecutive rows, named by its first scene. All parts have the same
+number of rows, so each has the same content whichever process computes it, and when.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class Folder:
     manifest: Mapping[str, Any]
 
     def scenes(self, first: int) -> range:
-        """Those of the part that begins with this one."""
+        """The scenes of the part that begins with this one."""
         return range(first, min(first + self.manifest["batch"], self.manifest["scenes"]))
 
     def parts(self) -> list[range]:
-        """The scenes of each part, in their order; other files are not looked at."""
+        """The scenes of each part in the folder, in order; other files are ignored."""
         with file_errors(self.path / PARTS, "be read"):
             names = [each.stem for each in (self.path / PARTS).glob("*.parquet")]
         return [self.scenes(int(name)) for name in sorted(names, key=int) if name.isdecimal()]
@@ -43,18 +43,18 @@ class Folder:
         return self.path / PARTS / f"{part.start:012d}.parquet"
 
     def write(self, columns: Columns) -> None:
-        """Write a part, whole or not at all."""
+        """Write a part; an interruption leaves no incomplete part."""
         pyarrow, parquet = arrow()
         whole = BytesIO()
         parquet.write_table(pyarrow.table(columns), whole, write_page_checksum=True)
         write_text(self.file(self.scenes(int(columns["scene"][0]))), whole.getvalue())
 
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
-        """Some columns of a part, default all; FileError where it is damaged."""
+        """Some columns of a part, by default all. Raises FileError if it is damaged."""
         pyarrow, parquet = arrow()
         path = self.file(part)
         try:
-            # Threads of its own could outlive the interpreter, which ends the process by an abort.
+            # Threads of pyarrow could outlive the interpreter and abort the process.
             found = parquet.read_table(
                 path,
                 columns=None if names is None else list(names),
@@ -65,15 +65,15 @@ class Folder:
         except (OSError, pyarrow.ArrowException) as error:
             raise FileError(f"{path}: damaged ({error}); --resume computes it again") from error
         arrays = {name: found[name].to_numpy() for name in found.column_names}
-        return {  # text of pyarrow comes as objects
+        return {  # pyarrow returns text as objects
             name: values.astype(np.str_) if values.dtype == object else values
             for name, values in arrays.items()
         }
 
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
-        """Which parts are to be computed, and what was found; what is damaged is removed.
+        """The parts to compute, and a line on those found. Damaged parts are removed.
 
-        Raises FileError where something is there that is not to be gone on with.
+        Raises FileError if parts exist and `resume` is false.
         """
         known, damaged = {part.start for part in self.parts()}, 0
         there = [part for part in wanted if part.start in known]
@@ -105,23 +105,23 @@ class Folder:
 
 
 def open_folder(path: Path) -> Folder:
-    """A folder that holds a sweep; FileError if it does not."""
+    """The folder of an existing sweep. Raises FileError if there is none."""
     if not (path / MANIFEST).exists():
-        raise FileError(f"{path}: no sweep: there is no {MANIFEST}")
+        raise FileError(f"{path}: not a sweep: there is no {MANIFEST}")
     try:
         with file_errors(path / MANIFEST, "be read"):
             manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
         if not isinstance(manifest, dict) or manifest.get("schema") != 2:
-            raise ValueError("no sweep of this version")
+            raise ValueError("not a sweep of this version")
     except ValueError as error:
         raise FileError(f"{path / MANIFEST}: cannot be read: {error}") from error
     return Folder(path, manifest)
 
 
 def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
-    """The folder of this sweep, made where it is not there.
+    """The folder of this sweep, created if it does not exist.
 
-    Raises FileError where it holds another sweep, or other things, or cannot be written.
+    Raises FileError if it contains another sweep or other files, or cannot be written.
     """
     if overwrite and (path / MANIFEST).exists():
         for part in (path / PARTS).glob("*.parquet"):
@@ -130,10 +130,10 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
     if not (path / MANIFEST).exists():
         with file_errors(path, "hold results"):
             (path / PARTS).mkdir(parents=True, exist_ok=True)
-            # A manifest may come while this looks: of another process, of the same sweep or not.
+            # Another process may write a manifest meanwhile, of the same sweep or another.
             strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
         if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
-            raise FileError(f"{path}: holds {strangers[0]}, and no sweep; --out takes another")
+            raise FileError(f"{path}: holds {strangers[0]}, but no sweep; --out names another")
         if not (path / MANIFEST).exists():
             write_text(path / MANIFEST, to_json(manifest) + "\n")
     folder = open_folder(path)
@@ -144,7 +144,7 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
             f"--force overwrites it, --out takes another folder"
         )
     if other := different(there["versions"]):
-        raise FileError(f"{path}: was begun with {other}; rows would not be of one kind")
+        raise FileError(f"{path}: was begun with {other}; rows could differ")
     return folder
 
 
@@ -156,7 +156,7 @@ def _named(manifest: Mapping[str, Any]) -> str:
 
 
 def arrow() -> tuple[Any, Any]:
-    """pyarrow and its Parquet."""
+    """The modules pyarrow and pyarrow.parquet. Raises ExtraError if they are not installed."""
     try:
         import pyarrow
         import pyarrow.parquet

@@ -1,8 +1,8 @@
-"""Which scenes a sweep has, one after the other: lists, a grid, draws, seeds.
+"""The scenes of a sweep: combinations of listed values, random values and seeds.
 
-Scene number i has the values of a mixed-radix count: the lists taken together turn slowest, then
-the keys of the grid, the last fastest, and the seeds fastest of all. Nothing of the length of the
-sweep is ever stored.
+The number of a scene gives its values as the digits of a mixed-radix number: the lists taken
+together change slowest, then the keys of the grid, the last of them fastest, and the seeds fastest
+of all. Memory does not grow with the number of scenes.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ Law = Literal["uniform", "normal", "lognormal"]
 
 
 class Draw(NamedTuple):
-    """A random value, the same for every scene of one seed.
+    """The law of a random value, which is the same for all scenes with the same seed.
 
-    uniform: from `first` to `second`;  normal: mean and standard deviation;  lognormal: mean and
-    coefficient of variation. The last two are cut at six deviations, as random heights are.
+    first, second : of "uniform" the ends; of "normal" the mean and the standard deviation; of
+        "lognormal" the mean and the coefficient of variation. The last two laws are clipped at six
+        deviations, as random heights are
     """
 
     key: str
@@ -36,7 +37,7 @@ class Draw(NamedTuple):
     second: float
 
     def value(self, seed: int) -> float:
-        """Each key has a stream of its own, so that another draw leaves this one as it was."""
+        """The value for a seed. It does not depend on other random keys."""
         random = np.random.default_rng([seed, zlib.crc32(self.key.encode())])
         if self.law == "uniform":
             return float(random.uniform(self.first, self.second))
@@ -48,7 +49,7 @@ class Draw(NamedTuple):
 
 
 class Point(NamedTuple):
-    """What distinguishes one scene: its values by key, and its seed, None where there is none."""
+    """The values of one scene by key, and its seed, or None."""
 
     values: dict[str, Any]
     seed: int | None
@@ -58,11 +59,11 @@ class Point(NamedTuple):
 class Grid:
     """The points of a sweep.
 
-    tables : of the scene file, without what is swept
-    together : keys whose values, as many of each, are taken one after the other
+    tables : tables of the scene file, without swept keys
+    together : keys with lists of the same length, whose k-th values belong together
     over   : keys whose values are combined in every way
-    draws  : keys whose values are random
-    seeds  : of random heights, tip radii and draws; None where nothing is random
+    draws  : keys with random values
+    seeds  : of random heights, tip radii and draws; None if nothing is random
     """
 
     tables: Mapping[str, Mapping[str, Any]]
@@ -73,7 +74,7 @@ class Grid:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """All that is swept, in the order of the columns."""
+        """All swept keys, in the order of the columns."""
         return (*(key for key, _ in (*self.together, *self.over)), *(it.key for it in self.draws))
 
     def is_number(self, key: str) -> bool:
@@ -83,17 +84,17 @@ class Grid:
 
     @property
     def each(self) -> int:
-        """Scenes that differ by their seed alone."""
+        """The number of scenes that differ only in their seed."""
         return 1 if self.seeds is None else len(self.seeds)
 
     @property
     def count(self) -> int:
-        """How many scenes there are; `len` could not say 10^20."""
+        """The number of scenes, which may exceed the range of `len`."""
         tuples = len(self.together[0][1]) if self.together else 1
         return tuples * math.prod(len(values) for _, values in self.over) * self.each
 
     def point(self, number: int) -> Point:
-        """That of scene `number`, from 0."""
+        """The point of scene `number`, counted from 0."""
         number, turn = divmod(number, self.each)
         seed = None if self.seeds is None else int(self.seeds[turn])
         found: dict[str, Any] = {}

@@ -1,8 +1,8 @@
-"""What a sweep can measure: every number of the summary of a run, by its name or the end of it.
+"""The numbers that a sweep can measure: those in the summary of a run, by name or its end.
 
-`cycle.loss` is the loss of each cycle; so is `loss`, if no stage before has one. Columns are named
-by the measure and the row of the summary: `loss_0.37` is that of the cycle between +-0.37 f P,
-`history.loss_2` that of the third force of a history.
+`cycle.loss` is the loss of each cycle, and so is `loss` if no earlier stage has such a number. The
+name of a column is that of the measure and of the row of the summary: `loss_0.37` is the loss of
+the cycle between +-0.37 f P, `history.loss_2` that at the third force of a history.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from convexrough.tabular.units import UnitNames
 
 Stages = Mapping[str, Stage]
 
-#: Every number, by its name and row.
+#: Numbers by name and row.
 Numbers = dict[tuple[str, str], float]
 
 #: Quantiles, over the loaded asperities, of the force at which they start to slide, over f P.
 ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
-#: What can go wrong in a scene without anything being wrong with the others.
+#: Errors of one scene that do not affect the others.
 FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 
 #: Keys of a scene file that are lengths.
@@ -35,7 +35,7 @@ LENGTHS = ("radius", "spacing", "tip_radius", "within", "height_std")
 
 
 class Column(NamedTuple):
-    """A column of a table, the number of a summary in it, and the row of that."""
+    """The name of a column, with the name and row of its number in a summary."""
 
     name: str
     number: str
@@ -47,9 +47,9 @@ class Column(NamedTuple):
 
 
 def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> tuple[Numbers, str]:
-    """Every number of the stages that are wanted, and why they are not certified, "" if they are.
+    """The numbers of the wanted stages, and the reasons why these are not certified, or "".
 
-    Whether the contact is certified is always asked.
+    The stage "normal" is always computed.
     """
     found: Numbers = {}
     doubts: list[str] = []
@@ -82,15 +82,16 @@ def _numbers(
 
 
 def row_label(ends: Sequence[float]) -> str:
-    """What tells a row apart: a force; or the ends of a cycle, the maximum alone if symmetric."""
+    """The label of a row: a force; or the ends of a cycle, only the maximum if symmetric."""
     *first, last = ends
     return "_".join(f"{float(it)!r}" for it in (*(it for it in first if it != -last), last))
 
 
 def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
-    """The columns of each measure: the first number of that name. Raises InputError.
+    """The columns of each measure, which is the first number of this name.
 
-    No stage is computed beyond the one in which the last of them is found.
+    Stages after the last one that is needed are not computed. Raises InputError for a measure
+    without a number.
     """
     rows: dict[str, list[str]] = {}
 
@@ -114,7 +115,7 @@ def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[C
 
 
 def unit(name: str, units: UnitNames) -> str:
-    """What a number of a summary, or a key of a file, is in; "" where that has no name."""
+    """The unit of a number of a summary or of a key of a file; "" if unknown."""
     end = name.rpartition(".")[2]
     if name.startswith("gradient."):
         return ""

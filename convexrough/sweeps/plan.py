@@ -1,4 +1,4 @@
-"""What a sweep computes: its scenes, the columns of its table, and the size of its parts."""
+"""`Plan`: the scenes of a sweep, the columns of its table, and the size of its parts."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from convexrough.sweeps.scenes import Source, Tables
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
-#: Scenes of a batch, at most; asperities in it, about; and batches of a small sweep.
+#: Limits of a batch: scenes, and about so many asperities; and the number of batches aimed at.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
 
-#: Scenes that are tried for what can be measured, where the first ones fail.
+#: Number of scenes that are tried to find the measurable numbers, if the first ones fail.
 TRIED = 5
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a sweep computes.
+    """The computation of a sweep.
 
-    size     : scenes of each batch, and part;  left_out : stages of which nothing is measured
-    identity : the SHA-256 of all that its numbers depend on
-    said     : what it was read from, for its manifest;  units : as its file names them
+    size     : scenes per batch and part;  left_out : stages without a measured number
+    identity : the SHA-256 of all input on which the numbers depend
+    said     : entries of the manifest on the origin of the sweep;  units : those of its file
     """
 
     source: Source
@@ -41,7 +41,7 @@ class Plan:
 
     @property
     def parts(self) -> int:
-        """How many."""
+        """The number of parts."""
         return -(-self.source.count // self.size)
 
     def part(self, number: int) -> range:
@@ -52,9 +52,9 @@ class Plan:
         return Batch(self.source.part(part), self.columns, part)
 
     def manifest(self) -> dict[str, Any]:
-        """What a folder says of its sweep; the same whenever it is made.
+        """The contents of manifest.json, which do not depend on the time.
 
-        each : scenes that differ by their seed alone
+        Its entry "each" is the number of scenes that differ only in their seed.
         """
         grid = self.source.grid if isinstance(self.source, Tables) else None
         labels = list(self.source.labels(range(0)))
@@ -82,11 +82,12 @@ def planned(
     units: UnitNames,
     **given: Any,
 ) -> Plan:
-    """The plan of scenes; the first of them says what can be measured, and how large they are.
+    """The plan for scenes; the first one gives the measurable numbers and the size of batches.
 
-    given : all that their numbers depend on, but for what is measured and this package
+    given : all input on which the numbers depend, except measures and version
 
-    Raises InputError where a measure is not there, and what the first scenes raise if all fail.
+    Raises InputError for an unknown measure, and the error of the first scenes if all of these
+    fail.
     """
     ask = source.part(range(tried := min(source.count, TRIED))).opened()
     for number in range(tried):

@@ -26,18 +26,19 @@ from convexrough.errors import ExtraError, InputError, WorkerError
 from convexrough.sweeps.batch import VERSIONS, Batch, BatchRows, Columns, compute, different
 from convexrough.threads import cores
 
-#: Batches that an executor is given at once; for each process here: more are lost with one.
+#: Number of batches submitted at once to an executor, and per local process: a process that dies
+#: loses its batches.
 AT_ONCE, EACH = 1000, 2
 
-#: Batches whose worker died after which no worker lives.
+#: Number of lost batches after which the sweep ends.
 MOST_LOST = 64
 
 
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
-    """The rows of batches, as they come.
+    """The rows of batches, in order of completion.
 
-    A batch whose worker died is computed again, alone, after the others. Raises WorkerError where
-    its worker dies again, or where no worker is left.
+    A batch whose worker died is computed again, alone, after the others. Raises WorkerError if its
+    worker dies again, or if no worker is left.
     """
     lost = yield from _together(iter(batches), executor)
     dead = []
@@ -45,13 +46,13 @@ def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
         dead += yield from _together(iter((batch,)), executor)
     if dead:
         which = ", ".join(map(str, dead))
-        raise WorkerError(f"the process that computed scenes {which} died, twice")
+        raise WorkerError(f"the process that computed scenes {which} died twice")
 
 
 def _together(
     batches: Iterator[Batch], executor: Executor
 ) -> Generator[Columns, None, list[Batch]]:
-    """The rows of batches, in any order; and those whose workers died."""
+    """The rows of batches, in any order; returns the batches whose workers died."""
     most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
     pending: dict[Future[BatchRows], Batch] = {}
     lost: list[Batch] = []
@@ -68,30 +69,30 @@ def _together(
                 except _lost() as error:
                     lost.append(batch)
                     if len(lost) > MOST_LOST:
-                        raise WorkerError(f"workers die as soon as they live: {error}") from error
+                        raise WorkerError(f"all workers die soon after start: {error}") from error
                     continue
                 if rows.versions != VERSIONS:
                     raise WorkerError(f"a worker has other versions: {different(rows.versions)}")
                 yield rows.columns
-    except BrokenExecutor as error:  # it takes nothing more, and is not ours to start anew
-        raise WorkerError(f"the executor is of no use any more: {error}") from error
+    except BrokenExecutor as error:  # the caller's executor cannot be restarted here
+        raise WorkerError(f"the executor is broken: {error}") from error
     except CancelledError as error:
-        raise WorkerError("a batch was dropped: is its scheduler gone?") from error
+        raise WorkerError("a batch was cancelled: check that the scheduler runs") from error
     finally:
         for future in pending:
             future.cancel()
 
 
 def _lost() -> tuple[type[BaseException], ...]:
-    """What a future raises where workers died with its batch: those of Dask have an error more."""
+    """The exceptions of a future whose worker died."""
     distributed = sys.modules.get("distributed")
     return (BrokenExecutor, *((distributed.KilledWorker,) if distributed else ()))
 
 
 class Processes(Executor):
-    """Processes of this machine, new ones where some died.
+    """Processes on this machine; those that die are replaced.
 
-    They are started as new interpreters, so that no lock or thread is inherited.
+    Each is a new interpreter, so that it inherits no locks or threads.
     """
 
     def __init__(self, workers: int | None = None) -> None:
@@ -114,15 +115,15 @@ class Processes(Executor):
                 return self._pool.submit(function, *given, **named)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = True) -> None:
-        """Ends the processes at once, whatever they are about."""
+        """End the processes at once, without waiting for their batches."""
         self._leash.close()
         self._pool.shutdown(wait, cancel_futures=cancel_futures)
 
 
 def _end_with(pipe: Any) -> None:
-    """Let this process end with the process that started it, and not by an interrupt.
+    """Make this process end with its parent process, and ignore interrupts.
 
-    pipe : one end of a pipe whose other end only that process has
+    pipe : one end of a pipe; only the parent has the other end
     """
 
     def watch() -> None:
@@ -136,9 +137,10 @@ def _end_with(pipe: Any) -> None:
 
 @contextmanager
 def _sheltered() -> Iterator[None]:
-    """New processes do not run the user's script, which need not be guarded, and no interrupt.
+    """Inside this context new processes do not run the user's script, and ignore interrupts.
 
-    A terminal interrupts them, too, and what is blocked here they have blocked for ever.
+    So scripts need no guard. A terminal interrupts child processes, too; they inherit the signals
+    blocked here.
     """
     script = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
@@ -154,12 +156,12 @@ def _sheltered() -> Iterator[None]:
 
 @contextmanager
 def dask(address: str) -> Iterator[Executor]:
-    """The workers of a Dask scheduler, which may come and go.
+    """An executor on the workers of a Dask scheduler, which may join and leave.
 
     address : of the scheduler, "tcp://host:port"; or its file, "scheduler.json"; or "local" for a
-        cluster of its own on this machine
+        new cluster on this machine
 
-    Raises ExtraError where Dask is not installed, and InputError where no scheduler answers.
+    Raises ExtraError if Dask is not installed; InputError if no scheduler answers.
     """
     try:
         from distributed import Client

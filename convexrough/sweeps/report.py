@@ -1,4 +1,4 @@
-"""What a sweep says: for programs, and in aligned lines for people."""
+"""Results of the command `sweep`: printed lines, JSON, tables and figures."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from convexrough.sweeps.sweep import Done
 from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
-#: Quantiles in print, rows of a table in print, failed scenes that are named, and figures drawn.
+#: Printed quantiles, and the largest numbers of printed rows, of printed failures and of figures.
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 
 def summarise(table: SweepTable, done: Done | None = None) -> Summary:
-    """What is there, and what this call did."""
+    """The contents of `--json`: the state of the table, and the work of this call."""
     said: Summary = {
         "folder": str(table.folder.path) if table.folder else None,
         "hash": table.manifest["sweep"],
@@ -37,7 +37,7 @@ def summarise(table: SweepTable, done: Done | None = None) -> Summary:
 
 
 def describe(summary: Summary) -> list[str]:
-    """Aligned lines."""
+    """The printed lines of a summary."""
     it = summary["sweep"]
     lines = [("scenes", f"{it['scenes']:,}"), ("rows", f"{it['rows']:,}")]
     lines += [(f"  {status}", f"{it[status]:,}") for status in ("certified", "undecided", "failed")]
@@ -52,17 +52,17 @@ def describe(summary: Summary) -> list[str]:
 
 
 def describe_quantiles(found: Columns) -> list[str]:
-    """A table of the first rows."""
+    """The printed table of the first quantiles."""
     heads = [f"{float(name):.0%}" if name[0] in "01" else name for name in found]
     rows = list(zip(*(values.tolist() for values in found.values()), strict=True))
     lines = aligned([heads, *rows[:MOST_ROWS]], left=heads.index("quantity") + 1)
     if len(rows) > MOST_ROWS:
-        lines.append(f"and {len(rows) - MOST_ROWS:,} rows more: --out DIR writes all of them")
+        lines.append(f"and {len(rows) - MOST_ROWS:,} more rows: --out DIR writes all of them")
     return lines
 
 
 def failures(table: SweepTable) -> list[str]:
-    """The first scenes that failed, and why."""
+    """The messages of the first scenes that failed."""
     named: list[str] = []
     for block in table.blocks(["scene", "status", "message"]):
         for row in np.flatnonzero(block["status"] == "failed")[: MOST_NAMED - len(named)]:
@@ -73,7 +73,7 @@ def failures(table: SweepTable) -> list[str]:
 def write_summary(
     folder: Path, table: SweepTable, found: Columns, *, overwrite: bool = False
 ) -> list[Path]:
-    """quantiles.csv, and a figure of each measured quantity over each swept one."""
+    """The files written: quantiles.csv, and figures of measured quantities over swept keys."""
     pairs = [(name, key) for key in table.swept for name in table.measured][:MOST_FIGURES]
     with results_folder(folder, force=overwrite) as new:
         figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
@@ -81,7 +81,7 @@ def write_summary(
 
 
 def progress_kept(folder: Path, plan: Plan) -> str:
-    """What a folder holds of a sweep that was cut short, and how to go on."""
+    """A line on the rows of an interrupted sweep in a folder, and on how to continue."""
     if not (folder / MANIFEST).exists():
         return "nothing was computed yet"
     rows = len(open_sweep(folder))

@@ -1,4 +1,4 @@
-"""The scenes of a sweep, from tables of a file or objects, and what is asked of each."""
+"""The scenes of a sweep, from the tables of a file or from objects, with their stages."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from convexrough.sweeps.measures import Stages
 if TYPE_CHECKING:
     from convexrough.run.study import Study
 
-#: Layouts of asperities that are kept for the scenes to come.
+#: Number of layouts of asperities in the cache.
 KEPT = 8
 
 
 @dataclass(frozen=True)
 class Asked:
-    """A scene, what presses it, and what is asked of the contact.
+    """A scene, its prescribed approach or load, and the stages to compute.
 
-    approach [length] or load [force], solver, influence, highest : as of a `SceneFile`
+    approach [length], load [force], solver, influence, highest : as in `SceneFile`
     """
 
     scene: Scene
@@ -46,11 +46,11 @@ class Asked:
 
     @property
     def plain(self) -> bool:
-        """It is pressed as `press` does unless told otherwise."""
+        """True if the solver and the compliance operator are the defaults of `press`."""
         return self.solver == "newton" and self.influence in (None, "dense")
 
     def pressed(self) -> Contact:
-        """Raises what `press` raises."""
+        """The contact. Raises the errors of `press`."""
         problem = NormalProblem.assemble(
             self.scene,
             approach=self.approach,
@@ -61,10 +61,10 @@ class Asked:
         return solve(problem, named(self.solver))
 
 
-#: From the number of a scene to what is asked of it.
+#: A function from the number of a scene to the scene and its stages.
 Ask = Callable[[int], Asked]
 
-#: What stands in the column of seeds where nothing is random.
+#: The entry of the column `seed` if nothing is random.
 NO_SEED = -1
 
 
@@ -72,7 +72,7 @@ NO_SEED = -1
 class Tables:
     """Scenes of a grid over the keys of a scene file.
 
-    path : of the file, for messages and for what paths in it are relative to
+    path : of the file, for messages and for relative paths in it
     """
 
     grid: Grid
@@ -83,7 +83,7 @@ class Tables:
         return self.grid.count
 
     def labels(self, numbers: range) -> dict[str, NDArray[Any]]:
-        """The columns that say which scenes these are: what is swept, and the seed."""
+        """The columns that identify scenes: the swept keys, and the seed."""
         points = [self.grid.point(number) for number in numbers]
         known = self.grid.tables.get("asperities", {}).get("seed", NO_SEED)
         seeds = [known if each.seed is None else each.seed for each in points]
@@ -92,16 +92,16 @@ class Tables:
             values = [each.values[key] for each in points]
             if self.grid.is_number(key):
                 swept[key] = np.array(values, dtype=np.float64)
-            else:  # lists as they stand in the file
+            else:  # lists as in the file
                 swept[key] = np.array([it if isinstance(it, str) else repr(it) for it in values])
         return swept | {"seed": np.array(seeds, dtype=np.int64)}
 
     def part(self, numbers: range) -> Tables:
-        """What a worker needs to know for these numbers, which stay the same."""
+        """The source for a worker that computes the scenes with these numbers."""
         return self
 
     def opened(self) -> Ask:
-        """How to make scenes; those one after the other share what they have in common."""
+        """A function that makes scenes by number; consecutive scenes share common data."""
         layouts = Layouts(*map(lru_cache(KEPT), READ))
         last: dict[str, Any] = {}
 
@@ -122,7 +122,7 @@ class Tables:
         return ask
 
     def _study(self, number: int, last: dict[str, Any]) -> Study:
-        """The tables of a scene; of those that differ by a seed alone, checked once."""
+        """The tables of a scene; those of scenes that differ only in the seed are checked once."""
         from convexrough.run.study import Lattice, validate
 
         point = self.grid.point(number)
@@ -142,7 +142,7 @@ class Tables:
 class Objects:
     """Scenes made in Python, each with its approach [length] or load [force].
 
-    first : the number of the first of them
+    first : number of the first scene
     """
 
     scenes: Sequence[Scene]

@@ -1,4 +1,4 @@
-"""`sweep`: every scene of a plan measured, by whoever computes, into one table."""
+"""`sweep`: measures many scenes, with local processes or any executor, into one table."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from convexrough.sweeps.scenes import Objects
 from convexrough.sweeps.table import SweepTable
 from convexrough.tabular.units import UnitNames
 
-#: A file, its contents, or scenes.
+#: A sweep file, its contents, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
 
-#: Scenes that one call computes at most; of a larger sweep a part may be asked for.
+#: Largest number of scenes that one call computes; larger sweeps are computed in parts.
 MOST = 10**8
 
 
@@ -51,11 +51,11 @@ def sweep(
     cycle: Sequence[float] = (),
     shear: Sequence[float] = (),
 ) -> SweepTable:
-    """Measure many scenes.
+    """The table of measured numbers of many scenes.
 
-    what     : a sweep file; or the tables of one, as a mapping; or scenes, with `approach` [length]
-        or `load` [force], one for all or one for each, and the amplitudes of `cycle` and forces of
-        `shear` as fractions of f P
+    what     : a sweep file; or its tables, as a mapping; or scenes
+    approach, load : for scenes, [length] and [force]; one of them, a number for all or one for each
+    cycle, shear : for scenes, amplitudes of cycles and shear forces as fractions of f P
     measure  : numbers of a run's summary, by name or its end; replaces the list of a file
     out      : folder for the results; default: they are only returned
     executor : any executor of `concurrent.futures`; default: processes
@@ -66,8 +66,8 @@ def sweep(
     The table is the same, bit for bit, for any executor, order and number of interruptions. The row
     of a failed scene has the reason.
 
-    Raises FileError and InputError for wrong input before anything is computed, and WorkerError
-    where a worker died twice with the same scenes, or no worker is left.
+    Raises FileError and InputError for wrong input, before anything is computed; WorkerError if
+    workers died twice with the same scenes, or if no worker is left.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
     >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)
@@ -78,7 +78,7 @@ def sweep(
     if isinstance(what, (str, os.PathLike, Mapping)):
         for name, value in given.items():
             if value is not None:
-                raise InputError(name, found="given", expected="in the tables of the sweep")
+                raise InputError(name, found="given", expected="none: the sweep tables have it")
         from convexrough.sweeps.file import plan_of, read_sweep  # it loads pydantic
 
         if isinstance(what, Mapping):
@@ -99,7 +99,7 @@ def sweep(
 
 @dataclass(frozen=True)
 class Done:
-    """A table, what was found before, and how many scenes were computed in how many seconds."""
+    """A table, a line on the rows found before, the number of computed scenes, and the time [s]."""
 
     table: SweepTable
     found: str
@@ -116,7 +116,7 @@ def run(
     overwrite: bool = False,
     part: tuple[int, int] | None = None,
 ) -> Done:
-    """`sweep` of a plan; its arguments are as there."""
+    """The result of a plan; arguments as for `sweep`."""
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
     if out is not None:
@@ -140,20 +140,20 @@ def run(
 
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
-    """The k-th of n shares of the parts, or all."""
+    """The scenes of the k-th of n shares of the parts, or of all parts."""
     k, n = part or (1, 1)
     if not 1 <= k <= n:
         raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
     first, stop = plan.parts * (k - 1) // n, plan.parts * k // n
     if (count := (stop - first) * plan.size) > MOST:
-        expected = f"at most {MOST:,} at once; a part of the sweep (K/N) may be that small"
+        expected = f"at most {MOST:,} at once: compute the sweep in parts (K/N)"
         where = str(plan.said["source"])
         raise InputError("scenes", found=f"about {count:,}", expected=expected, where=where)
     return [plan.part(number) for number in range(first, stop)]
 
 
 def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
-    """The rows themselves, with progress reported on the way."""
+    """The same rows; the progress is logged."""
     began, done, failed = time.monotonic(), 0, 0
     for columns in found:
         yield columns
@@ -166,7 +166,7 @@ def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
 
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
-    """Of tables with these values."""
+    """The stages with these fractions of f P."""
     from convexrough.run.stages import Cycle, Normal, Shear
     from convexrough.run.study import validate_table
 

@@ -1,4 +1,4 @@
-"""The table of a sweep: in a folder, part by part, or held as it was computed."""
+"""The table of a sweep, in the parts of a folder or in memory."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-#: Quantiles that are asked for where none are named.
+#: The default quantiles.
 USUAL = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: [bytes] of one cell of a table in memory, with what a data frame takes beside it.
+#: [bytes] memory per cell of a table, including a data frame of it.
 CELL = 24
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
-    """The table of a sweep in a folder, finished or not. Nothing is read before it is asked for.
+    """The table of a sweep in a folder, finished or not. Rows are read only when needed.
 
-    Raises FileError where there is no sweep.
+    Raises FileError if the folder contains no sweep.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -46,13 +46,13 @@ def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SweepTable(Record):
-    """A row for each scene, in the order of the sweep; scenes not computed yet are not there.
+    """A table with a row for each computed scene, in the order of the sweep.
 
-    manifest : what it is the table of;  folder : where it lies, None where it is held in memory
+    manifest : description of the sweep;  folder : folder of the parts, None if in memory
 
-    Columns: `scene`, its number; what is swept; `seed`, -1 where nothing is random; `status`,
-    "certified", "undecided" or "failed"; `message`, why; and what was measured, nan where that
-    failed.
+    The columns are `scene` (its number), the swept keys, `seed` (-1 if nothing is random), `status`
+    ("certified", "undecided" or "failed"), `message` (the reason), and the measured numbers (nan if
+    failed).
 
     >>> loads = [1e-7, 2e-7, 3e-7]
     >>> table = cr.sweep([scene] * 3, load=loads, measure=["contact"], workers=1)
@@ -70,12 +70,12 @@ class SweepTable(Record):
 
     @property
     def swept(self) -> list[str]:
-        """The keys that vary, drawn ones last."""
+        """The keys that vary, those with random values last."""
         return self.columns[1 : self.columns.index("seed")]
 
     @property
     def points(self) -> list[str]:
-        """The swept keys that are not drawn: their values are the points of the grid."""
+        """The swept keys without random values; combinations of their values are grid points."""
         return [key for key in self.swept if key not in self.manifest["drawn"]]
 
     @property
@@ -84,34 +84,34 @@ class SweepTable(Record):
 
     @property
     def scenes(self) -> int:
-        """How many the sweep has."""
+        """The number of scenes of the sweep."""
         return int(self.manifest["scenes"])
 
     @property
     def complete(self) -> bool:
-        """Every scene is there."""
+        """True if every scene has a row."""
         return len(self) == self.scenes
 
     def __len__(self) -> int:
-        """How many rows there are."""
+        """The number of rows."""
         if self.in_memory is not None:
             return len(self.in_memory["scene"])
         return sum(map(len, self._parts()))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
-        """Some columns, default all, a part after the other: for what exceeds memory."""
+        """Some columns, by default all, one part at a time, for tables that exceed memory."""
         self._refuse_unknown(names or ())
         if self.in_memory is not None:
             yield {name: self.in_memory[name] for name in names or self.columns}
             return
-        assert self.folder is not None  # or it is held
+        assert self.folder is not None  # else the table is in memory
         for part in self._parts():
             yield self.folder.read(part, names)
 
     def read(self, names: Sequence[str] | None = None) -> Columns:
-        """Some columns, default all, as arrays.
+        """Some columns, by default all, as arrays.
 
-        Raises InputError where they do not fit in memory, and for names that are not there.
+        Raises InputError if they do not fit in memory, and for unknown names.
         """
         wanted = self.columns if names is None else list(names)
         checks.fits_in_memory("rows", len(self), CELL * len(wanted))
@@ -121,7 +121,7 @@ class SweepTable(Record):
         return {name: np.concatenate([block[name] for block in blocks]) for name in wanted}
 
     def counts(self) -> dict[str, int]:
-        """How many rows have each status."""
+        """The number of rows with each status."""
         counts = dict.fromkeys(("certified", "undecided", "failed"), 0)
         for block in self.blocks(["status"]):
             for status in counts:
@@ -129,10 +129,10 @@ class SweepTable(Record):
         return counts
 
     def to_dataframe(self, columns: Sequence[str] | None = None) -> pandas.DataFrame:
-        """A data frame of pandas, of some columns or all.
+        """A data frame of pandas with some columns, by default all.
 
-        Raises ExtraError where pandas is not installed, InputError where it does not fit in memory:
-        `to_dask` need not.
+        Raises ExtraError if pandas is not installed; InputError if the table does not fit in
+        memory, for which `to_dask` is made.
         """
         variables: frames.Variables = {
             name: (("row",), values) for name, values in self.read(columns).items()
@@ -141,9 +141,10 @@ class SweepTable(Record):
         return frames.dataframe(variables, attributes)
 
     def to_dask(self, columns: Sequence[str] | None = None) -> dask.dataframe.DataFrame:
-        """A data frame of Dask, of some columns or all: parts are read when they are needed.
+        """A data frame of Dask with some columns, by default all; parts are read when needed.
 
-        Raises ExtraError where Dask is not installed, InputError where there are no parts.
+        Raises ExtraError if Dask is not installed; InputError if the table has no parts in a
+        folder.
         """
         try:
             import dask.dataframe
@@ -160,11 +161,12 @@ class SweepTable(Record):
     def plot(
         self, measured: str | None = None, over: str | None = None, axes: Axes | None = None
     ) -> Axes:
-        """Bands of quantiles of something measured against something swept.
+        """Axes with bands of quantiles of a measured number against a swept key.
 
-        Default: the first of each. What is swept beside it has bands of its own, if there are few.
+        measured, over : names of columns; default: the first of each kind. Combinations of other
+            swept keys have their own bands if these are few
 
-        Raises InputError where nothing is swept, and for names that are not there.
+        Raises InputError if nothing is swept, and for unknown names.
         """
         from convexrough.plots.style import label, literal  # it loads matplotlib
         from convexrough.sweeps.figures import draw_quantiles
@@ -183,10 +185,12 @@ class SweepTable(Record):
     def quantiles(
         self, measured: Sequence[str] | None = None, at: Sequence[float] = USUAL
     ) -> Columns:
-        """A row for each point of the grid and each quantity, from the rows that are there.
+        """Quantiles over seeds, with a row for each grid point and each measured number.
 
-        Columns: the swept keys that are not drawn; `quantity`; `scenes`, those computed, and
-        `failed` of them, which do not count; a column for each quantile, nan where all failed.
+        measured : names of columns, by default all;  at : quantiles, from 0 to 1
+
+        The columns are those of `points`, `quantity`, `scenes` (number computed), `failed` (number
+        of these without results), and one for each quantile, nan if all scenes failed.
         """
         names = self.measured if measured is None else list(measured)
         about = self.read([*self.points, "scene", "status"])
@@ -207,20 +211,20 @@ class SweepTable(Record):
         return {head: np.array([row[i] for row in rows]) for i, head in enumerate(heads, 1)}
 
     def _said(self, name: str) -> str:
-        """A column in words, with its unit."""
+        """The label of a column, with its unit."""
         table, _, key = name.rpartition(".") if name in self.swept else ("", "", name)
         label = (f"{table}: {key}" if table else key).replace("_", " ")
         unit = self.manifest["units"].get(name, "")
         return f"{label} ({unit})" if unit else label
 
     def _parts(self) -> list[range]:
-        assert self.folder is not None  # or it is held
+        assert self.folder is not None  # else the table is in memory
         return self.folder.parts()
 
     def _refuse_unknown(self, names: Iterable[str]) -> None:
         for name in names:
             if name not in self.columns:
-                expected = f"one of the table: {checks.nearest(name, self.columns)}"
+                expected = f"a column of the table: {checks.nearest(name, self.columns)}"
                 raise InputError("column", found=repr(name), expected=expected)
 
     def _rows(self) -> Iterator[tuple[str, str]]:

@@ -1,6 +1,6 @@
-"""Scenes of a batch that are pressed and cycled together, in rows of one stack.
+"""Scenes of a batch that are pressed and cycled together, as rows of one stack.
 
-Only where all that is measured is known of rows: the numbers of `NORMAL` and `CYCLE`.
+This is possible if only the numbers of `NORMAL` and `CYCLE` are measured.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ def _count(status: str) -> Callable[[Found], Array]:
     return lambda found: (found["status"] == status).sum(axis=1)
 
 
-#: Numbers of summaries, from what rows find. Beside the names of `Contacts` and `Cycles`: force
-#: amplitudes, displacement amplitudes where proved, and losses and scales of smooth spheres.
+#: Numbers of summaries from the arrays of `Contacts` and `Cycles`, and from four more: "amplitudes"
+#: (force), "moved" (proved displacement amplitudes), "smooth" and "scales" (losses of spheres).
 NORMAL: dict[str, Callable[[Found], Array]] = {
     **{name: _count(name) for name in ("contact", "open", "undecided")},
     "approach": lambda found: found["approaches"],
@@ -54,7 +54,7 @@ KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYC
 def measured_together(
     asked: Mapping[int, Asked], columns: Sequence[Column]
 ) -> dict[int, tuple[Numbers, str]]:
-    """`measured` of the scenes that rows prove, by their numbers."""
+    """The result of `measured` for the scenes that are proved in rows, by their numbers."""
     if not {column.number for column in columns} <= KNOWN:
         return {}
     groups: dict[tuple[int, bool, int], list[int]] = {}
@@ -76,13 +76,13 @@ def measured_together(
                 mine = [some[k] for k in rows.places.tolist()]
                 for k, known in _known(rows, mine, columns).items():
                     found[numbers[rows.places[k]]] = known, ""
-        except FAILURES:  # it is some scene's: one by one they say whose
+        except FAILURES:  # some scene caused it; each is then measured alone
             continue
     return found
 
 
 def _cycle(asked: Asked, columns: Sequence[Column]) -> Cycle | None:
-    """The cycles of a scene, if any is measured."""
+    """The stage of cycles of a scene if any of its numbers is measured, else None."""
     stage = asked.stages.get("cycle")
     wanted = any(column.stage == "cycle" for column in columns)
     return stage if wanted and isinstance(stage, Cycle) else None
@@ -91,7 +91,7 @@ def _cycle(asked: Asked, columns: Sequence[Column]) -> Cycle | None:
 def _known(
     rows: PressedRows, asked: Sequence[Asked], columns: Sequence[Column]
 ) -> dict[int, Numbers]:
-    """The numbers of those rows that are certified."""
+    """The numbers of the certified rows, by their positions."""
     contacts = rows.contacts()
     good = ~(contacts["status"] == "undecided").any(axis=1)
     normal = {name: number(contacts) for name, number in NORMAL.items()}

@@ -81,19 +81,6 @@ def test_histories_where_order_fails() -> None:
         assert abs(path.losses[i] - true) <= path.loss_errors[i] + 2e-5 * true
 
 
-@pytest.mark.parametrize("load", [3.0, 3.5, 4.0])
-def test_no_proof_of_a_loss_where_order_fails(load: float) -> None:
-    """A refusal is right, and a proof of the state of one step."""
-    contact = around(load)
-    for fraction in (0.3, 0.8):
-        try:
-            proof = contact.proof(sheared=[cr.shear(contact, force=fraction * 0.5 * load)])
-        except cr.ProofError:
-            continue
-        claim = proof.document["claims"]["shear"][0]
-        assert (claim["order"], claim["loss"]) == ("proved for one step", None)
-
-
 def test_no_false_word_near_gross_sliding() -> None:
     """P lacks more than the small one could ever take back, so the large one cannot slide."""
     contact = inside(1e-3, 1e-5)

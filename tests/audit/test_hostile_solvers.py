@@ -65,7 +65,7 @@ WRONG: dict[str, Spoil] = {
 CONTROLS = [{"approach": PAPER_APPROACH}, {"load": 2e-7}]
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("control", CONTROLS, ids=["approach", "load"])
 @pytest.mark.parametrize("kind", NO_LOADS)
 def test_what_are_no_loads_is_an_error(kind: str, control: Any) -> None:
@@ -76,7 +76,7 @@ def test_what_are_no_loads_is_an_error(kind: str, control: Any) -> None:
 @pytest.mark.parametrize("control", CONTROLS, ids=["approach", "load"])
 @pytest.mark.parametrize("kind", WRONG)
 @pytest.mark.parametrize("name", ["paper", "rough, closest"])
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 def test_wrong_loads_are_never_called_right(name: str, kind: str, control: Any) -> None:
     """By bounds that hold for them all the same, and not by luck: twenty each."""
     scene, _ = NAMED[name]
@@ -91,7 +91,7 @@ def test_wrong_loads_are_never_called_right(name: str, kind: str, control: Any) 
             require(status != "open" or gap > 0, "open of one that touches")
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("control", CONTROLS, ids=["approach", "load"])
 @pytest.mark.parametrize("approach", [0.0, 1.0, np.nan, np.inf, -1e300])
 def test_an_approach_that_the_loads_exclude_is_not_reported(approach: float, control: Any) -> None:

@@ -144,23 +144,6 @@ def test_histories_against_springs_with_sliders(fractions: list[float]) -> None:
 
 
 @settings(max_examples=20, deadline=None)
-@given(st.lists(st.floats(-1, 1), min_size=2, max_size=30), st.integers(1, 28))
-def test_stopping_on_the_way_changes_nothing(fractions: list[float], where: int) -> None:
-    """A stop between two forces is no turning point: same states and energy afterwards."""
-    contact = pressed("rough")
-    forces = np.array(fractions) * limit_of(contact)
-    where = min(where, len(forces) - 1)
-    stop = 0.3 * forces[where - 1] + 0.7 * forces[where]
-    plain = cr.history(contact, forces=forces)
-    stopped = cr.history(contact, forces=np.insert(forces, where, stop))
-    keep = np.delete(np.arange(len(forces) + 1), where)
-    scale = limit_of(contact)
-    assert_allclose(stopped.asperity_forces[keep], plain.asperity_forces, atol=1e-11 * scale)
-    assert_allclose(stopped.displacements[keep], plain.displacements, atol=1e-15)
-    assert_allclose(stopped.losses[keep], plain.losses, rtol=1e-9, atol=1e-9 * plain.losses.max())
-
-
-@settings(max_examples=20, deadline=None)
 @given(st.lists(st.floats(-0.5, 0.5), min_size=0, max_size=12))
 def test_return_point_memory_and_wiping_out(inner: list[float]) -> None:
     """Whatever happens inside +-0.5, coming back to a turning point beyond restores the state."""
@@ -192,15 +175,6 @@ def test_history_energy_is_the_area(fractions: list[float]) -> None:
     assert (np.diff(path.losses) >= -1e-12 * path.losses[-1]).all()
 
 
-def test_first_loading_costs_a_quarter_and_each_branch_a_half() -> None:
-    contact = pressed("paper")
-    limit = limit_of(contact)
-    energy = cr.cycle(contact, maximum=0.6 * limit).loss
-    path = cr.history(contact, forces=np.array([0.6, -0.6, 0.6, -0.6]) * limit)
-    assert_allclose(path.losses, energy * np.array([0.25, 0.75, 1.25, 1.75]), rtol=1e-12)
-    assert_allclose(np.array(path.slips.sum(axis=1)) / path.slips[0].sum(), [1, -1, 1, -1])
-
-
 @pytest.mark.parametrize("influence", KINDS)
 def test_each_state_of_a_history_is_certified(influence: str) -> None:
     """Bounds on the displacement add up over the turning points that a state hangs on."""
@@ -214,18 +188,6 @@ def test_each_state_of_a_history_is_certified(influence: str) -> None:
     assert path.displacement_errors[0] == pytest.approx(single, rel=0.02)
     assert path.displacement_errors[1] > path.displacement_errors[0]
     assert path.displacement_errors[3] == path.displacement_errors[2]
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("forces", [[0.0], [0.0, 0.0, 0.3, 0.3], [0.5, 0.5, -0.5, 0.5, 0.5]])
-def test_standing_still(forces: list[float]) -> None:
-    contact = pressed("paper")
-    path = cr.history(contact, forces=np.array(forces) * limit_of(contact))
-    assert path.asperity_forces.shape == (len(forces), 61)
-    for m in range(1, len(forces)):
-        if forces[m] == forces[m - 1]:
-            assert_allclose(path.asperity_forces[m], path.asperity_forces[m - 1], atol=1e-20)
-            assert path.losses[m] == pytest.approx(path.losses[m - 1], rel=1e-12)
 
 
 def test_bad_input() -> None:

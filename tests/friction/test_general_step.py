@@ -65,18 +65,6 @@ def test_random_paths(sampled: tuple[cr.Scene, float], seed: int) -> None:
     agree(path, cr.load_path(scene, loads=P, forces=Q, steps=1), 1e-12)
 
 
-def test_work_of_the_steps_is_the_loss() -> None:
-    scene, P, Q = path_of("paper", [(1, 0), (1, 0.5), (0.7, 0.1), (0.9, 0.4)])
-    start = cr.press(scene, load=P[0])
-    exact = cr.load_path(scene, start=start, loads=P, forces=Q).losses[-1]
-    missed = [
-        cr.load_path(scene, start=start, loads=P, forces=Q, steps=steps).losses[-1] / exact - 1
-        for steps in (4, 8)
-    ]
-    assert abs(missed[1]) < 0.35 * abs(missed[0])
-    assert abs(missed[1]) < 0.02
-
-
 @pytest.mark.parametrize("seed", [1, 5])
 def test_losses_of_the_steps_are_good_to_a_thousandth(seed: int) -> None:
     """Or none are given: against those of the memory curve, which are proved."""
@@ -124,26 +112,6 @@ def test_where_order_fails() -> None:
         bristles.go(load, force / 0.5, steps=80)
         assert TRAVEL * bristles.displacement == pytest.approx(X_step, abs=5e-3 * X)
         assert_allclose(0.5 * bristles.carried, Q_step, atol=5e-3 * Q.max())
-
-
-def test_bristles_converge_to_the_memory_curve() -> None:
-    """At first order: twice the steps and bristles, half the distance."""
-    scene = seven()
-    largest = cr.press(scene, approach=2e-5).load
-    P = np.array([1.0, 0.5, 0.9, 0.9]) * largest
-    T = np.array([0.4, -0.2, 0.3, -0.5]) * largest
-    path = cr.load_path(scene, loads=P, forces=0.5 * T)
-    missed = []
-    for count in (30, 60):
-        bristles = Bristles(scene, largest, count=4 * count)
-        for load, height in zip(P, T, strict=True):
-            bristles.go(load, height, steps=count)
-        missed.append(TRAVEL * bristles.displacement / path.displacements[-1] - 1)
-        assert_allclose(
-            0.5 * bristles.carried, path.asperity_forces[-1], atol=0.2 / count * 0.5 * P.max()
-        )
-    assert abs(missed[1]) < 0.65 * abs(missed[0])
-    assert abs(missed[1]) < 0.02
 
 
 def test_bad_input() -> None:

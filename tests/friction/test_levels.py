@@ -31,7 +31,7 @@ def assert_known(values: Any, errors: Any, true: Any, bound: float) -> None:
     assert np.max(errors) <= bound * largest
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("fraction", FRACTIONS)
 @pytest.mark.parametrize("holding", ["approach", "load"])
 @pytest.mark.parametrize("name", SCENES)

@@ -1,17 +1,13 @@
 """Load paths: values of independent prototypes, limits, balances, and bad input."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 from path_scenes import LARGEST, ONE, PAPER, TWO, follow, path_of
 
 import convexrough as cr
-from convexrough.influence import couple
-from convexrough.sphere import mindlin
 
 #: (scene, path): after each point X, W, front over the largest load, how many slide of how many
 #: touch. Prototypes: bristles, and a step per asperity.
@@ -93,26 +89,6 @@ def test_values_of_the_prototypes(name: str, which: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["paper", "rough"])
-def test_balances(name: str) -> None:
-    """Forces add up, Coulomb's bound holds, and every asperity's displacements add up to X."""
-    path = follow(name, TWO)
-    scene = path.scene
-    assert_allclose(path.asperity_forces.sum(axis=1), path.forces, atol=1e-14 * LARGEST[name])
-    assert (np.abs(path.asperity_forces) <= 0.5 * path.asperity_loads + 1e-14 * LARGEST[name]).all()
-    touching = path.status == "sliding"
-    signs = np.array([[float(curve.slopes[-1])] for curve in path.curves])
-    assert_allclose(
-        (signs * path.asperity_forces)[touching], 0.5 * path.asperity_loads[touching], rtol=1e-9
-    )
-    scale = 1.0 / (np.pi * scene.material.contact_modulus)
-    A = couple(scene, np.arange(len(scene)), scale, "dense")
-    moved = mindlin.ratio(scene.material.poisson_ratio) * A.apply(path.asperity_forces.T).T
-    total = path.asperity_displacements + moved
-    expected = np.broadcast_to(path.displacements[:, None], total.shape)
-    assert_allclose(total, expected, atol=1e-12 * 1e-5)
-
-
-@pytest.mark.parametrize("name", ["paper", "rough"])
 def test_constant_load_is_a_history(name: str) -> None:
     scene, P, Q = path_of(name, [(1, t) for t in (0.6, -0.2, 0.3, 0.3, -0.6, 0.9, -0.95)])
     contact = cr.press(scene, load=P[0])
@@ -130,38 +106,6 @@ def test_constant_load_is_a_history(name: str) -> None:
     difference = np.abs(path.displacements - past.displacements)
     assert (difference <= path.displacement_errors + past.displacement_errors).all()
     assert (np.abs(path.losses - past.losses) <= path.loss_errors + 1e-13 * past.losses).all()
-
-
-def test_what_a_path_costs_is_its_work() -> None:
-    """W = the integral of Q dX less the change of stored energy, which is that of the curve."""
-    path = follow("paper", [(0.8, 0.3), (0.5, -0.2), (0.9, 0.5)])
-    points = np.column_stack((path.loads, path.forces / 0.5))
-    curve = path.curves[-1]
-    pairs = zip(curve.levels, curve.heights, strict=True)
-    slow = np.array([(float(level), float(height)) for level, height in pairs])
-    missed = []
-    for parts in (16, 32):
-        cut = _cut(np.vstack(([0.0, 0.0], points)), parts)
-        assert cut.losses[-1] == pytest.approx(path.losses[-1], rel=1e-11, abs=0.0)
-        # Stored energy: the work along the path without slip to the same state.
-        stored = _cut(slow, parts)
-        assert stored.losses[-1] < 1e-12 * path.losses[-1]
-        missed.append((_work(cut) - _work(stored)) / path.losses[-1] - 1)
-    assert abs(missed[1]) < 2e-3
-    assert abs(missed[1]) < 0.4 * abs(missed[0])
-
-
-def _cut(corners: NDArray[np.float64], parts: int) -> cr.LoadPath:
-    """Each segment in parts, finer where it begins: near no load X goes as P^(2/3)."""
-    along = (np.arange(1, parts + 1)[:, None] / parts) ** 2
-    fine = np.concatenate([a + along * (b - a) for a, b in pairwise(corners)])
-    return cr.load_path(PAPER, loads=fine[:, 0], forces=0.5 * fine[:, 1])
-
-
-def _work(path: cr.LoadPath) -> float:
-    """By the trapezoid rule."""
-    Q, X = np.append(0.0, path.forces), np.append(0.0, path.displacements)
-    return float(np.trapezoid(Q, X))
 
 
 def test_pulled_off_and_pressed_again() -> None:

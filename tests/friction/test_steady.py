@@ -75,32 +75,6 @@ def test_loads_that_follow_cost_nothing() -> None:
     assert set(found.status) == {"stuck", "intermittent", "open"}
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    ("degrees", "loss"), [(0, 2.3311e-13), (45, 2.2997e-13), (90, 4.879666e-14), (135, 1.0184e-13)]
-)
-def test_ellipses(degrees: float, loss: float) -> None:
-    """The stuck level in closed form; the loss converges at second order."""
-    mean, phase = LARGEST["paper"] / 1.4, np.radians(degrees)
-    al, be = 0.4, 0.5
-    losses = []
-    for chords in (24, 48, 96):
-        P, Q = cr.elliptic_path(
-            load=mean,
-            load_amplitude=al * mean,
-            force_amplitude=0.5 * be * mean,
-            phase=phase,
-            friction=0.5,
-            chords=chords,
-        )
-        found = cr.steady(SCENES["paper"], loads=P, forces=Q)
-        rounds = [np.sqrt(al**2 + be**2 + 2 * c * al * be * np.sin(phase)) for c in (1, -1)]
-        assert found.level / mean == pytest.approx(1 - sum(rounds) / 2, rel=1e-12)
-        losses.append(found.loss)
-    assert losses[-1] == pytest.approx(loss, rel=5e-4, abs=0.0)
-    assert abs(losses[2] / losses[1] - 1) < 0.45 * abs(losses[1] / losses[0] - 1) + 1e-9
-
-
 @pytest.mark.parametrize("name", ["paper", "rough"])
 def test_constant_load_is_a_cycle(name: str) -> None:
     scene, P, Q = path_of(name, [(1, 0.7), (1, -0.3)])

@@ -1,6 +1,5 @@
 """The hard cases: answers proved anew, and everything of the package run on all of them."""
 
-import dataclasses
 import doctest
 import json
 import re
@@ -73,7 +72,7 @@ def true_shear_statuses(case: cr.gallery.HardCase, statuses: Any) -> bool:
     return bool(((statuses == allowed) | (statuses == "undecided")).all())
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @each_case
 def test_the_stored_answer_is_computed_anew(name: str) -> None:
     case = json.loads(gallery_answers.PATH.read_text())[name]
@@ -113,7 +112,7 @@ def test_cases_are_as_near_as_their_names_say() -> None:
         assert pressed(f"discs-{count}-overlapping").crowding == pytest.approx(1.05)
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(10)
 @each_operator
 def test_statuses_and_bounds_when_pressed(name: str, operator: Any) -> None:
     case, contact = gallery.case(name), pressed(name, operator)
@@ -144,7 +143,7 @@ def test_proofs_end_where_the_cases_say(threshold: str, below: str, above: str) 
     assert scopes == [below, above]
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(8)
 @each_case
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: solver.name)
 def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
@@ -164,7 +163,7 @@ def test_every_solver_is_right_or_refuses(name: str, solver: Any) -> None:
     assert case.check(contact.loads).error < SQUARED
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @each_case
 def test_sheared_and_cycled(name: str) -> None:
     case, contact = gallery.case(name), pressed(name)
@@ -180,22 +179,6 @@ def test_sheared_and_cycled(name: str) -> None:
     assert within(state.forces, case.forces, proof.force_errors)
     assert within(state.slips, case.slips, proof.slip_errors)
     assert within(state.displacement, [case.displacement], proof.displacement_error)
-
-
-@pytest.mark.sample(3)
-@each_family
-def test_sheared_with_vectors(name: str) -> None:
-    """At nu = 0 the tensor is the scalar kernel, and the answer is that of Ciavarella and Jaeger.
-
-    Ours has nu = 0.3, which divides displacements by c_t and leaves forces as they are.
-    """
-    case, contact = gallery.case(name), pressed(name)
-    scene = contact.scene
-    smooth = dataclasses.replace(scene, material=cr.Material(scene.material.contact_modulus, 0.0))
-    state = cr.shear_vector(dataclasses.replace(contact, scene=smooth), force=case.shear_force)
-    if case.forces:
-        assert true_shear_statuses(case, state.status)
-        assert within(state.forces[:, 0], case.forces, state.certificate.force_errors)
 
 
 @pytest.mark.parametrize("name", ["reversals-random", "reversals-nested"])
@@ -222,16 +205,6 @@ def test_an_asperity_loses_contact_as_the_load_rises() -> None:
     assert scenes[0] == scenes[1] == scenes[2]
 
 
-def test_a_load_path_across_lost_contact_claims_nothing() -> None:
-    """Order fails, on which its memory curve and errors rest."""
-    contact = pressed("losing-contact-after")
-    loads = contact.load * np.array([0.86, 0.951, 1.0])
-    path = cr.load_path(contact.scene, loads=loads, forces=0.1 * loads)
-    assert path.order == "fails"
-    assert np.isinf(path.asperity_force_errors).all()
-    assert {*path.status[:, 1:].ravel()} == {"undecided"}
-
-
 def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
     a = scene.asperities
     asperities = cr.Asperities(a.positions * length, a.tip_radii * length, a.heights * length)
@@ -240,7 +213,7 @@ def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
     return cr.Scene(radius, asperities, material, scene.friction, scene.geometry)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @each_family
 @pytest.mark.parametrize(("length", "modulus"), [(2.0**5, 2.0**-4), (2.0**-11, 2.0**10)])
 def test_powers_of_two_scale_every_bit(name: str, length: float, modulus: float) -> None:
@@ -264,7 +237,7 @@ def test_powers_of_two_scale_every_bit(name: str, length: float, modulus: float)
     assert loss == cr.cycle(one, maximum=case.shear_force).loss * force * length
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(6)
 @each_case
 def test_verify_is_not_fooled(name: str) -> None:
     """One asperity forgotten, one loaded too many: the nearest to being right."""

@@ -55,7 +55,7 @@ def program(index: Any, name: str, ending: str) -> Any:
     return found
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @each_case
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # how qpsolvers calls OSQP
 def test_bristle_programs(name: str, pack: Path, index: Any) -> None:
@@ -72,7 +72,7 @@ def test_bristle_programs(name: str, pack: Path, index: Any) -> None:
         judged(name, about, qpsolvers.solve_problem(problem, solver, **given).x, about["off"])
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @each_case
 def test_cone_programs_by_another_solver(name: str, pack: Path, index: Any) -> None:
     """By Clarabel's own reader, and by SCS, which takes the numbers of the same file."""
@@ -100,7 +100,7 @@ def test_cone_programs_by_another_solver(name: str, pack: Path, index: Any) -> N
         judged(name, about, x, NEAR)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.filterwarnings("ignore::DeprecationWarning:picos")  # of PICOS' reader, by itself
 @pytest.mark.parametrize("name", ["one", "two-equal", "load-1e-15", "convexity-bound-1-above",
                                   "convexity-solution-21-25-above", "ring-of-six",

@@ -8,7 +8,6 @@ from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
 from gradient_oracle import DIGITS, known
 from levels_reference import SCENES, Friction, Holding, Slopes, friction_state, pressed, reference
-from scenes import NAMED
 
 import convexrough as cr
 
@@ -45,7 +44,7 @@ def assert_both(
         assert max(loss.balance_defect, moved.balance_defect) < 1e-14
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("fraction", [1e-2, 0.4, 0.999])
 def test_every_derivative(name: str, fraction: float) -> None:
@@ -85,7 +84,7 @@ def random_scene(rng: np.random.Generator) -> tuple[cr.Scene, float]:
     return scene, float(approach - scene.offsets.max())
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("seed", range(40))
 def test_no_bound_is_too_small(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -108,63 +107,6 @@ def test_a_height_that_is_off_by_its_bound_is_found() -> None:
     object.__setattr__(gradient, "height_errors", gradient.height_errors * 0.0)
     with ctx.workdps(DIGITS), pytest.raises(AssertionError, match="heights"):
         assert_entries(gradient, state.loss_slopes("load"), None)
-
-
-#: Of the paper's scene at this load with f = 0.5: the asperities F, D, B, A, and the rest.
-REFERENCE = {
-    "value": 1.35549370702e-13,
-    "heights": (5.85650309932e-10, 5.62555012938e-10, -7.53379944689e-10, -1.60288736774e-10),
-    "tip": 1.05616394214e-13,
-    "x": 4.01746346873e-12,
-    "sphere_radius": -1.51922764098e-13,
-    "contact_modulus": 6.48593171837e-15,
-    "poisson_ratio": 1.13907034203e-13,
-    "friction": -4.29159681105e-13,
-    "load": -9.88254936336e-07,
-    "maximum": 5.39642868840e-06 / 2,
-}
-
-
-def test_reference_values() -> None:
-    contact = cr.press(with_friction(NAMED["paper"][0]), load=3.60853389e-7)
-    gradient = cr.cycle(contact, maximum=9e-8).gradient()
-    found = {name: getattr(gradient, name) for name in REFERENCE if hasattr(gradient, name)}
-    found["heights"] = tuple(gradient.heights[[0, 7, 19, 31]])
-    found["tip"], found["x"] = gradient.tip_radii[0], gradient.positions[31, 0]
-    for name, value in REFERENCE.items():
-        assert found[name] == pytest.approx(value, rel=1e-11), name
-    moved = cr.shear(contact, force=9e-8).gradient(displacement=1.0)
-    values = (moved.value, *moved.heights[[0, 31]], moved.friction, moved.force, moved.load)
-    true = (9.85362640859e-06, 6.90994620863e-03, -1.43750418523e-02, -2.69821434420e-06)
-    assert values == pytest.approx((*true, 124.474817563, -12.2449270891), rel=1e-11)
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("holding", ["load", "approach"])
-@pytest.mark.parametrize("fraction", [1e-3, 0.5])
-def test_identities(holding: Any, fraction: float) -> None:
-    contact = pressed("rough", "load")
-    g = cr.cycle(contact, maximum=fraction * FRICTION * contact.load).gradient(holding=holding)
-    scene, W = contact.scene, g.value
-    x, y = scene.asperities.positions.T
-    turned = x * g.positions[:, 1] - y * g.positions[:, 0]
-    assert abs(turned.sum()) <= 1e-13 * np.abs(turned).sum()
-    assert g.maximum is not None
-    sizes = (
-        scene.asperities.heights @ g.heights
-        + scene.asperities.tip_radii @ g.tip_radii
-        + (scene.asperities.positions * g.positions).sum()
-        + scene.sphere_radius * g.sphere_radius
-        + 4 * g.maximum * fraction * FRICTION * contact.load
-    )
-    if g.load is not None:
-        assert abs(g.heights.sum()) <= 1e-13 * np.abs(g.heights).sum()
-        # lengths by s and forces by s^2 leave all pressures: the loss grows by s^3
-        assert sizes + 2 * contact.load * g.load == pytest.approx(3 * W, rel=1e-11)
-    else:
-        assert g.approach is not None
-        assert g.heights.sum() == pytest.approx(g.approach, rel=1e-12)
-        assert sizes + contact.approach * g.approach == pytest.approx(3 * W, rel=1e-11)
 
 
 def test_a_cycle_that_does_not_move_costs_nothing_and_changes_nothing() -> None:
@@ -206,12 +148,12 @@ def test_gross_sliding_from_one_side() -> None:
 def test_no_derivative_in_gross_sliding() -> None:
     contact = pressed("rough", "load")
     force = FRICTION * contact.load
-    with pytest.raises(cr.InputError, match="with the approach held f P may fall below"):
+    with pytest.raises(cr.InputError, match="at constant approach f P may fall below"):
         cr.cycle(contact, maximum=force).gradient(holding="approach")
     pair = cr.Asperities([[-0.0015, 0.0], [0.0015, 0.0]], 0.02)
     even = with_friction(cr.Scene(1.0, pair, cr.Material(1.0, 0.3), geometry="summit"))
     together = cr.press(even, load=1e-8)
-    with pytest.raises(cr.InputError, match="several asperities slide last, together"):
+    with pytest.raises(cr.InputError, match="several asperities slide last"):
         cr.cycle(together, maximum=FRICTION * together.load).gradient()
     with pytest.raises(cr.InputError, match="asperity: found 1, which slides last, together with"):
         cr.onset_gradient(together, 1)
@@ -250,7 +192,7 @@ def test_normalised(name: str, holding: Any) -> None:
         check(of, explicit)
     errors = np.abs(g.height_errors).max()
     assert 0 < errors <= SHARP * np.abs(g.heights).max()
-    with pytest.raises(cr.InputError, match="the gradient of a cycle"):
+    with pytest.raises(cr.InputError, match="the gradient of the loss of a cycle"):
         _ = contact.gradient(load=1.0).normalised
 
 

@@ -30,10 +30,10 @@ def test_slopes_of_the_surface_are_its_derivative(seed: int, count: int) -> None
 
 def test_slopes_on_a_mesh() -> None:
     rng = np.random.default_rng(1)
-    asperities = cr.Asperities(rng.uniform(-1, 1, size=(6000, 2)), 1e-3)
+    asperities = cr.Asperities(rng.uniform(-1, 1, size=(3000, 2)), 1e-3)
     scene = cr.Scene(1.0, asperities, MATERIAL, geometry="summit")
-    loads = rng.uniform(0.5, 1.0, size=6000)
-    mesh, matrix = (couple(scene, np.arange(6000), 1.0, kind) for kind in ("scattered", "dense"))
+    loads = rng.uniform(0.5, 1.0, size=3000)
+    mesh, matrix = (couple(scene, np.arange(3000), 1.0, kind) for kind in ("scattered", "dense"))
     assert mesh._double.splitting.meshed  # type: ignore[attr-defined]
     found, expected = mesh.slopes(loads), matrix.slopes(loads)
     off = np.abs(found - expected).max(axis=1)

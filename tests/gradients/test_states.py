@@ -108,7 +108,7 @@ def test_gaps_of_asperities_that_could_not_touch() -> None:
 STATES = [("summit", "load", 1e-3), ("summit", "approach", 0.5), ("closest", "load", 0.95)]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("geometry", "holding", "fraction"), STATES)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_any_sum_of_forces_and_slips(
@@ -292,7 +292,7 @@ def assert_path(gradient: cr.Gradient, contact: cr.Contact, P: Any, Q: Any, valu
         assert float(slope) == pytest.approx(gradient.friction, rel=1e-12)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("name", "number"),
     [
@@ -341,19 +341,6 @@ def test_histories_are_paths_whose_load_is_one() -> None:
     assert same.friction == last.friction
 
 
-def test_a_cycle_is_the_history_between_its_ends() -> None:
-    contact = small()
-    Q = 0.3 * contact.load
-    twice = cr.history(contact, forces=[Q, -Q, Q]).gradient(losses=[-1.0, 0.0, 1.0])
-    cycle = cr.cycle(contact, maximum=Q).gradient()
-    np.testing.assert_allclose(twice.heights, cycle.heights, rtol=1e-13)
-    assert twice.friction == pytest.approx(cycle.friction, rel=1e-14)
-    assert twice.forces is not None
-    assert cycle.maximum is not None
-    # The first quarter is taken off again; what is left is the cycle, whose ends are Q and -Q.
-    assert twice.forces[0] + twice.forces[2] == pytest.approx(cycle.maximum, rel=1e-13)
-
-
 def test_a_point_that_is_repeated_has_two_sides() -> None:
     contact = small()
     Q = contact.load * np.array([0.2, 0.2, -0.4])
@@ -371,13 +358,13 @@ def test_a_point_that_is_repeated_has_two_sides() -> None:
 def test_what_has_no_derivative() -> None:
     contact = small()
     scene = contact.scene
-    with pytest.raises(cr.InputError, match="a contact that carries some load"):
+    with pytest.raises(cr.InputError, match="a contact with a load"):
         cr.press(scene, approach=-1e-4).gradient(load=1.0)
-    with pytest.raises(cr.InputError, match="at least one: weights"):
+    with pytest.raises(cr.InputError, match="weights of at least one"):
         contact.gradient()
     with pytest.raises(cr.InputError, match='expected "load" or "approach"'):
         contact.gradient(load=1.0, holding="both")  # type: ignore[arg-type]
-    with pytest.raises(cr.InputError, match="where all slide, a history has no derivative"):
+    with pytest.raises(cr.InputError, match="in gross sliding a history has no derivative"):
         cr.history(contact, forces=[FRICTION * contact.load]).gradient(losses=[1.0])
     with pytest.raises(cr.InputError, match="19 values, one per asperity"):
         contact.gradient(loads=[1.0, 2.0])
@@ -390,6 +377,6 @@ def test_where_order_fails_there_is_no_sum_of_levels() -> None:
     contact = cr.press(shaded(), load=2.96)
     cycle = cr.cycle(contact, maximum=0.25 * contact.load)
     assert cycle.order == "fails"
-    with pytest.raises(cr.InputError, match='order: found "fails", expected indentations'):
+    with pytest.raises(cr.InputError, match='order: found "fails", expected a result whose'):
         cycle.gradient()
     assert contact.gradient(approach=1.0).height_errors.max() < 1e-15

@@ -174,7 +174,7 @@ def loadings(count: int, seed: int = 0) -> dict[str, Array]:
     }
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("shift", [0.0, 300.0, 1e6])
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("count", [40, 500, 1000])

@@ -53,7 +53,7 @@ def among(ball: Ball, m: int) -> arb:
     return middle(ball[m]) + arb(0, float(ball.radius[m]))
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("largest", [8, 300, 4000, 100_000])
@@ -75,7 +75,7 @@ def test_values_of_the_kernel(name: str, size: str, largest: int) -> None:
             assert abs(value - exact) <= arb(distances.error) * exact
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("count", [2, 3, 4, 5])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 1), (9, 11), (24, 31)])
@@ -123,7 +123,7 @@ def loadings(kind: str, shape: tuple[int, int]) -> Pair:
     return Pair(loads.ravel(), (loads * rng.uniform(-1, 1, shape) * 2.0**-54).ravel())
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("kind", LOADS)
@@ -161,7 +161,7 @@ def perturbed(seed: int, count: int) -> Array:
     return np.asarray(points * (1 + rng.choice([-1, 0, 1], points.shape) * 2.0**-53))
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("slices", [2, 3, 4])
 def test_points_are_where_they_are(seed: int, slices: int) -> None:

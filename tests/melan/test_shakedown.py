@@ -102,15 +102,6 @@ def test_rough(name: str, exact: float, elastic: float, monkeypatch: pytest.Monk
     assert below.factor == pytest.approx(elastic, rel=1e-9)
 
 
-def test_elastic_limit() -> None:
-    """Lower than the exact one, as the edge of a light contact is soft once it slips."""
-    found = cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="elastic")
-    assert found.factor == pytest.approx(0.2571338521083, rel=1e-11)
-    assert found.witness.sum() == pytest.approx(0.0, abs=1e-12 * P)
-    contact = cr.press(PAPER, load=P)
-    assert (np.abs(found.witness) <= 0.5 * contact.loads * (1 + 1e-9)).all()
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("ratio", "along", "across"),
@@ -148,16 +139,6 @@ def test_vector_limits_of_other_paths() -> None:
     assert limit(np.array([[0, 0], [1.0, 0], [1, 1]])) == pytest.approx(0.34487646, rel=1e-7)
     across = np.array([[0, 1.0], [0, -1.0]])
     assert limit(across, (0.5, 0.0)) == pytest.approx(0.24197896, rel=1e-7)
-
-
-def test_the_mechanism_proves_the_upper_bound() -> None:
-    """Its slips, closed over a cycle, evaluated here once more with the package's kernel only."""
-    swing = np.column_stack((SWING, 0 * SWING))
-    found = cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="vector")
-    net = found.mechanism.sum(axis=0)
-    touching = cr.press(PAPER, load=P).loads > 0
-    assert_allclose(net[touching], np.broadcast_to(net[0], (37, 2)), atol=1e-9)
-    assert np.hypot(*found.mechanism.T).max() == pytest.approx(1.0)
 
 
 def test_a_path_that_follows_never_slides() -> None:
@@ -393,14 +374,14 @@ def test_bad_input() -> None:
         cr.shakedown(PAPER, loads=P, force_amplitudes=[])
     with pytest.raises(cr.InputError, match=r"force_amplitudes\[0\].*finite"):
         cr.shakedown(PAPER, loads=P, force_amplitudes=[np.nan, 1.0])
-    with pytest.raises(cr.InputError, match="load_amplitudes: found 3 values, expected 2, as"):
+    with pytest.raises(cr.InputError, match="load_amplitudes: found 3 values, expected 2, one"):
         cr.shakedown(PAPER, loads=P, load_amplitudes=[1e-9, 0, 0], force_amplitudes=SWING)
     for wrong in ([["a", 0.0]], [[np.inf, 0.0]], np.zeros((0, 2))):
         with pytest.raises(cr.InputError, match="force_amplitudes"):
             cr.shakedown(PAPER, loads=P, force_amplitudes=wrong, kind="vector")
     with pytest.raises(cr.InputError, match="kind"):
         cr.shakedown(PAPER, loads=P, force_amplitudes=SWING, kind="plastic")  # type: ignore[arg-type]
-    with pytest.raises(cr.InputError, match=r"load_amplitudes.*only .exact."):
+    with pytest.raises(cr.InputError, match=r"load_amplitudes.*not .exact."):
         cr.shakedown(
             PAPER, loads=P, load_amplitudes=0.1 * P, force_amplitudes=SWING, kind="elastic"
         )

@@ -35,7 +35,7 @@ from convexrough.normal.problem import NormalProblem
 Array = NDArray[np.float64]
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("kind", ATTACKS)
 @pytest.mark.parametrize(("name", "operator"), CASES)
 def test_attacks_on_known_scenes(name: str, operator: Kind, kind: str) -> None:
@@ -160,7 +160,7 @@ def test_scopes() -> None:
     assert list(judged.in_the_way) == [0, 1]
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("operator", OPERATORS)
 @pytest.mark.parametrize("seed", range(20))
 def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
@@ -212,7 +212,7 @@ def test_bounds_do_not_depend_on_who_solved(kind: Kind) -> None:
     assert (again.status == contact.status).all()
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_the_rounding_of_the_residual_is_counted(name: str, kind: Kind) -> None:
     """Loads correctly rounded from 50 digits are known to half a unit in the last place."""
@@ -228,18 +228,7 @@ def test_the_rounding_of_the_residual_is_counted(name: str, kind: Kind) -> None:
         ).all()
 
 
-def test_gaps_of_screened_asperities() -> None:
-    """A small difference of a large height and a large drop keeps the rounding of both."""
-    height = 3.1**2 / 2 - 1e-8 - 1e-12
-    scene = cr.Scene(
-        1.0, cr.Asperities([[0, 0], [3.1, 0]], 0.02, [0, height]), MATERIAL, geometry="summit"
-    )
-    certificate = cr.press(scene, approach=1e-8).certificate
-    exact = reference(scene, approach=1e-8)
-    assert_honest(certificate, cr.press(scene, approach=1e-8).loads, exact)
-
-
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("seed", range(40))
 def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:
     """Where contact points are rounded, so is their distance, to whom it may concern."""

@@ -170,16 +170,6 @@ def test_an_isolated_pair_is_proved_up_to_pi() -> None:
         assert (overlapping_margin(A, lengths, CROWDED_MARGINS) > 0) == proved
 
 
-def test_a_third_beside_a_close_pair_costs_little() -> None:
-    """It has shells nearly as wide, or else hardly any margin is left."""
-    points = np.array([[0.0, 0.0], [1.0, 0.0], [-2.0, 0.3]])
-    for closeness in (0.9, 0.97, 0.98):
-        lengths = np.array([closeness, closeness, 1.0])
-        least = float(np.linalg.eigvalsh(scaled(lengths, points))[0])
-        A = DenseInfluence.assemble(points, 1.0)
-        assert 0.6 * least < overlapping_margin(A, lengths, CROWDED_MARGINS) < least
-
-
 def test_who_is_in_the_way() -> None:
     """The pair that can be no least of the energy; else those whose shells meet."""
     points = np.array([[0.0, 0.0], [1.6e-4, 0.0], [2e-3, 0.0], [2.36e-3, 0.0], [5e-3, 0.0]])

@@ -3,27 +3,22 @@
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import pytest
 
 import convexrough as cr
-from convexrough.normal.load_control import all_that_could_touch, highest_approach
+from convexrough.normal.load_control import all_that_could_touch
 from convexrough.scene.asperities import largest_tip_radius
 from convexrough.scene.patterns import CUT_DEVIATIONS
 from convexrough.scene.scene import reach
-from convexrough.sphere import hertz
 
 Maker = tuple[Callable[[float], cr.Scene], Callable[[float], float]]
 
-PATTERNS = [cr.Asperities.hexagonal, cr.Asperities.square]
 ROUGHNESS: dict[str, dict[str, Any]] = {
     "even": dict(),
     "heights": dict(height_std=1e-6, seed=3),
     "heights and radii": dict(height_std=1e-6, tip_radius_cv=0.1, seed=7),
     "very rough": dict(height_std=2e-5, tip_radius_cv=0.5, seed=5),
 }
-#: On one asperity, on a few, on some hundred and on a thousand.
-LOADS = [1e-12, 1e-9, 2e-8, 2e-7, 3.6e-7, 2e-6, 1e-5]
 
 
 def maker(pattern: Any, geometry: Any, k: float = 1.0, **rough: Any) -> Maker:
@@ -44,39 +39,6 @@ def maker(pattern: Any, geometry: Any, k: float = 1.0, **rough: Any) -> Maker:
         )
 
     return scene_within, farthest
-
-
-def grown_step_by_step(make: Maker, load: float) -> cr.Scene:
-    """From 1.5 contact radii of the smooth sphere, until nothing outside could touch."""
-    scene_within, farthest = make
-    within = 1.5 * float(hertz.contact_radius(load, 1.0, 1.0))
-    while True:
-        scene = scene_within(within)
-        needed = farthest(highest_approach(scene, load))
-        if needed <= within:
-            return scene
-        within = needed
-
-
-def assert_same(found: cr.Scene, expected: cr.Scene) -> None:
-    for name in ("positions", "heights", "tip_radii"):
-        one, other = (getattr(scene.asperities, name) for scene in (found, expected))
-        assert np.array_equal(one, other)
-
-
-@pytest.mark.sample(8)
-@pytest.mark.parametrize("load", LOADS)
-@pytest.mark.parametrize("rough", ROUGHNESS)
-@pytest.mark.parametrize("geometry", ["summit", "closest"])
-@pytest.mark.parametrize("pattern", PATTERNS, ids=["hexagonal", "square"])
-def test_as_far_as_growing_step_by_step(
-    pattern: Any, geometry: Any, rough: str, load: float
-) -> None:
-    make = maker(pattern, geometry, **ROUGHNESS[rough])
-    scene, bound = all_that_could_touch(*make, load)
-    assert_same(scene, grown_step_by_step(make, load))
-    # The bound is that of the scene itself, but for rounding.
-    assert bound == pytest.approx(highest_approach(scene, load), rel=1e-11)
 
 
 @pytest.mark.sample(3)

@@ -10,9 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import (
-    CASES,
     MATERIAL,
-    NAMED,
     OPERATORS,
     PAPER_APPROACH,
     on_lattice,
@@ -25,7 +23,6 @@ from scenes import (
 import convexrough as cr
 from convexrough.convex.newton import descend
 from convexrough.influence import Kind
-from convexrough.influence.coupling import inverse_distances
 from convexrough.normal.load_control import highest_approach
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import Newton
@@ -37,26 +34,6 @@ Case = tuple[cr.Scene, float, Kind]
 
 def assembled(scene: cr.Scene, **control: Any) -> NormalProblem:
     return NormalProblem.assemble(scene, **control)
-
-
-def phi(problem: NormalProblem, loads: Any) -> float:
-    return problem.energy(loads, problem.influence.apply(loads))
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize(("name", "kind"), CASES)
-def test_the_gap_is_the_gradient_of_the_energy(name: str, kind: Kind) -> None:
-    scene, approach = NAMED[name]
-    problem = assembled(scene, approach=approach, influence=kind)
-    rng = np.random.default_rng(0)
-    loads = problem.bounds(problem.approach_bound) * rng.uniform(0.1, 0.9, len(problem))
-    gap = problem.gap(loads, problem.influence.apply(loads), problem.approach or 0.0)
-    direction = rng.standard_normal(len(problem)) * loads
-    step = 1e-5
-    slope = (phi(problem, loads + step * direction) - phi(problem, loads - step * direction)) / (
-        2 * step
-    )
-    assert slope == pytest.approx(float(gap @ direction), rel=1e-7)
 
 
 def test_screening_drops_only_those_that_cannot_touch() -> None:
@@ -122,50 +99,6 @@ def test_convexity_number(sampled: Case, size: float) -> None:
     assert theta >= true * (1 - 1e-9)
     if kind == "dense":  # a lattice takes its spacing for every distance to the nearest
         assert theta == pytest.approx(true, rel=1e-9)
-
-
-@settings(max_examples=25, deadline=None)
-@given(
-    st.integers(0, 2**32 - 1),
-    st.integers(1, 40),
-    st.floats(0.1, 0.95),
-    st.sampled_from([scattered, on_lattice]),
-    st.data(),
-)
-def test_manufactured_contacts(
-    seed: int, count: int, crowding: float, make: Any, data: st.DataObject
-) -> None:
-    """Draw loads and gaps, at most one of them positive, and the heights that make them exact."""
-    scene, approach = make(seed, count, crowding, 0.0)
-    kind = data.draw(st.sampled_from(operators(scene)[::-1]))
-    rng = np.random.default_rng(seed)
-    problem = assembled(scene, approach=approach)
-    if len(problem) < count:
-        return
-    touching = rng.random(count) < 0.6
-    largest = problem.bounds(problem.approach_bound) * problem.units.force
-    loads = np.where(touching, largest * rng.random(count), 0.0)
-    gaps = np.where(touching, 0.0, approach * rng.random(count))
-    k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
-    points = scene.contact_points
-    matrix = inverse_distances(points, points) / (np.pi * scene.material.contact_modulus)
-    prescribed = hertz.indentation(loads, k) + matrix @ loads - gaps
-    a = scene.asperities
-    made = cr.Scene(
-        scene.sphere_radius,
-        cr.Asperities(a.positions, a.tip_radii, prescribed - approach + scene.drops),
-        scene.material,
-        geometry=scene.geometry,
-    )
-    contact = cr.press(made, approach=approach, influence=kind)
-    if contact.certificate.scope != "global":
-        return
-    top = largest.max()
-    assert_allclose(contact.loads, loads, rtol=1e-10, atol=1e-12 * top)
-    assert_allclose(contact.gaps, gaps, rtol=1e-10, atol=1e-12 * approach)
-    statuses = contact.status
-    assert (statuses[touching] != "open").all()
-    assert (statuses[~touching] != "contact").all()
 
 
 @settings(max_examples=15, deadline=None)

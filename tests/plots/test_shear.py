@@ -69,7 +69,7 @@ def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
 # --- nothing collides -----------------------------------------------------------------------------
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "shares"),
     [("paper", [0.9, -0.5, 0.6, -0.2, 0.4, 0.1, 0.8, 0.95]), ("paper", [-0.5, 0.1, 0.2, 1.0]),
@@ -83,6 +83,7 @@ def test_fit_to_print(name: str, shares: list[float]) -> None:
         fits(figure)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["one", "paper"])
 def test_figures_of_the_paper_fit_to_print(name: str) -> None:
     for figure in of_paper(name).values():

@@ -111,14 +111,12 @@ def test_of_many_some_can_be_followed(contact: cr.Contact, monkeypatch: pytest.M
 # What the command line writes.
 
 
-def test_run_and_paper_write_the_page(command: Any, tmp_path: Path) -> None:
+def test_run_writes_the_page(command: Any, tmp_path: Path) -> None:
     more = "[friction]\ncoefficient = 0.5"
     (tmp_path / "a.toml").write_text(scene_text(HEXAGONAL, more=more))
     ran = command("run", "a.toml", "--html", "--no-figures")
     assert (ran.status, "slider.html" in ran.out) == (0, True)
     assert "slider.html" in json.loads((tmp_path / "a-results/files.json").read_text())["files"]
-    assert command("paper", "--html", "--no-figures").status == 0
-    assert (tmp_path / "paper-results/slider.html").stat().st_size < 1_000_000
 
 
 def test_without_friction_there_is_no_page_and_no_work(command: Any, tmp_path: Path) -> None:

@@ -14,7 +14,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import proof_oracle
 import pytest
 import scenes
 from flint import arb, ctx, fmpq
@@ -410,21 +409,3 @@ def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
         document["argument"] |= {"box": wide}
         with pytest.raises(Refused, match="breaks down"):
             checker.prove(document, lambda line: None)
-
-
-def test_the_oracle_knows_the_loss_of_one_sphere() -> None:
-    """[16] of the source, doubled: (9 (2 - nu) f^2 P^2 / (5 G a)) e(t)."""
-    scene = cr.Scene(
-        1.0, cr.Asperities([[0, 0]], 0.02), scenes.MATERIAL, friction=0.5, geometry="summit"
-    )
-    contact = cr.press(scene, approach=1e-5)
-    claims = contact.proof(sheared=[cr.shear(contact, force=0.25 * contact.load)]).document[
-        "claims"
-    ]
-    nu, G, a, P = 0.3, scene.material.shear_modulus, contact.contact_radii[0], contact.load
-    e = 1 - 0.5 ** (5 / 3) - 5 / 12 * (1 + 0.5 ** (2 / 3))
-    loss = 9 * (2 - nu) * 0.25 * P**2 / (5 * G * a) * e
-    low, high = (float.fromhex(text) for text in claims["shear"][0]["loss"])
-    assert low == pytest.approx(loss, rel=1e-12)
-    assert high == pytest.approx(loss, rel=1e-12)
-    assert proof_oracle.false_claims(contact.proof().document) == []

@@ -30,7 +30,7 @@ def test_a_run(command: Any) -> None:
     write('[gradient]\nof = "loss"\nfraction = 0.5\n')
     outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 0, outcome.err
-    assert "gradient of the loss at Q/(fP) = 0.5, load held" in outcome.out
+    assert "gradient of the loss at Q/(fP) = 0.5, at constant load" in outcome.out
     summary = json.loads(Path("out/summary.json").read_text())["gradient"]
     file = cr.read_scene("scene.toml")
     contact = cr.press(file.scene, load=file.load)
@@ -56,7 +56,7 @@ def test_what_is_printed(command: Any) -> None:
     write('[gradient]\nof = "loss"\nfraction = 0.5\nby = ["heights", "positions"]\n')
     outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     summary = json.loads(Path("out/summary.json").read_text())["gradient"]
-    assert "load held, and so is the force" in outcome.out
+    assert "at constant load and force" in outcome.out
     lines = printed(outcome.out)
     for name, slope in summary["by"].items():
         assert lines[f"by {name}"] == f"{slope + 0.0:.8g}"
@@ -99,7 +99,7 @@ def test_where_there_is_none(command: Any) -> None:
     """All else is computed and written; what is missing is said, and the status says so."""
     keys = 'of = "loss"\nfraction = 1.0\nholding = "approach"'
     said = "[gradient] fraction: found 1, a force of 1.804266945e-07: gross sliding, expected a "
-    said += "force below f P: with the approach held f P may fall below the force"
+    said += "force below f P: at constant approach f P may fall below the force"
     write(f"[gradient]\n{keys}\n[cycle]\nmaximum_fraction = [0.5]\n")
     outcome = command("run", "scene.toml", "--out", "out", "--no-figures")
     assert outcome.status == 3

@@ -50,7 +50,7 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
     assert command("check", "proof.json").status == 0
     again = command("verify", "first.toml", loads, "--proof")
     assert again.status == 2
-    assert "proof.json: is there already" in again.err
+    assert "proof.json: exists already" in again.err
 
 
 def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:
@@ -66,12 +66,3 @@ def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:
     assert judged.status == 3
     assert "warning: nothing is proved" in judged.err
     assert not (tmp_path / "proof.json").exists()
-
-
-def test_a_proof_of_another_run_does_not_stay(command: Any, tmp_path: Path) -> None:
-    command("new", "first.toml")
-    assert command("run", "first.toml", "--proof", "--no-figures").status == 0
-    folder = tmp_path / "first-results"
-    assert "proof.json" in json.loads((folder / "files.json").read_text())["files"]
-    assert command("run", "first.toml", "--no-figures", "--force").status == 0
-    assert not (folder / "proof.json").exists()

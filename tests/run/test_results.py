@@ -58,21 +58,6 @@ def test_a_folder_says_where_its_results_are_from(command: Any, tmp_path: Path) 
     assert said["versions"]["numpy"] == np.__version__
 
 
-def test_a_cycle_says_how_stiff_and_how_lossy(command: Any, tmp_path: Path) -> None:
-    more = FRICTION + '[cycle]\nmaximum_fraction = [0.5]\n[units]\nlength = "mm"\nforce = "N"'
-    (tmp_path / "a.toml").write_text(scene_text(more=more))
-    text = command("run", "a.toml", "--no-figures").out
-    assert "steady cycles  (Qa N, Xa mm, Qa/Xa N/mm, W N mm)" in text
-    assert "W/(pi Qa Xa)" in text
-    (row,) = json.loads((tmp_path / "a-results" / "summary.json").read_text())["cycle"]
-    moved, force = row["displacement_amplitude"], row["force_amplitude"]
-    assert row["secant_stiffness"] == pytest.approx(force / moved, rel=1e-15)
-    assert row["loss_factor"] == pytest.approx(row["loss"] / (np.pi * force * moved), rel=1e-14)
-    assert f"{row['loss_factor']:.6g}" in text
-    header = (tmp_path / "a-results" / "cycle.csv").read_text().splitlines()[0].split(",")
-    assert {"secant_stiffness", "loss_factor", "displacement_error"} < set(header)
-
-
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
@@ -115,16 +100,6 @@ def test_contact_beyond_the_sphere(command: Any, tmp_path: Path) -> None:
     outcome = warned(command, tmp_path, scene_text(blunt, "approach = 0.9"))
     assert "1.09 of the base's radius: its paraboloid differs from a sphere" in outcome.err
     assert "of the tip radius: the paraboloid of a tip differs" in outcome.err
-
-
-def test_the_estimate_is_what_boundary_elements_measure() -> None:
-    """docs/validation.md: ring A carries 7.58 % too little with "summit", 0.25 % too much else."""
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    contact = cr.press(
-        cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit"), approach=5e-5
-    )
-    measured = 1.0025 / (1 - 0.0758) - 1
-    assert limits_of(contact)["closest_change"] == pytest.approx(measured, rel=0.02)
 
 
 @pytest.mark.parametrize("spacing", [0.0025, 2.5e-4])

@@ -70,7 +70,7 @@ def test_a_spoiled_header_of_an_array(tmp_path: Path, before: bytes, after: byte
 
 
 STEADY = "[friction]\ncoefficient = 0.5\n[steady]\nreference = 1e60\n"
-STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 12}\n"
+STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
 SHAKEDOWN = '[friction]\ncoefficient = 0.5\n[shakedown]\nloads = 1e-8\nkind = "elastic"\n'
 
 

@@ -3,14 +3,13 @@
 from dataclasses import replace
 from typing import Any
 
-import multiprecision
 import numpy as np
 import pytest
 from attacks import ATTACKS, attack
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, STEEL, solve_exactly
+from scenes import MATERIAL, PAPER_APPROACH, STEEL
 
 import convexrough as cr
 from convexrough.influence import Kind
@@ -100,7 +99,7 @@ def residual(problem: NormalProblem, contact: cr.Contact) -> float:
     return problem.residual(loads, approach) / approach
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("kind", ["lattice", "scattered"])
 @pytest.mark.parametrize("name", SCENES)
@@ -178,7 +177,7 @@ def test_manufactured_contacts(
     assert not ((contact.status == "contact") & (gaps > 1e-9 * approach)).any()
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", ["none", "one", "far", "huge", "random", "opposite"])
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_any_start(kind: str, control: str) -> None:
@@ -199,7 +198,7 @@ def test_any_start(kind: str, control: str) -> None:
     assert_allclose(contact.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("approach", "steps"), [(-1e-6, 0), (1e-12, 6), (1e-8, 8), (1e-6, 8), (1e-5, 8), (1e-4, 12)]
 )
@@ -271,19 +270,6 @@ def test_the_certificate_under_attack(kind: str) -> None:
             assert not ((judged.status == "contact") & (known.status == "open")).any()
             between = np.abs(judged.gaps - known.gaps)
             assert (between <= judged.gap_errors + known.certificate.gap_errors).all()
-
-
-def test_fifty_digits_of_some_hundred() -> None:
-    """A contact through transforms, proved in ball arithmetic."""
-    pressed = scene(1.6, height_std=1e-6, seed=9)
-    contact = cr.press(pressed, approach=PAPER_APPROACH, influence="lattice")
-    exact = solve_exactly(pressed, approach=PAPER_APPROACH, start=contact.loads)
-    truth = np.abs(multiprecision.errors(contact.loads, exact.loads))
-    assert contact.certificate.holds
-    assert truth.max() <= 1e-13 * contact.loads.max()
-    assert (truth <= contact.certificate.load_errors).all()
-    gaps = np.abs(multiprecision.errors(contact.gaps, exact.gaps))
-    assert (gaps <= contact.certificate.gap_errors).all()
 
 
 @pytest.mark.sample(2)

@@ -88,13 +88,6 @@ def test_the_bristle_program_bounds_the_energy(control: str) -> None:
     assert 0 < excess[1] < 0.3 * excess[0]
 
 
-def test_what_is_undefined_is_infinite() -> None:
-    """Loads that are no numbers have no residual that could look small."""
-    problem, _ = solved("paper", "approach")
-    loads = np.full(len(problem), np.nan)
-    assert Solution.of(problem, loads, PAPER_APPROACH, 1).residual == np.inf
-
-
 @pytest.mark.parametrize("solver", [Conic(), BristleQP()], ids=lambda each: each.name)
 def test_an_answer_that_is_not_a_number(solver: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     of_numbers = programs._of_numbers

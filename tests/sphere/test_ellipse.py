@@ -11,7 +11,6 @@ from scipy.special import ellipe, ellipk
 
 import convexrough as cr
 from convexrough.sphere import ellipse
-from convexrough.sphere.hertz import indentation, local_coefficient
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 
 ALONE = cr.Asperities([(0.0, 0.0)], 1.0)  # of no consequence
@@ -43,31 +42,6 @@ def test_semi_axes_and_approach_by_legendres_integrals(radii: tuple[float, float
     assert hertz.peak_pressure * 2 / 3 * np.pi * a * b == pytest.approx(2e-6, rel=1e-14)
 
 
-def test_its_pressure_makes_the_gap_vanish() -> None:
-    """Boussinesq's integral in polar coordinates about a point of the contact."""
-    radii, load = (1.0, 0.4), 5e-6
-    hertz = smooth(radii, load)
-    axes = np.array(hertz.semi_axes)
-
-    def moved(point: Any) -> float:
-        def along(angle: float) -> float:
-            way = np.array([np.cos(angle), np.sin(angle)]) / axes
-            at = np.array(point) / axes
-            A, B, C = way @ way, at @ way, 1 - at @ at
-            # the integral of sqrt(C - 2 B s - A s^2) over s from 0 to where it vanishes
-            q = C + B * B / A
-            t = B / np.sqrt(A * q)
-            return float(q / (2 * np.sqrt(A)) * (np.pi / 2 - np.arcsin(t) - t * np.sqrt(1 - t * t)))
-
-        total = quad(along, 0, 2 * np.pi, epsabs=0, epsrel=1e-11, limit=200)[0]
-        return hertz.peak_pressure * total / (np.pi * 3.0)
-
-    for x, y in ((0.0, 0.0), (0.6, 0.0), (0.0, 0.7), (0.5, -0.5)):
-        at = np.array([x, y]) * axes
-        expected = hertz.approach - at[0] ** 2 / (2 * radii[0]) - at[1] ** 2 / (2 * radii[1])
-        assert moved(at) == pytest.approx(expected, rel=1e-9)
-
-
 def test_equal_radii_give_the_sphere() -> None:
     sphere = cr.smooth(
         cr.Scene(2.0, ALONE, cr.Material(3.0, 0.3), 0.4, geometry="summit"), load=1e-6
@@ -77,15 +51,6 @@ def test_equal_radii_give_the_sphere() -> None:
         assert_allclose([a, b], sphere.contact_radius, rtol=1e-9 if off else 1e-14)
         approach = ellipse.approach(1e-6, 3.0, (a, b))
         assert approach == pytest.approx(sphere.approach, rel=1e-9 if off else 1e-14)
-
-
-@pytest.mark.parametrize("ratio", [0.02, 0.1])
-def test_what_the_mean_curvature_neglects(ratio: float) -> None:
-    """An approach less by e^2 / 18, e the difference of the relative curvatures over the mean."""
-    radii = 1 / (1 + ratio / 2), 1 / (1 - ratio / 2)
-    exact = ellipse.approach(1.0, 1.0, ellipse.semi_axes(1.0, 1.0, radii))
-    mean = float(indentation(1.0, local_coefficient(1.0, 1.0)))
-    assert 1 - exact / mean == pytest.approx(ratio**2 / 18, rel=2 * ratio**2)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])

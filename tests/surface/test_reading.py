@@ -119,7 +119,7 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
 @pytest.mark.parametrize(
     ("content", "options", "message"),
     [
-        (matrix(), {}, "pixel: found none, expected its size, as the file does not say"),
+        (matrix(), {}, "pixel: found none, expected its size, which the file does not state"),
         (matrix(HOLED), {"pixel": 1.0}, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
         (matrix(np.full((7, 9), np.nan)), {"pixel": 1.0, "fill": True}, "expected some heights"),
         (matrix(np.ones((7, 9))), {"pixel": 1.0}, "found 1 everywhere, expected a rough surface"),
@@ -127,7 +127,7 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         (matrix(1e-9 * HEIGHTS), {"pixel": 1.0}, "rms slope .* give height_unit"),
         (matrix(), {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
         (matrix(), {"pixel": 1.0, "unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
-        (matrix(), {"pixel": 1.0, "height_unit": "nm"}, "unit: found none, expected that of a pix"),
+        (matrix(), {"pixel": 1.0, "height_unit": "nm"}, "unit: found none, expected the unit of"),
         (
             "# Width: 9 µm\n# Height: 7 µm\n" + matrix(),
             {"unit": "nm"},
@@ -142,9 +142,9 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         (
             "x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n",
             {},
-            "x, y: found a place twice, expected each",
+            "x, y: found a point twice, expected each",
         ),
-        ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected places"),
+        ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
         ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
         ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
         ("", {}, "empty"),
@@ -208,7 +208,7 @@ class TestInstruments:
     def test_no_such_format(self, tmp_path: Path) -> None:
         path = tmp_path / "a.bin"
         path.write_bytes(b"\1\2\3" * 50)
-        with pytest.raises(cr.FileError, match=r"a\.bin: no format that SurfaceTopography knows"):
+        with pytest.raises(cr.FileError, match=r"a\.bin: SurfaceTopography cannot read it"):
             raw(path)
         with pytest.raises(cr.FileError, match="cannot be read: No such file"):
             raw(tmp_path / "b.gwy")

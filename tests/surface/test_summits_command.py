@@ -50,7 +50,7 @@ def rows(path: str) -> list[dict[str, str]]:
 def test_a_scan_becomes_a_scene(command: Any) -> None:
     outcome = command("summits", "scan.npz", "--no-figures")
     assert outcome.status == 0
-    assert outcome.err.startswith("convexrough: hint: --scene or --radius presses on them")
+    assert outcome.err.startswith("convexrough: hint: use --scene or --radius to press")
     assert outcome.out.endswith("\nwritten here: summits.csv\n")
     summits = cr.surface.read("scan.npz").summits()
     table = rows("summits.csv")
@@ -144,7 +144,7 @@ def test_not_certified_is_exit_status_three(
     assert outcome.status == 3
     assert Path("summits.csv").exists()
     assert " none " in outcome.out
-    assert "not to be trusted" in outcome.err
+    assert "cannot be trusted" in outcome.err
 
 
 @pytest.mark.usefixtures("surface")
@@ -152,7 +152,7 @@ def test_nothing_is_overwritten_unasked(command: Any) -> None:
     Path("summits.csv").write_text("mine")
     outcome = command("summits", "scan.npz")
     assert outcome.status == 2
-    assert "summits.csv: is there already; --force replaces it, --out names another" in outcome.err
+    assert "summits.csv: exists already; --force replaces it, --out names another" in outcome.err
     assert Path("summits.csv").read_text() == "mine"
     assert sorted(path.name for path in Path().iterdir()) == [
         "scan.npz",
@@ -165,7 +165,7 @@ def test_nothing_is_overwritten_unasked(command: Any) -> None:
     ("arguments", "message"),
     [
         (("missing.npy",), "missing.npy: cannot be read: No such file"),
-        (("bare.npy",), "bare.npy: pixel: found none, expected its size, as the file does not say"),
+        (("bare.npy",), "bare.npy: pixel: found none, expected its size, which the file does not"),
         (("bare.npy", "--pixel", "one"), "--pixel: found 'one', expected a number, or two"),
         (("bare.npy", "--pixel", "1,30"), "pixel: found 1 by 30, expected sides at most 1 to 10"),
         (("bare.npy", "--pixel", "-1"), "pixel: found -1.0, expected a positive number"),
@@ -232,7 +232,7 @@ def test_holes_are_filled_where_asked_and_counted(command: Any) -> None:
 @pytest.mark.usefixtures("surface")
 def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any) -> None:
     outcome = command("summits", "scan.npz", "--radius", "1e4", "--approach", "-100")
-    assert "warning: at a pruning of 0.05 nothing touches: trust is that of a" in outcome.err
+    assert "warning: at a pruning of 0.05 nothing touches, so the model is not" in outcome.err
     assert "to be trusted     nothing, as nothing touches" in outcome.out
 
 

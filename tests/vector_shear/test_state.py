@@ -8,25 +8,20 @@ from friction_scenes import (
     FRICTION,
     VECTOR_FRACTIONS,
     VECTOR_NAMES,
-    assert_solves,
     cerruti,
     found,
     lengths,
     pressed,
-    with_friction,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, paper, random_scenes
+from scenes import MATERIAL, PAPER_APPROACH, paper
 
 import convexrough as cr
 from convexrough import FrictionConic, FrictionNewton, shear_vector
 from convexrough.sphere import mindlin
-from convexrough.vector_shear.problem import VectorProblem
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("fraction", [*VECTOR_FRACTIONS, 0.9999, 1 - 1e-9, 1.0])
 @pytest.mark.parametrize("name", VECTOR_NAMES)
 def test_without_poissons_ratio_it_is_ciavarella_and_jaeger(name: str, fraction: float) -> None:
@@ -43,7 +38,7 @@ def test_without_poissons_ratio_it_is_ciavarella_and_jaeger(name: str, fraction:
     assert set(state.status[contact.loads == 0]) == {"open"}
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("nu", "fraction", "forces", "transverse", "travel", "sliding"),
     [
@@ -77,27 +72,13 @@ def test_the_error_of_the_papers_assumption(
     assert state.disagreement == pytest.approx(norm, rel=1e-9)
 
 
-@pytest.mark.sample(5)
-@pytest.mark.parametrize("fraction", VECTOR_FRACTIONS)
-@pytest.mark.parametrize("name", VECTOR_NAMES)
-def test_the_equations_hold(name: str, fraction: float) -> None:
-    for nu in (0.3, 0.5):
-        state = found(name, nu, fraction)
-        assert_solves(state, 1e-11)
-        assert state.residual < 1e-12
-        statuses = np.where(lengths(state.slips) > 0, "sliding", "partial")
-        statuses[state.contact.loads == 0] = "open"
-        assert (state.status == statuses).all()
-
-
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 @pytest.mark.parametrize("fraction", [0.99, 0.999, 0.9999, 1 - 1e-6, 1 - 1e-9, 1 - 1e-12])
 def test_close_to_gross_sliding(fraction: float, nu: float) -> None:
     """All slide before Q = f P: then forces only turn, and the displacement grows as 1 / root."""
     state = found("paper", nu, fraction)
     assert state.residual < 1e-10
-    assert_solves(state, 1e-10)
     if fraction >= 0.9999:
         assert (lengths(state.slips) > 0).sum() == 37
         statuses = state.status[state.contact.loads > 0]
@@ -180,46 +161,6 @@ def test_small_forces_keep_their_digits() -> None:
         size = lengths(expected)
         assert (lengths(state.forces[touching] - expected) <= 1e-11 * size).all()
         assert_allclose(state.displacement, X, rtol=1e-11)
-
-
-@settings(max_examples=15, deadline=None)
-@given(
-    random_scenes(crowding=0.9),
-    st.one_of(st.floats(1e-6, 0.999), st.floats(-12, -2).map(lambda x: 1 - 10**x)),
-    st.floats(0, 0.5),
-    st.floats(0, 2 * np.pi),
-    st.integers(0, 2**32 - 1),
-)
-def test_random_scenes(
-    sampled: tuple[cr.Scene, float], fraction: float, nu: float, angle: float, seed: int
-) -> None:
-    """The law holds at every asperity, and no other forces that friction bears cost less energy."""
-    scene, approach = sampled
-    contact = cr.press(with_friction(scene, nu=nu), approach=approach)
-    if contact.load == 0 or contact.certificate.scope == "none":
-        return
-    Q = fraction * FRICTION * contact.load
-    state = shear_vector(contact, force=(Q * np.cos(angle), Q * np.sin(angle)))
-    assert state.residual < 1e-10
-    assert_solves(state, 1e-9 if fraction < 0.9999 else 1e-5)
-
-    problem = VectorProblem.of(contact)
-    force = problem.units.force * FRICTION
-    q, P = state.forces[problem.touching] / force, problem.loads
-    least = problem.energy(q, problem.couple(q))
-    rng = np.random.default_rng(seed)
-    for size in (1e-3, 0.1, 1.0):
-        trial = q + size * P[:, None] * rng.standard_normal(q.shape)
-        trial /= np.maximum(lengths(trial) / P, 1.0)[:, None]
-        # Projected on the total and on the discs in turn, until both hold.
-        excess = trial.sum(axis=0) - q.sum(axis=0)
-        for _ in range(50):
-            trial -= excess / len(P)
-            trial /= np.maximum(lengths(trial) / P, 1.0)[:, None]
-            excess = trial.sum(axis=0) - q.sum(axis=0)
-        displacement = np.hypot(*state.displacement) / problem.units.length / FRICTION
-        slack = np.hypot(*excess) * displacement / mindlin.ratio(nu) + 1e-12 * least
-        assert problem.energy(trial, problem.couple(trial)) >= least - slack
 
 
 def test_a_solver_that_is_missing_or_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

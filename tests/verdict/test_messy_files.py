@@ -583,7 +583,7 @@ def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
     assert f"{np.argmax(case.loads)} at (" in str(cases["loads: contact set"][0].text)
     again = command("verify", "scene.toml", name, "--junit", "found.xml")
     assert again.status == 2
-    assert "found.xml: is there already" in again.err
+    assert "found.xml: exists already" in again.err
 
 
 def test_bounds_are_said_in_plain_numbers() -> None:

@@ -187,12 +187,6 @@ def test_shear_forces_with_statuses(tmp_path: Path) -> None:
 # Positions
 
 
-def test_loads_are_matched_by_position(tmp_path: Path, contact: cr.Contact) -> None:
-    order = np.random.default_rng(3).permutation(len(contact.loads))
-    path = write_loads(tmp_path / "loads.csv", contact.scene, contact.loads, order)
-    assert np.array_equal(read_loads(path, contact.scene).values, contact.loads)
-
-
 @pytest.mark.parametrize(("offset", "fine"), [(0.009, True), (0.011, False)])
 def test_loads_at_a_slightly_different_place(
     tmp_path: Path, contact: cr.Contact, offset: float, fine: bool

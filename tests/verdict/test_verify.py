@@ -133,25 +133,6 @@ def test_noise(command: Any, contact: cr.Contact) -> None:
     assert command("verify", "a.toml", below, "--floor", "1e-20").status == 0
 
 
-def test_units_in_the_header(command: Any, contact: cr.Contact) -> None:
-    path = Path(claim(contact))
-    text = path.read_text()
-    path.write_text(text.replace("x,load,y", "x [mm],load [N],y [mm]"))
-    outcome = command("verify", "a.toml", str(path))
-    assert "load [N], x [mm], y [mm], matched by position" in outcome.out
-
-
-def test_columns_and_tolerance(command: Any, contact: cr.Contact) -> None:
-    path = Path(claim(contact))
-    path.write_text(path.read_text().replace("x,load,y", "X pos;P;b").replace(",", ";"))
-    named = ("--column", "load=P", "--column", "x=X pos", "--column", "y=b")
-    assert command("verify", "a.toml", str(path), *named).status == 0
-    assert command("verify", "a.toml", str(path), *named, "--tolerance", "1e-9").status == 0
-    outcome = command("verify", "a.toml", str(path), "--column", "q=P")
-    assert outcome.status == 2
-    assert "--column: found q=P, expected NAME=COLUMN" in outcome.err
-
-
 def shear_file(contact: cr.Contact, forces: Any, statuses: Any = None) -> str:
     rows = [repr(force) for force in np.asarray(forces).tolist()]
     if statuses is not None:

@@ -20,11 +20,11 @@ from convexrough.run.values import Fractions, Mistake, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.tabular.units import UnitNames
 
-#: Asperities whose loops are kept, at most, unless they are named.
+#: Largest number of asperities whose loops are computed, unless the scene file names them.
 MOST_LOOPS = 12
 
-#: Points of a loop, at most and at least, and touching asperities times points that are affordable:
-#: each takes a friction state of all of them.
+#: Most and fewest points of a loop by default, and the limit on touching asperities times points:
+#: each point takes a friction state of all touching asperities.
 MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, 600_000
 
 Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
@@ -32,7 +32,7 @@ Chosen = Annotated[
     Literal["all"] | list[Whole], expected('"all" or a list of indices of asperities, from 0')
 ]
 
-#: Numbers that a cycle has by these names.
+#: Attributes of a cycle that are numbers.
 OWN = ("force_amplitude", "displacement_amplitude", "displacement_error", "secant_stiffness",
        "loss_factor", "loss", "loss_error", "loss_normalised", "smooth_normalised",
        "balance_defect", "sliding", "partial", "undecided")  # fmt: skip
@@ -41,10 +41,10 @@ OWN = ("force_amplitude", "displacement_amplitude", "displacement_error", "secan
 class Cycle(Stage):
     """The largest and smallest shear forces of steady cycles, as fractions of f P.
 
-    minimum_fraction : as many; default: the negatives of the maxima
-    loop_points : of each loop, about; default: what is affordable
-    loop_asperities : whose loops to keep: indices or "all"; default: one at each distance from the
-        axis, of at most 12 distances
+    minimum_fraction : one for each maximum; default: the negatives of the maxima
+    loop_points : approximate number of points of a loop; default: fewer for more asperities
+    loop_asperities : asperities whose loops are computed: indices or "all"; default: one at each of
+        at most 12 distances from the axis
     """
 
     name = "cycle"
@@ -119,7 +119,7 @@ class Cycled(Result):
 
     @cached_property
     def loops(self) -> list[Loop]:
-        """The loops of each cycle, with those of some asperities."""
+        """The loops of each cycle, in total and for some asperities."""
         stage, contact = self.stage, self.contact
         touching = max(1, int((contact.loads > 0).sum()))
         affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
@@ -143,7 +143,7 @@ class Cycled(Result):
     def tables(self) -> dict[str, Columns]:
         """The tables of cycles, of fretting by asperity, and of loops, total and by asperity."""
         touching = int(np.count_nonzero(self.contact.loads))
-        worn = {  # with fractions in place of forces, as in the other tables
+        worn = {  # fractions replace forces, as in the other tables
             name: np.repeat([row[name] for row in self.known], touching)
             for name in self.stage.labels
         }
@@ -176,7 +176,7 @@ class Cycled(Result):
         return self.printed if self.smooth else over
 
     def lines(self, units: UnitNames) -> list[str]:
-        said = "no smooth reference, so no W/W0: a flat base, or a cylinder"
+        said = "no W/W0: a flat base or a cylinder has no smooth reference"
         return [*super().lines(units), *([] if self.smooth else [said])]
 
     def figures(self, **units: Any) -> Mapping[str, Any]:

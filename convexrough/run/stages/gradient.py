@@ -20,23 +20,24 @@ from convexrough.run.values import Mistake, Share, expected
 from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
 
-#: What a scene file may ask the gradient of, and its letter.
+#: Results whose gradient a scene file may ask for, and their symbols.
 LETTERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
 
 #: Parameters per asperity, and the name of one of them.
 EACH = {"heights": "height", "tip_radii": "tip_radius", "positions": "position"}
 
-#: What is one number for the whole scene.
+#: Parameters that are one number for the whole scene.
 SHARED = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load", "approach",
           "maximum", "minimum", "force")  # fmt: skip
 
 
 class Gradient(Stage):
-    """Of what, and by what.
+    """The result to differentiate, and the parameters.
 
     of       : "loss" of the cycle between +-fraction f P, "displacement" under fraction f P,
         "approach" or "load"
-    by       : which columns the table has;  holding : default: what is prescribed
+    by       : parameters with columns in the table
+    holding  : "load" or "approach", held constant; default: what is prescribed
     """
 
     name = "gradient"
@@ -83,7 +84,7 @@ class Gradient(Stage):
         return cycle(contact, maximum=force).gradient(holding=self.holding)
 
     def _in_the_file(self, error: InputError) -> InputError:
-        """The error, with the key of the scene file in place of the name of a force."""
+        """The error, with the name of a force replaced by the key of the scene file."""
         if error.what not in ("force", "maximum"):
             return error
         found = f"{self.fraction:g}, a force of {error.found}"
@@ -98,7 +99,7 @@ class Differentiated(Single):
     none_because: str = ""
 
     def rows(self) -> list[Summary]:
-        """Derivatives by single parameters and the largest by asperity, or why there are none."""
+        """Derivatives by the scene's parameters and the largest by asperities' parameters."""
         asked = self.stage
         if not self.found:
             return [{"of": asked.of, "none_because": self.none_because}]
@@ -140,15 +141,15 @@ class Differentiated(Single):
 
     def doubts(self) -> Iterator[str]:
         if not self.found:
-            yield f"no gradient of the {self.stage.of}: there is none for this scene"
+            yield f"no gradient of the {self.stage.of} exists for this scene"
 
     def lines(self, units: UnitNames) -> list[str]:
         said = self.known[0]
         if not self.found:
             return [f"gradient of the {said['of']}: none, {said['none_because']}"]
-        held, under = f"{said['holding']} held", ""
+        held, under = f"at constant {said['holding']}", ""
         if "fraction" in said:
-            under, held = f" at Q/(fP) = {said['fraction']:g}", f"{held}, and so is the force"
+            under, held = f" at Q/(fP) = {said['fraction']:g}", f"{held} and force"
         rows = [("  value", f"{said['value'] + 0.0:.10g}")]  # no -0
         rows += [(f"  by {name}", f"{slope + 0.0:.8g}") for name, slope in said["by"].items()]
         for name, most in said["largest"].items():

@@ -1,4 +1,4 @@
-"""[history]: shear forces one after the other."""
+"""[history]: a sequence of shear forces."""
 
 from __future__ import annotations
 

@@ -20,10 +20,10 @@ from convexrough.run.values import Finite, Positive
 from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
 
-#: Loads of this part of the largest, and greater, are looked at for what the geometry does to them.
+#: `closest_change` is taken over the loads that are at least this fraction of the largest.
 HEAVY = 0.1
 
-#: Relative difference between the geometries that is worth a word.
+#: Relative change of loads by the geometry above which the report mentions it.
 DIFFERENT = 0.01
 
 PROOF = ("scope", "convexity_number", "load_error", "gap_error", "duality_gap")
@@ -107,9 +107,9 @@ def judged_loads(certificate: Certificate, loads: Array) -> Summary:
 def doubts_of(normal: Summary) -> Iterator[str]:
     """The reasons why loads are not certified."""
     if normal["certificate"]["scope"] == "none":
-        yield "not certified: these loads come without any proof"
+        yield "not certified: nothing is proved about these loads"
     elif normal["undecided"]:
-        yield f"not certified: {normal['undecided']} of the asperities undecided"
+        yield f"not certified: undecided asperities: {normal['undecided']}"
 
 
 def cautions(normal: Summary, units: UnitNames) -> Iterator[str]:
@@ -120,12 +120,12 @@ def cautions(normal: Summary, units: UnitNames) -> Iterator[str]:
 
 
 def limits_of(contact: Contact) -> Summary:
-    """How far the model holds: keys of `plausibility.limits_of`, and
+    """Measures of the validity of the model: those of `plausibility.limits_of`, and
 
     geometry        : where asperities meet the base
     contact_modulus : [force / length^2]
-    closest_change  : the largest change of a load, relative to itself, in the geometry "closest";
-        None where that is the geometry, or where it is not found
+    closest_change  : largest relative change of a large load if the geometry were "closest"; None
+        if it is, or if the change could not be computed
     """
     scene, change = contact.scene, None
     if scene.geometry == "summit" and contact.loads.any():
@@ -142,7 +142,7 @@ def limits_of(contact: Contact) -> Summary:
 
 
 def describe(normal: Summary, units: UnitNames) -> list[str]:
-    """Aligned lines for people, of judged loads or of a contact."""
+    """The printed report, in aligned lines, of checked loads or of a contact."""
     proof = normal["certificate"]
     able = f"  ({normal['candidates']} could touch)" if "candidates" in normal else ""
     width = len(str(normal["asperities"]))

@@ -39,7 +39,10 @@ INCREASE = "indentations increase with the load: "
 
 
 class Ellipse(FileTable):
-    """An elliptic path, of load P + A cos t and shear force Q + B sin(t + phase), by chords."""
+    """An elliptic path in chords: load P + A cos t, shear force Q + B sin(t + phase).
+
+    load : P;  load_amplitude : A;  force : Q;  force_amplitude : B;  chords : their number
+    """
 
     load: Positive
     load_amplitude: Finite = 0.0
@@ -61,12 +64,12 @@ class _Points(Stage):
         loads, forces = self.loads, self.forces
         if self.ellipse is not None:
             if (loads, forces) != (None, None):
-                yield "ellipse", "found beside loads or forces, expected one of the two ways"
+                yield "ellipse", "found with loads or forces, expected an ellipse or both lists"
         elif loads is None or forces is None:
-            yield "loads, forces", "missing, both are needed where there is no ellipse"
+            yield "loads, forces", "missing, both are needed without an ellipse"
         elif len(loads) != len(forces) or not loads:
             found = f"{len(loads)} and {len(forces)} values"
-            yield "loads, forces", f"found {found}, expected as many of both, at least one"
+            yield "loads, forces", f"found {found}, expected equally many, at least one"
 
     def points(self, contact: Contact) -> dict[str, Any]:
         """Load and shear force [force] at the points of the path."""
@@ -136,7 +139,8 @@ class Pathed(Steps):
 class Steady(_Points):
     """A closed path that is repeated.
 
-    phases, factors : of an ellipse: its loss at other phases [rad], and with amplitudes times these
+    phases, factors : also compute the losses of the ellipse at these phases [rad], with its
+        amplitudes multiplied by these factors
     """
 
     name = "steady"
@@ -231,6 +235,6 @@ def _by_phase(losses: PhaseLosses) -> Columns:
 
 
 def unproved_order(result: Result, order: str | None) -> Iterator[str]:
-    """The reason that a proof needs an order of indentations which is not proved."""
+    """A reason if the order of indentations, which the proof of a result needs, is not proved."""
     if order is not None and not order.startswith("proved"):
-        yield f"not proved: the order of indentations, on which [{result.name}] rests"
+        yield f"not proved: the order of indentations that the proof of [{result.name}] needs"
