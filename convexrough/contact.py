@@ -271,21 +271,22 @@ def _contact(
             solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
         else:
             solution = _solved(solver, problem, first)
-        LOGGER.info("certifying")
-        if solution.refine and len(problem) and refines(problem):
-            state = solution.trial
+        state = solution.trial
+        if refine := bool(solution.refine and len(problem) and refines(problem)):
             if state is None or not np.array_equal(state.loads.high, solution.loads):
                 state = refined_loads(problem, solution.loads)
             solution = replace(solution, loads=state.loads.high)
-            loads = frozen(problem.to_scene(solution.loads * force))
+        loads = frozen(problem.to_scene(solution.loads * force))
+        radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
+        model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
+        LOGGER.info("certifying")
+        if refine:
+            assert state is not None
             found = proved(problem, state)
             certificate = certificate_of(problem, loads, state, found)
             known = (problem, state, found) if problem.influence.stored else None  # it is small
         else:
-            loads = frozen(problem.to_scene(solution.loads * force))
             certificate = certify_on(problem, loads)
-        radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
-        model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
     contact = Contact(
         scene=scene,
         loads=loads,
