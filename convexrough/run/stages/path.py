@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -13,7 +14,7 @@ from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.friction.cycle import steady
-from convexrough.friction.fretting import fretting, fretting_columns
+from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import load_path
 from convexrough.friction.phases import PhaseLosses, phase_losses
 from convexrough.friction.shapes import elliptic_path
@@ -192,10 +193,19 @@ class Settled(Single):
             said |= {"phase_losses": lists | {"order": losses.order}}
         return said
 
+    @cached_property
+    def worn(self) -> Fretting:
+        """The slip, losses and tractions of each asperity in the steady cycle."""
+        return fretting(self.found[0])
+
+    def prepare(self, *, figures: bool) -> None:
+        super().prepare(figures=figures)
+        _ = self.worn
+
     def tables(self) -> dict[str, Columns]:
         x, y = self.contact.scene.asperities.positions.T
         columns = self.found[0].columns("slips", "stick_radii", "status")
-        worn = fretting_columns([fretting(self.found[0])])
+        worn = fretting_columns([self.worn])
         tables = {"steady": {"x": x, "y": y, **columns}, "steady_fretting": worn}
         for losses in self.found[1:]:
             tables["phase_losses"] = _by_phase(losses)
