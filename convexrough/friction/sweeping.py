@@ -32,6 +32,7 @@ For one outside of the contact one neighbour alone does, if that is nearer to al
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -67,6 +68,8 @@ DIRECTIONS, NUMBERS = 256, 2**20
 def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Array:
     """(n,) lower bounds on y(C) for all 0 <= C <= C~; all -inf if one of the support may be 0.
 
+    With less than two on the support nothing is swept: row sums of A C~ say all there is.
+
     c     : (n,) C~, 0 where open
     spare : (n,) rates of open ones may be less than 0 by so much, and need not be known better
     most  : for how many weights of least total are sought
@@ -74,7 +77,7 @@ def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Arra
     support, others = np.flatnonzero(c > 0), np.flatnonzero(c == 0)
     rates = np.full(len(c), -np.inf)
     if len(support) < 2:
-        return rates + np.inf if len(support) == 0 else np.ones(len(c))
+        return rates
     swept = _Swept(influence, support, influence.scale * c, np.where(c > 0, 0.0, spare))
     rates[others] = swept.outside(others)
 
@@ -88,12 +91,19 @@ def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Arra
         for count in MORE:
             failed = unsettled(left)
             left, looked = left[failed], np.column_stack((looked, worst))[failed]
-            if len(left) > most:
+            if not 0 < len(left) <= most:
                 break
             rates[left], worst = swept.rates(left, *swept.tightest(left, count, looked))
         if not (rates[support] > 0).all():
             return np.full(len(c), -np.inf)
     return rates
+
+
+def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
+    """make(*rows), so many rows at once that about NUMBERS numbers are held."""
+    some = max(1, NUMBERS // cost)
+    parts = range(0, max(1, len(rows[0])), some)  # one at least, if empty
+    return np.concatenate([make(*(each[k : k + some] for each in rows)) for k in parts])
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,12 +174,7 @@ class _Swept:
         Weights are all 0 where some would be negative.
         """
         near = self.neighbours(which, NEIGHBOURS)
-        weights = np.zeros(near.shape)
-        some = max(1, NUMBERS // (near.shape[1] + 5) ** 2)
-        for start in range(0, len(which), some):
-            part = slice(start, start + some)
-            weights[part] = self._lightest(which[part], near[part])
-        return near, weights
+        return near, _in_parts(self._lightest, (near.shape[1] + 5) ** 2, which, near)
 
     def _lightest(self, which: Indices, near: Indices) -> Array:
         """With Lagrange's multipliers, without neighbours whose weights would be negative."""
@@ -207,12 +212,8 @@ class _Swept:
         By a barrier: from far inside of the constraints, until the total is less than 1.
         """
         near = self.neighbours(which, count)
-        weights = np.empty(near.shape)
-        some = max(1, NUMBERS // max(near.shape[1] * (NEAR + RINGS * SECTORS), len(self.support)))
-        for start in range(0, len(which), some):
-            part = slice(start, start + some)
-            weights[part] = self._tightest(which[part], near[part], looked[part])
-        return near, weights
+        cost = max(near.shape[1] * (NEAR + RINGS * SECTORS), len(self.support))
+        return near, _in_parts(self._tightest, cost, which, near, looked)
 
     def _tightest(self, which: Indices, near: Indices, looked: Indices) -> Array:
         spread = self._spread(which, near[:, 0])
@@ -246,7 +247,8 @@ class _Swept:
         away = self.places[self.support] - self.places[which][:, None]
         itself = self.support == which[:, None]
         apart = np.abs(np.where(itself, self.extent, away))
-        ring = np.log(apart / apart.min(axis=1, keepdims=True)) / np.log(self.extent / apart.min())
+        least = apart.min(axis=1, keepdims=True)
+        ring = np.log(apart / least) / np.log(self.extent / least)
         sector = np.angle(away) % (2 * np.pi) / (2 * np.pi)
         place = (ring.clip(0, 0.999) * RINGS).astype(int) * SECTORS
         place += np.minimum((sector * SECTORS).astype(int), SECTORS - 1)
