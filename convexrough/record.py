@@ -67,6 +67,9 @@ class Record:
         for name in (*self._shown, *(each.name for each in self._fields() if each.repr)):
             if text := in_text(getattr(self, name)):  # empty values are left out
                 yield name, text
+        scene = getattr(getattr(self, "contact", self), "scene", None)
+        if units := str(getattr(scene, "units", "")):
+            yield "units", units
 
     def _headline(self) -> str:
         """The record in one line."""

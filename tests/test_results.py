@@ -259,7 +259,7 @@ def test_without_an_extra(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_axes_in_axes_out() -> None:
     for name, result in having("plot").items():
-        alone = result.plot(length_unit="mm", force_unit="N")
+        alone = result.plot()
         assert isinstance(alone, Axes)
         mine, other = Figure().subplots(1, 2)
         assert plots.plot(result, other) is other

@@ -54,7 +54,7 @@ def compare(scene: Path, solvers: tuple[str, ...], log: Path | None, as_json: bo
     if log is not None:
         write_rows(log, report.steps(comparison))
     summary = report.comparison_summary(comparison)
-    echo(summary, report.describe_comparison(summary, file.units), as_json)
+    echo(summary, report.describe_comparison(summary, file.scene.units), as_json)
     for warning in report.comparison_warnings(summary):
         say_aside("warning", warning)
     outcomes = {entry.outcome for entry in comparison.entries}

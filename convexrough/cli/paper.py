@@ -34,7 +34,6 @@ def paper(
         write_results,
         write_tables,
     )
-    from convexrough.tabular.units import UnitNames
 
     folder = out or Path("paper-results")
     with results_folder(folder, force=force) as new, progress("reproducing the paper"):
@@ -49,7 +48,7 @@ def paper(
 
             files += write_figures(new, paper_figures(contact), formats=formats, dpi=dpi)
         if html:
-            page = slider_page(found[0], UnitNames())
+            page = slider_page(found[0])
             files.append(write_text(new / "slider.html", page))
         more = {"paper": comparison}
         files += write_results(new, found, figures=False, more=more)

@@ -63,17 +63,17 @@ def run(
             results = file.compute(contact)
             for result in results:
                 result.prepare(figures=not no_figures)
-            page = slider_page(results[0], file.units) if html else ""
+            page = slider_page(results[0]) if html else ""
         evidence = _proved(results) if proof else None
         with progress("writing results"):
             saved: dict[str, Any] = {"formats": formats, "dpi": dpi}
-            files = write_results(new, results, figures=not no_figures, units=file.units, **saved)
+            files = write_results(new, results, figures=not no_figures, **saved)
             files.append(write_text(new / "scene.toml", file.text))
             if html:
                 files.append(write_text(new / "slider.html", page))
             if evidence is not None:
                 evidence.save(new / "proof.json")
-    status = say(results, as_json, written(folder, files), file.units)
+    status = say(results, as_json, written(folder, files))
     if evidence is not None:
         click.echo(f"{evidence.proved}\nwritten  {folder / 'proof.json'}", err=as_json)
     return NOT_CERTIFIED if proof and evidence is None else status

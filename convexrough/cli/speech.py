@@ -12,7 +12,6 @@ import click
 
 if TYPE_CHECKING:
     from convexrough.run.stage import Result
-    from convexrough.tabular.units import UnitNames
 
 DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2, 3, 4, 130
 
@@ -26,17 +25,14 @@ def say(
     results: Iterable[Result],
     as_json: bool,
     lines: Sequence[str] = (),
-    units: UnitNames | None = None,
     more: dict[str, Any] | None = None,
 ) -> int:
     """Print the summary with `more`, or results and `lines`; print warnings; return exit status."""
     from convexrough.run.summary import describe, summarise, warnings
-    from convexrough.tabular.units import UnitNames
 
-    results, named = list(results), units or UnitNames()
-    said = describe(results, named)
-    echo(summarise(results) | (more or {}), [*said, *lines], as_json)
-    for warning in warnings(results, named):
+    results = list(results)
+    echo(summarise(results) | (more or {}), [*describe(results), *lines], as_json)
+    for warning in warnings(results):
         say_aside("warning", warning)
     return DONE if all(result.certified for result in results) else NOT_CERTIFIED
 

@@ -33,7 +33,6 @@ from convexrough.errors import ConvexroughError, FileError, InputError, blamed_o
 if TYPE_CHECKING:
     from convexrough.proof import Proof
     from convexrough.run.scene_file import SceneFile
-    from convexrough.tabular.units import UnitNames
     from convexrough.verdict.claims import Manner
     from convexrough.verdict.report import Verified
 
@@ -141,12 +140,12 @@ def verify(
     with ExitStack() as stack:
         stack.enter_context(_reported(junit))
         file = read_scene(scene)
-        manner = _manner(units=file.units, convert=file.convert, **how)
+        manner = _manner(units=file.scene.units, convert=file.convert, **how)
         if explain:
             read = [read_loads(loads, file.scene, manner)]
             read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
             lines = [line for each in read for line in (each.note, *each.explained, "")]
-            lines += report.describe_scene(file.scene, file.units)
+            lines += report.describe_scene(file.scene)
             echo({"read": lines}, lines, as_json)
             return DONE
         new = stack.enter_context(results_folder(out, force=force)) if out is not None else None
@@ -159,16 +158,16 @@ def verify(
         normal = judged_loads(found.verdict.certificate, found.verdict.loads)
         summary = headed(normal=normal) | report.verdict_summary(found)
         evidence = proved(partial(_proof, file, found, scene)) if proof else None
-        files = [] if new is None else _written(new, summary, found, file.units)
+        files = [] if new is None else _written(new, summary, found)
         if evidence is not None:
             evidence.save((new or Path()) / "proof.json")
     if junit is not None:
         write_text(junit, report.junit(found))
-    lines = report.describe_verdict(found, file.units)
-    lines += ["", "certificate of the given loads", *describe(normal, file.units)]
+    lines = report.describe_verdict(found)
+    lines += ["", "certificate of the given loads", *describe(normal, file.scene.units)]
     lines += written(out, files) if out is not None else []
     echo(summary, lines, as_json)
-    for hint in found.verdict.hints(file.units.force or "N"):
+    for hint in found.verdict.hints():
         say_aside("hint", hint)
     if not found.holds:
         reasons = filter(None, map(report.reason, found.claims))
@@ -192,15 +191,13 @@ def _reported(path: Path | None) -> Iterator[None]:
         raise
 
 
-def _written(
-    folder: Path, summary: dict[str, Any], found: Verified, units: UnitNames
-) -> list[Path]:
+def _written(folder: Path, summary: dict[str, Any], found: Verified) -> list[Path]:
     """Write verdict.json, verdict.csv and the figures; return the paths."""
     from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
     from convexrough.run.results import write_figures, write_json, write_tables
     from convexrough.verdict.report import asperity_columns
 
-    figures = verdict_figures(found.verdict, found.sheared, length_unit=units.length)
+    figures = verdict_figures(found.verdict, found.sheared)
     return [
         write_json(folder / "verdict.json", summary),
         *write_tables(folder, {"verdict": asperity_columns(found)}),

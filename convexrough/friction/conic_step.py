@@ -44,16 +44,8 @@ class ConicStepper(Stepper):
         pairs = zip(now.curves, own.tolist(), targets.tolist(), strict=True)
         curves = [old.go(top, target)[0] for old, top, target in pairs]
         moved = x - self.A @ (forces - now.carried)
-        work = now.work + 0.5 * (float(now.carried.sum()) + total) * x
-        return Bundle(
-            now.load,
-            level,
-            tuple(curves),
-            forces,
-            now.positions + moved,
-            now.displacement + x,
-            work,
-        )
+        positions, displacement = now.positions + moved, now.displacement + x
+        return Bundle(now.load, level, tuple(curves), forces, positions, displacement)
 
 
 @dataclass(frozen=True, eq=False)

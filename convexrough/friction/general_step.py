@@ -49,7 +49,7 @@ SETTLED, SETTLED_MOTION, NEGLIGIBLE = 1e-3, 1e-3, 1e-6
 class Bundle:
     """The state of n asperities after a step.
 
-    load    : P, as it identifies a level
+    load    : P, as it identifies a level;  height : T = Q / f
     curves  : the memory curve of each asperity;  carried : (n,) T_i
     positions : (n,) deflection plus drift, over c_t f
     displacement : X / (c_t f);  work : work of the shear force along X, over c_t f^2
@@ -61,6 +61,7 @@ class Bundle:
     carried: Array
     positions: Array
     displacement: float = 0.0
+    height: Fraction = Fraction(0)
     work: float = 0.0
 
     @property
@@ -108,17 +109,15 @@ class Stepper:
     def step(self, now: Bundle, load: Fraction, height: Fraction, cuts: int = CUTS) -> Bundle:
         """The state after one straight step; in two halves if Newton's method does not converge."""
         level = self.levels.snapshot(load)
-        if load == 0:
-            nothing = self.start(MemoryCurve())
-            return replace(nothing, work=now.work - now.displacement * float(now.carried.sum()) / 2)
         try:
-            return replace(self._solve(now, level, float(height)), load=load)
+            found = self._solve(now, level, float(height)) if load else self.start(MemoryCurve())
         except SolverError:
             if cuts == 0:
                 raise
-            before = now.load, Fraction(float(now.carried.sum()))
-            middle = (before[0] + load) / 2, (before[1] + height) / 2
+            middle = (now.load + load) / 2, (now.height + height) / 2
             return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
+        mean, run = float(now.height + height) / 2, found.displacement - now.displacement
+        return replace(found, load=load, height=height, work=now.work + mean * run)
 
     def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
         trial = _Trial.of(self, now, level)
@@ -143,8 +142,7 @@ class Stepper:
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
         moved = now.positions + iterate.eta
         displacement = now.displacement + iterate.x
-        work = now.work + 0.5 * (float(now.carried.sum()) + total) * iterate.x
-        return Bundle(now.load, level, iterate.curves, iterate.carried, moved, displacement, work)
+        return Bundle(now.load, level, iterate.curves, iterate.carried, moved, displacement)
 
     def stored(self, state: Bundle) -> float:
         """The elastic energy over c_t f^2: of own deflections along the curves, and of coupling."""

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, summed
 from convexrough.convex.theorem import distance
 from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.normal.boxes import Box, box_of_touching, crowded, tried
@@ -146,7 +146,7 @@ def stays_in(box: Box, state: Trial, errors: Array) -> Any:
 def errors_in(problem: Problem, box: Box, state: Trial) -> Array:
     """(n,) bounds on the errors of the trial loads, valid if the box holds the solution."""
     missing = _Missing.of(problem, state)
-    residual = missing.added_to(state.excess, box.fixed_open)
+    residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
     within = distance(residual, box.stiffness, 1.0 - box.convexity_number)
     return missing.errors(within, box.stiffness)
 
@@ -154,7 +154,7 @@ def errors_in(problem: Problem, box: Box, state: Trial) -> Array:
 def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Known:
     """The solution, by the theorem on the small box given by bounds on the errors of loads."""
     missing = _Missing.of(problem, state)
-    residual = missing.added_to(state.excess, box.fixed_open)
+    residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
     near = np.minimum(box.loads, (state.loads.high + at_first) * (1 + SAFETY))
     h = problem.stiffness(near)
     margin = 1.0 - np.minimum(box.convexity_number, box.problem.convexity_at(h))
@@ -162,7 +162,7 @@ def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Kn
     errors = missing.errors(within, h)
     # Bound A (P - P*) by Cauchy's inequality.
     softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
-    moved = (within / np.sqrt(softest) * problem.row_norm + missing.effect) * (1 + SAFETY)
+    moved = (within / np.sqrt(softest) * problem.row_norm + missing.coupled) * (1 + SAFETY)
     shift = _approach_error(problem, state, errors, moved)
     approach = Ball.around(state.approach.mid, shift)
     known = state.indentation
@@ -182,44 +182,34 @@ class Known(NamedTuple):
 
 
 class _Missing(NamedTuple):
-    """The part of the total load that the trial loads lack; it is added to the largest load.
+    """The part of the total load that the trial loads P lack: (1 + t) P have it, with |t| <= part.
 
-    size   : bound on this part
-    effect : bound on its contribution to every gap
-    place  : index of the largest load
-    own    : bound on its further contribution to the gap there
+    The factor 1 + t adds (2/3) t k P^(2/3) + t A P to the sides of the contact law. All of that but
+    a constant enters the residuals, because the approach is free.
+
+    loads, coupled : (n,) bounds on |t| P and |t| A P;  residual : (n,) on what enters the residuals
     """
 
-    size: Any
-    effect: Any
-    place: Indices
-    own: Array
+    loads: Array
+    coupled: Array
+    residual: Array
 
     @classmethod
+    @np.errstate(divide="ignore", invalid="ignore")
     def of(cls, problem: Problem, state: Trial) -> _Missing:
-        loads, missing = state.loads.high, state.missing.size
-        if not missing.any():
-            return cls(missing, 0.0 * missing, NONE, np.zeros(0))
-        place = np.argmax(loads, axis=-1, keepdims=True)
-        most, local = (np.take_along_axis(each, place, -1) for each in (loads, state.local))
-        steepest = 4.0 / 3.0 * local / most * (1 + SAFETY)
-        own = np.where(missing < most / 2.0, missing * steepest, np.inf)
-        return cls(missing, missing * problem.largest_entry, place, own)
-
-    def added_to(self, excess: Array, fixed_open: NDArray[np.bool_]) -> Array:
-        """(n,) bounds on the residuals that enter the theorem."""
-        residual = np.where(fixed_open, 0.0, excess + self.effect)
-        return self._with(residual, self.own)
+        loads, coupled, local = state.loads.high, state.product.upper, state.local
+        if not state.missing.size.any():
+            return cls(0.0 * loads, 0.0 * loads, 0.0 * loads)
+        part = state.missing.size / summed(loads) * (1 + SAFETY)
+        grows = coupled + 2.0 / 3.0 * local
+        middle = summed(np.where(state.inside, grows, 0.0)) / summed(1.0 * state.inside)
+        rest = np.abs(grows - middle) + 2 * state.product.radius + SAFETY * grows + part * local
+        known = part <= 0.5
+        return cls(*(np.where(known, part * each, np.inf) for each in (loads, coupled, rest)))
 
     def errors(self, within: Any, stiffness: Array) -> Array:
         """(n,) bounds on the errors of the loads."""
-        return self._with(within / np.sqrt(stiffness) * (1 + SAFETY), self.size)
-
-    def _with(self, values: Array, more: Any) -> Array:
-        if len(self.place):
-            there = np.take_along_axis(values, self.place, -1) + more
-            np.put_along_axis(values, self.place, there, -1)
-        return values
+        return np.asarray(within / np.sqrt(stiffness) * (1 + SAFETY) + self.loads)
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
@@ -247,6 +237,6 @@ def _approach_error(problem: Problem, state: Trial, errors: Array, moved: Any) -
     least = state.loads.high - errors
     # k P^(2/3) is concave: from least to P it rises by at most its slope at the former
     slope = problem.stiffness(np.where(least > 0, least, 1.0))
-    each = np.where(least > 0, state.gap.size + slope * errors * (1 + SAFETY), np.inf)
+    each = np.where(least > 0, state.gap.size + slope * errors + moved, np.inf)
     closest = each.min(axis=-1, initial=np.inf, keepdims=each.ndim > 1)
-    return (closest + moved) * (1 + SAFETY) + state.approach.radius
+    return closest * (1 + 4 * SAFETY) + state.approach.radius

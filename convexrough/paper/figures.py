@@ -17,7 +17,7 @@ from convexrough.paper.curves import forces_figure, loss_figure
 from convexrough.paper.states import SHARE, PaperStates
 from convexrough.plots.asperity_map import SLIDING, STICK, Layer, draw_contact
 from convexrough.plots.cycle import MOST_ASPERITIES, loops_figure
-from convexrough.plots.measure import Measure, Scale, measure, product, quantity
+from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.press import pressure_figure
 from convexrough.plots.shear import draw_state, legend_handles
@@ -45,9 +45,6 @@ from convexrough.sphere.smooth import smooth
 def paper_figures(
     contact: Contact,
     found: PaperStates | None = None,
-    *,
-    length_unit: str = "",
-    force_unit: str = "",
 ) -> Figures:
     """The figures of the paper's example, or of any contact with asperities in rings.
 
@@ -67,11 +64,11 @@ def paper_figures(
     if not contact.loads.any():
         return no_contact("fig3_pressure", "fig4_rings", "fig5_traction", "fig6_section",
                           "fig7_asperities", "fig8_loops", "fig9_energy")  # fmt: skip
-    scale = Scale(contact, length_unit, force_unit)
+    scale = Scale(contact)
     found = found or PaperStates.of(contact)
     some = evenly_chosen(list(found.named), MOST_ASPERITIES)
     firsts = [int(found.named[name][0]) for name in some]
-    pressure = product(force_unit, under=length_unit)
+    pressure = contact.scene.units.pressure
     f = checks.friction(contact.scene.friction)
     traction = measure(f * scale.peak, pressure, "(fp_0)")
     return Figures(
@@ -112,7 +109,7 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     bars.tick_params(axis="y", length=0)
     for row, value in zip(rows, start, strict=True):
         bars.text(1.02, row, f"{value:.4f}", fontsize=TICK, va="center")
-    limit = f"$fP$ = {quantity(scale.limit, scale.force_unit)}"
+    limit = f"$fP$ = {quantity(scale.limit, scale.units.force)}"
     label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
     title(bars, "light: stick in part; dark: slide")
     bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK,
@@ -139,7 +136,7 @@ def _traction_figure(state: ShearState, centre: int, scale: Scale, unit: Measure
     profile.plot(x / a, unit.of(fields.traction(state, line)), lw=1.4, color=ROUGH, label="$q$")
     profile.set(xlim=(-1.08, 1.08), ylim=(0.0, 1.06 * fp.max()))
     title(profile, "central asperity")
-    across = f"$x\\,/\\,a_i$  ($a_i$ = {quantity(a, scale.length_unit)})"
+    across = f"$x\\,/\\,a_i$  ($a_i$ = {quantity(a, scale.units.length)})"
     label(profile, across, unit.label("q"))
     legend_above(profile)
     return figure

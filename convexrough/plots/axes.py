@@ -58,9 +58,7 @@ from convexrough.vector_shear.state import VectorShearState
 from convexrough.verdict import Verdict
 
 
-def plot(
-    result: object, axes: Axes | None = None, *, length_unit: str = "", force_unit: str = ""
-) -> Axes:
+def plot(result: object, axes: Axes | None = None) -> Axes:
     """Draw the main picture of a result, and return the axes it is in.
 
     result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
@@ -71,7 +69,6 @@ def plot(
         phase; Shakedown: map of the factors; Surface, Summits: map; Provability: contacts by
         pruning
     axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
-    length_unit, force_unit : of the scene; where they are named, axes are in SI units with prefixes
 
     Raises InputError for anything else.
     """
@@ -85,7 +82,7 @@ def plot(
     if isinstance(contact, Contact) and not contact.loads.any():
         say_nothing(axes)
     else:
-        draw(result, axes, length_unit, force_unit)
+        draw(result, axes)
     return axes
 
 
@@ -103,17 +100,17 @@ def thumbnail(result: object) -> str:
     return image_tag(type(result).__name__, figure, 80)
 
 
-def _draw_state(state: State, axes: Axes, *units: str) -> None:
-    scale = Scale(state.contact, *units)
+def _draw_state(state: State, axes: Axes) -> None:
+    scale = Scale(state.contact)
     draw_state(axes, state, scale)
     axes.set_title(state_title(state, scale, narrow=False), fontsize=TICK)
     legend_below(axes, handles=legend_handles([state], scale))
 
 
-def _draw_cycle(cycle: Cycle, axes: Axes, *units: str) -> None:
+def _draw_cycle(cycle: Cycle, axes: Axes) -> None:
     if np.ptp(cycle.loads) > 0:
-        return draw_closed(axes, cycle, units[1])
-    scale = Scale(cycle.contact, *units)
+        return draw_closed(axes, cycle)
+    scale = Scale(cycle.contact)
     loop = cycle.loop(asperities=[])
     draw_loop(axes, scale, loop.displacements, loop.forces)
     if scale.sphere is not None:
@@ -122,14 +119,14 @@ def _draw_cycle(cycle: Cycle, axes: Axes, *units: str) -> None:
     return label(axes, scale.displacement.label("X"), scale.force.label("Q"))
 
 
-def _draw_path(path: LoadPath, axes: Axes, *units: str) -> None:
+def _draw_path(path: LoadPath, axes: Axes) -> None:
     if path.load_constant:
-        draw_path_loop(axes, path, Scale(path.contact, *units), between(path))
+        draw_path_loop(axes, path, Scale(path.contact), between(path))
     else:
-        draw_path(axes, path, units[1])
+        draw_path(axes, path)
 
 
-def _draw_times(comparison: Comparison | PathComparison, axes: Axes, *units: str) -> None:
+def _draw_times(comparison: Comparison | PathComparison, axes: Axes) -> None:
     """From above, what each took [s]; those without an answer say why."""
     rows = [_took(entry) for entry in comparison.entries]
     for place, (_, seconds, outcome) in enumerate(rows):
@@ -150,28 +147,28 @@ def _took(entry: Any) -> tuple[str, float | None, str]:
     return entry.solver, entry.contact.seconds if entry.contact else None, entry.outcome
 
 
-def _draw_summits(summits: Summits, axes: Axes, *units: str) -> None:
+def _draw_summits(summits: Summits, axes: Axes) -> None:
     every = np.ones(len(summits), dtype=bool)
     layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
     draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
 
 
-#: What draws each kind of result: of it, the axes, and the units of length and force.
+#: What draws each kind of result on axes.
 PICTURES: dict[type, Callable[..., Any]] = {
-    Contact: lambda it, axes, *units: draw_pressure(axes, Scale(it, *units)),
+    Contact: lambda it, axes: draw_pressure(axes, Scale(it)),
     ShearState: _draw_state,
     VectorShearState: _draw_state,
     Cycle: _draw_cycle,
-    Fretting: lambda it, axes, *units: draw_slip(axes, it, Scale(it.contact, *units)),
+    Fretting: lambda it, axes: draw_slip(axes, it, Scale(it.contact)),
     LoadPath: _draw_path,
-    MemoryCurve: lambda it, axes, *units: draw_curve(axes, it, units[1]),
-    PhaseLosses: lambda it, axes, *units: draw_losses(axes, it, *units),
-    Shakedown: lambda it, axes, *units: draw_factors(axes, it, units[0]),
-    Gradient: lambda it, axes, *units: draw_gradient(axes, it, Scale(it.contact, *units)),
-    Verdict: lambda it, axes, *units: draw_claim(axes, it, it.scene.asperities.positions, units[0]),
+    MemoryCurve: lambda it, axes: draw_curve(axes, it),
+    PhaseLosses: lambda it, axes: draw_losses(axes, it),
+    Shakedown: lambda it, axes: draw_factors(axes, it),
+    Gradient: lambda it, axes: draw_gradient(axes, it, Scale(it.contact)),
+    Verdict: lambda it, axes: draw_claim(axes, it, it.scene),
     Comparison: _draw_times,
     PathComparison: _draw_times,
-    Surface: lambda it, axes, *units: draw_surface(axes, it),
+    Surface: lambda it, axes: draw_surface(axes, it),
     Summits: _draw_summits,
-    Provability: lambda it, axes, *units: draw_provability(axes, it),
+    Provability: lambda it, axes: draw_provability(axes, it),
 }

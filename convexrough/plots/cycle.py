@@ -45,8 +45,6 @@ def cycle_figures(
     *,
     loops: Sequence[Loop] | None = None,
     asperities: Sequence[int] | None = None,
-    length_unit: str = "",
-    force_unit: str = "",
 ) -> Figures:
     """The figures of steady cycles of one contact.
 
@@ -64,7 +62,7 @@ def cycle_figures(
     several = len(np.unique([each.maximum - each.minimum for each in cycles])) > 1
     if not contact.loads.any():
         return no_contact("hysteresis", *(["loss"] if several else []))
-    scale = Scale(contact, length_unit, force_unit)
+    scale = Scale(contact)
     by_range = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
     r = np.hypot(*(contact.scene.contact_points - scale.centre).T)
     known = np.arange(len(r)) if loops is None else loops[0].asperities

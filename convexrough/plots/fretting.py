@@ -8,12 +8,12 @@ from matplotlib.axes import Axes
 from convexrough.arrays import Array
 from convexrough.friction.fretting import Fretting
 from convexrough.plots.asperity_map import draw_values
-from convexrough.plots.measure import Measure, Scale, measure, product
+from convexrough.plots.measure import Measure, Scale, measure
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import DOUBLE, TICK, no_contact, title
 
 
-def fretting_figures(worn: Fretting, *, length_unit: str = "", force_unit: str = "") -> Figures:
+def fretting_figures(worn: Fretting) -> Figures:
     """The figure of fretting in a steady cycle.
 
     "fretting" : maps of the slip amplitude at the rim of each disc, the energy lost per cycle, the
@@ -21,15 +21,14 @@ def fretting_figures(worn: Fretting, *, length_unit: str = "", force_unit: str =
     """
     if not worn.contact.loads.any():
         return no_contact("fretting")
-    scale = Scale(worn.contact, length_unit, force_unit)
+    scale = Scale(worn.contact)
     figure = Figure(figsize=(DOUBLE, 6.2), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
-    work = product(force_unit, length_unit)
-    pressure, f = product(force_unit, under=length_unit), scale.limit / worn.contact.load
+    pressure, f = scale.units.pressure, scale.limit / worn.contact.load
     most = _largest(worn.largest_tractions) if pressure else f * scale.peak
     traction = measure(most, pressure, f"(f{scale.pressure.symbol})")
     draw_slip(panels[0], worn, scale)
-    energy = measure(_largest(worn.losses), work, "W_m")
+    energy = measure(_largest(worn.losses), scale.units.work, "W_m")
     _draw(panels[1], scale, worn.losses, energy, "energy lost per cycle", "W_i")
     _draw(panels[2], scale, worn.mean_tractions, traction, "mean traction", "\\bar q_i")
     _draw(panels[3], scale, worn.largest_tractions, traction, "largest traction", "q_i")
@@ -44,7 +43,7 @@ def fretting_figures(worn: Fretting, *, length_unit: str = "", force_unit: str =
 def draw_slip(axes: Axes, worn: Fretting, scale: Scale) -> None:
     """The map of slip amplitudes."""
     most = _largest(worn.slip_amplitudes)
-    slip = measure(most if scale.length_unit else scale.travel, scale.length_unit, "X_0")
+    slip = measure(most if scale.units.length else scale.travel, scale.units.length, "X_0")
     _draw(axes, scale, worn.slip_amplitudes, slip, "slip amplitude at the rim", "s_i")
 
 

@@ -11,16 +11,14 @@ from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import SINGLE, title
 
 
-def gradient_figures(
-    gradient: Gradient, *, of: str = "J", length_unit: str = "", force_unit: str = ""
-) -> Figures:
+def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
     """The map of the derivatives by heights.
 
     "gradient" : contact discs, in the colour of D0 / J times dJ / dz; open asperities as dots
     of : what the number is called, as a formula
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.3), layout="constrained")
-    scale = Scale(gradient.contact, length_unit, force_unit)
+    scale = Scale(gradient.contact)
     draw_gradient(figure.subplots(), gradient, scale, of)
     return Figures({"gradient": figure})
 

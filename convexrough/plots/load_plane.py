@@ -11,7 +11,7 @@ from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import LoadPath
 from convexrough.friction.phases import PhaseLosses
 from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
-from convexrough.plots.measure import Measure, Scale, measure, product, quantity
+from convexrough.plots.measure import Measure, Scale, measure, quantity
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import (
     DASHED,
@@ -40,7 +40,7 @@ PATTERNS = ("-", (0, (5, 1.5)), (0, (3, 1.2, 1, 1.2)), (0, (1, 1)), "-")
 MOST_FACTORS = 5
 
 
-def steady_figures(found: Cycle, *, length_unit: str = "", force_unit: str = "") -> Figures:
+def steady_figures(found: Cycle) -> Figures:
     """The figure of a closed path.
 
     "steady" : the path in the load plane, with the two lines that keep the point (L*, T*) for ever;
@@ -48,33 +48,33 @@ def steady_figures(found: Cycle, *, length_unit: str = "", force_unit: str = "")
     """
     figure = Figure(figsize=(DOUBLE, 3.5), layout="constrained")
     plane, place = figure.subplots(1, 2)
-    draw_closed(plane, found, force_unit)
-    length = Scale(found.contact, length_unit, force_unit).length
+    draw_closed(plane, found)
+    length = Scale(found.contact).length
     layers = status_layers(found.status, found.contact.contact_radii)
     draw_map(place, found.scene.contact_points, layers, length)
     if handles := status_handles(np.unique(found.status)):
         legend_outside(figure, handles, "lower center", len(handles))
-    lost = quantity(found.loss, product(force_unit, length_unit))
+    lost = quantity(found.loss, found.scene.units.work)
     title(place, f"every later cycle loses {lost}")
     return Figures({"steady": figure})
 
 
-def phase_figures(found: PhaseLosses, *, length_unit: str = "", force_unit: str = "") -> Figures:
+def phase_figures(found: PhaseLosses) -> Figures:
     """The figure of losses at several phases and sizes.
 
     "phase_losses" : loss per cycle against the phase, a line for each size; and the smooth sphere's
     """
     figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
-    draw_losses(figure.subplots(), found, length_unit, force_unit)
+    draw_losses(figure.subplots(), found)
     return Figures({"phase_losses": figure})
 
 
-def draw_losses(axes: Axes, found: PhaseLosses, length_unit: str, force_unit: str) -> None:
+def draw_losses(axes: Axes, found: PhaseLosses) -> None:
     """Loss over factor^3, as losses of small cycles are of third order: lines come together."""
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     cubes = np.abs(found.factors) ** 3
     most = float((found.losses / cubes).max()) or 1.0
-    unit = measure(most, product(force_unit, length_unit), "W_m")
+    unit = measure(most, found.scene.units.work, "W_m")
     for size, shade, pattern in zip(sizes, shades_of(len(sizes)), PATTERNS, strict=False):
         those = np.flatnonzero(found.factors == size)
         those = those[np.argsort(found.phases[those])]
@@ -92,9 +92,12 @@ def draw_losses(axes: Axes, found: PhaseLosses, length_unit: str, force_unit: st
     )
 
 
-def draw_path(axes: Axes, path: LoadPath, force_unit: str) -> None:
+def draw_path(axes: Axes, path: LoadPath) -> None:
     """The path, and the memory curve at some of its points."""
-    f, unit = path.scene.friction or 1.0, _plane(axes, float(path.loads.max()), force_unit)
+    f, unit = (
+        path.scene.friction or 1.0,
+        _plane(axes, float(path.loads.max()), path.scene.units.force),
+    )
     P, T = unit.of(path.loads), unit.of(path.forces / f)
     axes.plot(np.append(unit.of(path.start), P), np.append(0.0, T), color=FAINT, lw=0.9)
     chosen = evenly_chosen(range(len(P)), MOST_CURVES)
@@ -105,9 +108,9 @@ def draw_path(axes: Axes, path: LoadPath, force_unit: str) -> None:
     legend_below(axes, handlelength=2.2)
 
 
-def draw_curve(axes: Axes, curve: MemoryCurve, force_unit: str) -> None:
+def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
     """One state: its vertices, and its front."""
-    unit = _plane(axes, float(curve.load), force_unit)
+    unit = _plane(axes, float(curve.load))
     axes.plot(*_vertices(curve, unit), "o-", color=ROUGH, lw=1.4, ms=3.5)
     if curve.front is None:
         return
@@ -119,9 +122,12 @@ def draw_curve(axes: Axes, curve: MemoryCurve, force_unit: str) -> None:
                   ha="left" if side > 0 else "right")  # fmt: skip
 
 
-def draw_closed(axes: Axes, found: Cycle, force_unit: str) -> None:
+def draw_closed(axes: Axes, found: Cycle) -> None:
     """A closed path, and the two lines that keep the point (L*, T*) for ever."""
-    f, unit = found.scene.friction or 1.0, _plane(axes, float(found.loads.max()), force_unit)
+    f, unit = (
+        found.scene.friction or 1.0,
+        _plane(axes, float(found.loads.max()), found.scene.units.force),
+    )
     P, T = (np.append(each, each[0]) for each in (found.loads, found.forces / f))
     level, height = found.level, found.force_level / f
     ends = np.array([level, P.max()])
@@ -133,7 +139,7 @@ def draw_closed(axes: Axes, found: Cycle, force_unit: str) -> None:
     title(axes, "dot: $(L^*, T^*)$, kept for ever")
 
 
-def _plane(axes: Axes, most: float, force_unit: str) -> Measure:
+def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
     """Names of the axes, and |T| = P, gross sliding; the measure of both."""
     unit = measure(most, force_unit, "P_m")
     for sign in (1.0, -1.0):

@@ -84,13 +84,6 @@ def literal(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def product(*units: str, under: str | None = None) -> str:
-    """The unit of a product, over the square of another; "" unless all are named."""
-    if not all(units) or under == "":
-        return ""
-    return " ".join(units) + (f"/{under}²" if under else "")
-
-
 def _metric(unit: str) -> tuple[str, int] | None:
     """The unit of SI that a unit is a power of ten of, and the power; None of others."""
     if (known := parsed(unit) if unit.strip() else None) is None:
@@ -118,8 +111,8 @@ class Scale:
     axes   : its semi-axes [length];  centre : (2,) [length] where distances are counted from
     """
 
-    def __init__(self, contact: Contact, length_unit: str = "", force_unit: str = "") -> None:
-        self.contact, self.length_unit, self.force_unit = contact, length_unit, force_unit
+    def __init__(self, contact: Contact) -> None:
+        self.contact, self.units = contact, contact.scene.units
         load, points = contact.load, contact.scene.contact_points
         self.sphere = smooth_reference(contact.scene, load) if load else None
         self.centre: Array = np.zeros(2)
@@ -139,8 +132,8 @@ class Scale:
             self.typical = float(rims[touching].max(initial=0.0))
             self.peak = load / (np.pi * self.typical**2) if load else 0.0
             symbols = "r_c", "\\bar p"
-        self.length = measure(self.typical, length_unit, symbols[0])
-        pressure, most = product(force_unit, under=length_unit), peak_pressures(contact).max()
+        self.length = measure(self.typical, self.units.length, symbols[0])
+        pressure, most = self.units.pressure, peak_pressures(contact).max()
         self.pressure = measure(float(most) if pressure else self.peak, pressure, symbols[1])
 
     @property
@@ -171,21 +164,21 @@ class Scale:
     @cached_property
     def force(self) -> Measure:
         """Of shear forces."""
-        return measure(self.limit, self.force_unit, "(fP)")
+        return measure(self.limit, self.units.force, "(fP)")
 
     @cached_property
     def displacement(self) -> Measure:
         """Of displacements along the shear."""
-        return measure(self.travel, self.length_unit, "X_0")
+        return measure(self.travel, self.units.length, "X_0")
 
     def energy(self, largest: float) -> Measure:
         """Of energies up to the largest."""
-        unit = product(self.force_unit, self.length_unit)
+        unit = self.units.work
         return measure(largest if unit else self.work, unit, "W_0")
 
     def footnote(self) -> str:
         """What f P and X0 are."""
         whose = f"the {self.name}'s" if self.sphere else "this contact's"
-        X0 = quantity(self.travel, self.length_unit)
-        limit = quantity(self.limit, self.force_unit)
+        X0 = quantity(self.travel, self.units.length)
+        limit = quantity(self.limit, self.units.force)
         return f"$fP$ = {limit},   $X_0$ = {X0}: {whose} $X$ at gross sliding"

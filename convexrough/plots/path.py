@@ -41,9 +41,7 @@ from convexrough.sphere import hertz
 MOST_MAPS = 8
 
 
-def path_figures(
-    path: LoadPath, *, fine: LoadPath | None = None, length_unit: str = "", force_unit: str = ""
-) -> Figures:
+def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
     """The figures of a load path; of a history, whose load is held, one.
 
     fine : the same with points between its own, as `between` finds; None to find them
@@ -55,14 +53,14 @@ def path_figures(
     """
     if path.load_constant and not path.contact.loads.any():
         return no_contact("history")
-    scale = Scale(path.contact, length_unit, force_unit)
+    scale = Scale(path.contact)
     figure = Figure(figsize=(DOUBLE, 3.0 if path.load_constant else 3.2), layout="constrained")
     *plane, loop, cost = figure.subplots(
         1, 2 if path.load_constant else 3, gridspec_kw={"wspace": 0.06}
     )
     fine = fine or between(path)
     for axes in plane:
-        draw_path(axes, path, force_unit)
+        draw_path(axes, path)
     draw_loop(loop, path, scale, fine)
     draw_cost(cost, path, scale, fine)
     figure.supxlabel(scale.footnote(), fontsize=TICK)

@@ -35,7 +35,7 @@ from convexrough.plots.style import (
 from convexrough.sphere import hertz
 
 
-def press_figures(contact: Contact, *, length_unit: str = "", force_unit: str = "") -> Figures:
+def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact, by the stem of the file each belongs in.
 
     "pressure" : map of the contact discs, and the profile along y = 0 with that of the smooth
@@ -45,7 +45,7 @@ def press_figures(contact: Contact, *, length_unit: str = "", force_unit: str = 
     """
     if not contact.loads.any():
         return no_contact("pressure", "loads")
-    scale = Scale(contact, length_unit, force_unit)
+    scale = Scale(contact)
     return Figures({"pressure": pressure_figure(scale), "loads": _loads_figure(scale)})
 
 

@@ -30,7 +30,7 @@ from convexrough.plots.style import (
 FINE = 240
 
 
-def shakedown_figures(found: Shakedown, *, length_unit: str = "", force_unit: str = "") -> Figures:
+def shakedown_figures(found: Shakedown) -> Figures:
     """The figures of a limit of shakedown; forces are drawn without units.
 
     "shakedown" : up to which factor of the path each asperity stops to slide, and which is first
@@ -39,14 +39,14 @@ def shakedown_figures(found: Shakedown, *, length_unit: str = "", force_unit: st
         every onset is known
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.4), layout="constrained")
-    draw_factors(figure.subplots(), found, length_unit)
+    draw_factors(figure.subplots(), found)
     figures = Figures({"shakedown": figure})
     if found.kind == "exact" and len(onsets := _onsets(found)) > 1:
         figures["shakedown_map"] = _map(found, onsets)
     return figures
 
 
-def draw_factors(axes: Axes, found: Shakedown, length_unit: str) -> None:
+def draw_factors(axes: Axes, found: Shakedown) -> None:
     """Each asperity in the shade of its factor; by "vector", which has one for all, of its slip."""
     vector = found.kind == "vector"
     known, points = np.isfinite(found.factors), found.scene.contact_points
@@ -60,7 +60,7 @@ def draw_factors(axes: Axes, found: Shakedown, length_unit: str) -> None:
         Layer("first", np.where(first, 1.25 * radii, 0.0), UNSURE, None),
         Layer("known", radii, colours.to_rgba(np.nan_to_num(values))),
     ]
-    draw_map(axes, points, layers, measure(float(np.ptp(points)), length_unit))
+    draw_map(axes, points, layers, measure(float(np.ptp(points)), found.scene.units.length))
     ringed = "\nringed: the first to slide on" if first.any() else ""
     title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
     if high > low:

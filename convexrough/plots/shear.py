@@ -42,9 +42,7 @@ State: TypeAlias = ShearState | VectorShearState
 MOST_PANELS = 12
 
 
-def shear_figures(
-    states: Sequence[ShearState], *, length_unit: str = "", force_unit: str = ""
-) -> Figures:
+def shear_figures(states: Sequence[ShearState]) -> Figures:
     """The map of each friction state of one contact, at most 12 of them, evenly chosen.
 
     "stick_slip" : contact discs with their stick discs inside, sliding asperities, open ones; and
@@ -52,7 +50,7 @@ def shear_figures(
     """
     if not states:
         return Figures()
-    scale = Scale(states[0].contact, length_unit, force_unit)
+    scale = Scale(states[0].contact)
     if not states[0].contact.loads.any():
         return no_contact("stick_slip")
     shown = evenly_chosen(states, MOST_PANELS)
@@ -74,7 +72,7 @@ def shear_figures(
         axes.remove()
     for axes in panels[len(shown) - columns : len(shown)]:
         axes.tick_params(labelbottom=True)
-    limit = f"$fP$ = {quantity(scale.limit, force_unit)}"
+    limit = f"$fP$ = {quantity(scale.limit, scale.units.force)}"
     figure.supxlabel(f"{scale.length.label('x')}    ({limit})", fontsize=LABEL)
     figure.supylabel(scale.length.short("y"), fontsize=LABEL)
     legend_outside(figure, legend_handles(shown, scale), "upper center", 2 if columns == 1 else 4)

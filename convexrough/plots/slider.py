@@ -24,7 +24,6 @@ from convexrough.scene.base import sphere_radius
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 from convexrough.tabular.columns import bound
-from convexrough.tabular.units import UnitNames
 
 #: Forces of the slider for up to so many touching asperities; fewer for still more.
 FORCES = {2_500: 101, 20_000: 51}
@@ -55,17 +54,17 @@ class Slides:
         return cls(contact, fractions, steady, loading)
 
 
-def slider_html(slides: Slides, proved: Sequence[str], units: UnitNames) -> str:
+def slider_html(slides: Slides, proved: Sequence[str]) -> str:
     """The page.
 
     proved : lines that say what is proved of the contact
     """
-    found = json.dumps(slider_data(slides, proved, units), separators=(",", ":"))
+    found = json.dumps(slider_data(slides, proved), separators=(",", ":"))
     template = files("convexrough.plots").joinpath("slider.html").read_text(encoding="utf-8")
     return template.replace("{{data}}", found.replace("<", "\\u003c"))
 
 
-def slider_data(slides: Slides, proved: Sequence[str], units: UnitNames) -> dict[str, Any]:
+def slider_data(slides: Slides, proved: Sequence[str]) -> dict[str, Any]:
     """What the page shows: lengths of the map in a_H, forces in f P, displacements in X0.
 
     Numbers have the five digits that are shown. `stick` has a row per force and a column per disc:
@@ -94,11 +93,11 @@ def slider_data(slides: Slides, proved: Sequence[str], units: UnitNames) -> dict
     edge = 1.06 * max(1.0, float(reach.max(initial=0.0)))
     empty = empty[np.maximum(np.abs(x[empty]), np.abs(y[empty])) < edge]
     return {
-        "units": units._asdict(),
+        "units": contact.scene.units._asdict(),
         "touching": len(touching),
         "edge": _digits(edge),
         "certificate": list(proved),
-        "letters": _letters(limit, a_H, X0, units),
+        "letters": _letters(limit, a_H, X0, *contact.scene.units),
         "left_out": _left_out(len(touching), len(shown), len(followed), len(fractions)),
         "states": _states(fractions, steady, X0, limit),
         "discs": {"index": shown.tolist(), "x": _digits(points[:, 0]), "y": _digits(points[:, 1]),
@@ -180,9 +179,9 @@ def _digits(values: ArrayLike) -> Any:
     return [float(f"{value:.5g}") for value in np.asarray(values).tolist()]
 
 
-def _letters(limit: float, a_H: float, X0: float, units: UnitNames) -> list[list[str]]:
+def _letters(limit: float, a_H: float, X0: float, *units: str) -> list[list[str]]:
     """Letter, its value, and what it is."""
-    force, length = (f" {unit}".rstrip() for unit in (units.force, units.length))
+    length, force = (f" {unit}".rstrip() for unit in units)
     return [
         ["f P", f"{limit:.5g}{force}", "the largest shear force: gross sliding"],
         ["a_H", f"{a_H:.5g}{length}", "contact radius of the smooth sphere"],

@@ -15,6 +15,7 @@ from convexrough.plots.asperity_map import CROWDED, Layer, draw_map, even_radii
 from convexrough.plots.measure import Measure, measure
 from convexrough.plots.notebook import Figure, Figures
 from convexrough.plots.style import DOUBLE, SINGLE, TICK, UNSURE, legend_below, title
+from convexrough.scene.scene import Scene
 from convexrough.verdict import Verdict
 
 #: Suspects that are numbered, likeliest first.
@@ -28,9 +29,7 @@ NAMES = {"partial": "partial slip"}
 MARKS = ["o", "X"]
 
 
-def verdict_figures(
-    verdict: Verdict, sheared: ShearVerdict | None = None, *, length_unit: str = ""
-) -> Figures:
+def verdict_figures(verdict: Verdict, sheared: ShearVerdict | None = None) -> Figures:
     """The figure of a verdict.
 
     "verdict" : map of the array, what is proved of each asperity, and those that are not as
@@ -40,15 +39,15 @@ def verdict_figures(
     claims: list[Claim] = [each for each in (verdict, sheared) if each is not None]
     width = SINGLE if len(claims) == 1 else DOUBLE
     figure = Figure(figsize=(width, 3.9), layout="constrained")
-    points = verdict.scene.asperities.positions
     for axes, claim in zip(figure.subplots(1, len(claims), squeeze=False)[0], claims, strict=True):
-        draw_claim(axes, claim, points, length_unit)
+        draw_claim(axes, claim, verdict.scene)
     return Figures({"verdict": figure})
 
 
-def draw_claim(axes: Axes, claim: Claim, points: Array, length_unit: str = "") -> None:
+def draw_claim(axes: Axes, claim: Claim, scene: Scene) -> None:
     """The map of one claim."""
-    status, length = claim.status, measure(float(np.ptp(points)), length_unit)
+    status, points = claim.status, scene.asperities.positions
+    length = measure(float(np.ptp(points)), scene.units.length)
     size = even_radii(points, np.ones(len(points), dtype=bool))
     layers = [
         Layer(name, np.where(status == name, size, 0.0), shade)

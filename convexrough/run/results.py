@@ -25,7 +25,6 @@ from convexrough.progress import LOGGER
 from convexrough.run.scene_file import SceneFile
 from convexrough.run.stage import Result, Summary
 from convexrough.run.summary import headed, summarise
-from convexrough.tabular.units import UnitNames
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -110,7 +109,6 @@ def write_results(
     results: Sequence[Result],
     *,
     figures: bool,
-    units: UnitNames | None = None,
     more: Mapping[str, Any] | None = None,
     **saved: Any,
 ) -> list[Path]:
@@ -125,24 +123,22 @@ def write_results(
         LOGGER.info(f"writing {result.name}")
         written += write_tables(folder, result.tables())
     if figures:
-        units = units or UnitNames()
         for result in results:
             LOGGER.info(f"drawing {result.name}")
-            pictures = result.figures(length_unit=units.length, force_unit=units.force)
-            written += write_figures(folder, pictures, **saved)
+            written += write_figures(folder, result.figures(), **saved)
     path = folder / "summary.json"
     write_json(path, summarise(results) | dict(more or {}))
     return [path, *written]
 
 
-def slider_page(pressed: Result, units: UnitNames) -> str:
+def slider_page(pressed: Result) -> str:
     """An HTML page with a slider for the shear force; its states are computed in this call.
 
     Raises InputError if the scene has no friction, or another base than a sphere.
     """
     from convexrough.plots.slider import Slides, slider_html  # matplotlib: only when it draws
 
-    return slider_html(Slides.of(pressed.contact), pressed.lines(units), units)
+    return slider_html(Slides.of(pressed.contact), pressed.lines())
 
 
 def write_json(path: Path, summary: Summary) -> Path:

@@ -80,7 +80,6 @@ class SceneFile(Record):
     stages: Mapping[str, Stage]
     solver: Solver
     influence: Kind | None
-    units: UnitNames
     convert: bool
 
     def problem(self) -> NormalProblem:
@@ -145,7 +144,6 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
         stages=study.stages,
         solver=named(study.solver.name),
         influence=study.solver.influence,
-        units=study.units.names,
         convert=study.units.convert,
     )
 
@@ -239,6 +237,7 @@ def build_scene(
             stuff,
             friction=study.friction.coefficient if study.friction else None,
             geometry=study.asperities.geometry,
+            units=study.units.names,
         )
 
     layout = study.asperities

@@ -118,6 +118,11 @@ class Result(Table, Plottable):
         """Name of the table in the scene file, the key in the summary and the CSV file."""
         return self.stage.name
 
+    @property
+    def units(self) -> UnitNames:
+        """The names of the scene's units."""
+        return self.contact.scene.units
+
     def rows(self) -> list[Summary]:
         """Rows of numbers and texts by key; by default one row for each of `found`."""
         return [numbers_of(each, self.stage.numbers) for each in self.found]
@@ -145,20 +150,20 @@ class Result(Table, Plottable):
         """Tables of columns, by the file name without its ending."""
         return {self.name: columns_of(self.known)}
 
-    def figures(self, **units: Any) -> Mapping[str, Figure]:
-        """Figures, by the file name without its ending; units are used for labels only."""
+    def figures(self) -> Mapping[str, Figure]:
+        """Figures, by the file name without its ending."""
         return {}
 
     def prepare(self, *, figures: bool) -> None:
         """Compute what tables and figures need, so that writing them solves nothing."""
         _ = self.known
 
-    def lines(self, units: UnitNames) -> list[str]:
+    def lines(self) -> list[str]:
         """The printed table, one string per line."""
         cut = self.known[-MOST_PRINTED:] if self.steps else self.known
         many = f"(the last {len(cut)} of {len(self.known)} rows; all are in {self.name}.csv)"
         printed = self.headings()
-        said = [titled(self.title or self.name, printed, units)]
+        said = [titled(self.title or self.name, printed, self.units)]
         said += [many] if len(cut) < len(self.known) else []
         rows = [[row[key] for key in printed] for row in cut]
         return [*said, *aligned([list(printed.values()), *rows], digits=self.digits)]
@@ -209,10 +214,10 @@ class Steps(Result):
         if figures:
             _ = self.fine
 
-    def figures(self, **units: Any) -> Mapping[str, Figure]:
+    def figures(self) -> Mapping[str, Figure]:
         from convexrough.plots import path_figures  # matplotlib: only when it draws
 
-        return path_figures(self.found[0], fine=self.fine, **units)
+        return path_figures(self.found[0], fine=self.fine)
 
     def summary(self) -> Summary:
         """A list along the steps for each number."""

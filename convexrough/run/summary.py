@@ -8,7 +8,6 @@ from typing import Any
 from convexrough.atomic import to_json as to_json
 from convexrough.run.stage import Result, Summary
 from convexrough.run.stages.normal import Pressed, cautions
-from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
 #: Version of the keys of summary.json and of the columns of tables.
@@ -25,15 +24,15 @@ def summarise(results: Iterable[Result]) -> Summary:
     return headed(**{result.name: result.summary() for result in results})
 
 
-def describe(results: Iterable[Result], units: UnitNames) -> list[str]:
+def describe(results: Iterable[Result]) -> list[str]:
     """The printed report of all stages, in aligned lines."""
     first, *others = results
-    return [*first.lines(units), *(line for it in others for line in ("", *it.lines(units)))]
+    return [*first.lines(), *(line for it in others for line in ("", *it.lines()))]
 
 
-def warnings(results: Iterable[Result], units: UnitNames) -> Iterator[str]:
+def warnings(results: Iterable[Result]) -> Iterator[str]:
     """Warnings: what is not proved, and where the model does not hold."""
     for result in results:
         yield from result.doubts()
         if isinstance(result, Pressed):
-            yield from cautions(result.known[0], units)
+            yield from cautions(result.known[0], result.units)

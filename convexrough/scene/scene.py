@@ -20,6 +20,7 @@ from convexrough.scene.lattice import Lattice
 from convexrough.scene.layout import MANY
 from convexrough.scene.material import Material
 from convexrough.scene.neighbours import refuse_coincident
+from convexrough.tabular.units import NAMELESS, UnitNames
 
 Geometry = Literal["summit", "closest"]
 
@@ -33,6 +34,8 @@ class Scene(Record):
     friction      : Coulomb's coefficient f; required only for shear
     geometry      : position of each contact: "closest" (where the two undeformed paraboloids are
         closest) or "summit" (at the summit of the asperity, as in the source paper)
+    units         : names of the units of length and force, as ("mm", "N"), for figures and reports;
+        no number is converted
 
     >>> asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
     >>> material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
@@ -46,6 +49,7 @@ class Scene(Record):
     material: Material
     friction: float | None = None
     geometry: Geometry = "closest"
+    units: UnitNames = NAMELESS
 
     def __post_init__(self) -> None:
         checks.instance("asperities", self.asperities, Asperities)
@@ -57,6 +61,7 @@ class Scene(Record):
             raise InputError(
                 "geometry", found=repr(self.geometry), expected='"summit" or "closest"'
             )
+        object.__setattr__(self, "units", UnitNames.of(self.units))
         if self.geometry == "closest" and (len(self) <= MANY or self.lattice is None):
             refuse_coincident(self.contact_points)
 

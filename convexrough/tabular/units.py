@@ -107,6 +107,20 @@ class UnitNames(NamedTuple):
     length: str = ""
     force: str = ""
 
+    @classmethod
+    def of(cls, names: object) -> UnitNames:
+        """These names, checked. Raises InputError."""
+        if not isinstance(names, tuple) or len(names) != 2:
+            raise InputError("units", found=repr(names), expected='two names, as ("mm", "N")')
+        for kind, name in zip(cls._fields, names, strict=True):
+            if not isinstance(name, str):
+                raise InputError(f"units, {kind}", found=repr(name), expected='a name, as "mm"')
+            known_unit(f"units, {kind}", name, kind)
+        return cls(*names)
+
+    def __str__(self) -> str:
+        return ", ".join(filter(None, self))
+
     def unit(self, kind: str) -> Unit | None:
         """The scene's unit of a kind; None where it names none."""
         length, force = (parsed(name) if name else None for name in self)
@@ -115,6 +129,11 @@ class UnitNames(NamedTuple):
         if kind == "pressure" and length and force:
             return (force * length**-2)._replace(name=self.pressure)
         return {"length": length, "force": force}.get(kind)
+
+    @property
+    def work(self) -> str:
+        """The name of the unit of work, "" unless both are named."""
+        return f"{self.force} {self.length}" if self.length and self.force else ""
 
     @property
     def pressure(self) -> str:

@@ -19,7 +19,6 @@ from convexrough.plausibility import described_modulus
 from convexrough.record import rows_of
 from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import aligned, bound, labelled
-from convexrough.tabular.units import NAMELESS, UnitNames
 from convexrough.verdict.verdict import Verdict
 
 #: From this part on errors are said in per cent.
@@ -84,18 +83,18 @@ def _columns(claim: Claim) -> dict[str, NDArray[Any]]:
     return columns
 
 
-def describe_verdict(found: Verified, units: UnitNames) -> list[str]:
+def describe_verdict(found: Verified) -> list[str]:
     """Aligned lines: of each claim the wrong set, undecided, off, and the total, in this order."""
-    lines = [*found.notes, *describe_scene(found.verdict.scene, units)]
+    lines = [*found.notes, *describe_scene(found.verdict.scene)]
     for claim in found.claims:
         others = ": --json and --out have all"
-        lines += ["", *describe_claim(claim, found.verdict.scene, units, others)]
+        lines += ["", *describe_claim(claim, found.verdict.scene, others)]
     return lines
 
 
-def describe_scene(scene: Scene, units: UnitNames) -> list[str]:
+def describe_scene(scene: Scene) -> list[str]:
     """Lines about the scene: geometry and contact modulus."""
-    modulus = described_modulus(scene.material.contact_modulus, units)
+    modulus = described_modulus(scene.material.contact_modulus, scene.units)
     return labelled([("geometry", scene.geometry), ("contact modulus", modulus)])
 
 
@@ -117,13 +116,11 @@ def _size(claim: Claim) -> str:
     return f"{f'{bound(100 * claim.error)} %' if per_cent else bound(claim.error)} of the largest"
 
 
-def describe_claim(
-    claim: Claim, scene: Scene, units: UnitNames = NAMELESS, others: str = ""
-) -> list[str]:
+def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
     """Aligned lines of one claim; `others` says where those are that a table leaves out."""
 
     def table(which: Indices) -> list[str]:
-        lines = _table(claim, scene, units, which[:MOST_LISTED])
+        lines = _table(claim, scene, which[:MOST_LISTED])
         more = len(which) - MOST_LISTED
         return [*lines, f"    and {more:,} more{others}"] if more > 0 else lines
 
@@ -138,7 +135,7 @@ def describe_claim(
     lines += labelled([("undecided", str(len(claim.undecided) or "none"))])
     lines += table(claim.undecided)
     lines += [*labelled([(f"{claim.one} error", _off(claim))]), *table(claim.off)]
-    lines += labelled([(f"total {claim.one}", _total(claim, units.force))])
+    lines += labelled([(f"total {claim.one}", _total(claim, scene.units.force))])
     if len(claim.suspects):
         lines += [*labelled([("suspects", "likeliest first")]), *table(claim.suspects)]
     return lines
@@ -197,11 +194,12 @@ def _named(scene: Scene, which: Indices) -> str:
     return joined(f"{i} at ({points[i, 0]:.6g}, {points[i, 1]:.6g})" for i in which)
 
 
-def _table(claim: Claim, scene: Scene, units: UnitNames, which: Indices) -> list[str]:
+def _table(claim: Claim, scene: Scene, which: Indices) -> list[str]:
     """A row for each of these asperities; none of none."""
     if len(which) == 0:
         return []
-    names = {"x": units.length, "y": units.length, claim.one: units.force}
+    length, force = scene.units
+    names = {"x": length, "y": length, claim.one: force}
     named = [f"{each} [{unit}]" if unit else each for each, unit in names.items()]
     nearby, points = claim.nearby(), scene.asperities.positions.tolist()
     rows = [

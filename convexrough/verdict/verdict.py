@@ -107,7 +107,7 @@ class Verdict(Claim, Table, Plottable):
         found = self.solution
         return None if found is None else (found.loads, found.certificate.load_errors)
 
-    def hints(self, force_unit: str = "N") -> Iterator[str]:
+    def hints(self) -> Iterator[str]:
         """What loads that are wrong may come from."""
         small = self.loads[self.wrongly_loaded]
         if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
@@ -120,8 +120,8 @@ class Verdict(Claim, Table, Plottable):
         if expected is None and self.solution is not None:
             expected = self.solution.load
         if expected and (power := power_of_ten(self.total_given / expected)):
-            prefix = PREFIXES.get(power)
-            example = f", as {prefix}{force_unit} for {force_unit}" if prefix else ""
+            prefix, unit = PREFIXES.get(power), self.scene.units.force or "N"
+            example = f", as {prefix}{unit} for {unit}" if prefix else ""
             yield f"the loads are 10^{power} times what they should be: another unit{example}?"
         if self.solution is not None and (moved := self._moved(self.solution.loads)):
             yield f"the loads are right with {moved}"

@@ -18,10 +18,11 @@ from scenes import MATERIAL, random_scenes
 
 import convexrough as cr
 from convexrough.arrays import Array
+from convexrough.errors import SolverError
 from convexrough.friction import general_step
 from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.general_step import followed
-from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.general_step import Bundle, Stepper, followed
+from convexrough.friction.levels import FrictionLevels, Snapshot
 from convexrough.influence import couple
 
 #: c_t f of the scenes here.
@@ -46,6 +47,27 @@ def test_one_step_per_segment_is_the_memory_curve(points: list[tuple[float, floa
     scene, P, Q = path_of("paper", points)
     path = cr.load_path(scene, loads=P, forces=Q)
     agree(path, cr.load_path(scene, loads=P, forces=Q, steps=1), 1e-12)
+
+
+def test_a_step_is_cut_in_its_exact_middle() -> None:
+    """Of P and T as rational numbers, not of the sum of the forces that were found."""
+    third = Fraction(LARGEST["paper"]) / 3
+    levels = cr.press(PAPER, load=LARGEST["paper"]).cached(FrictionLevels)
+    asked: list[tuple[Fraction, Fraction]] = []
+
+    class OnceCut(Stepper):
+        def step(self, now: Bundle, load: Fraction, height: Fraction, cuts: int = 6) -> Bundle:
+            asked.append((load, height))
+            return super().step(now, load, height, cuts)
+
+        def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
+            if len(asked) == 2:
+                raise SolverError("not this one", solver="general step")
+            return super()._solve(now, level, total)
+
+    first, last = (2 * third, third / 7), (third, third / 3)
+    OnceCut(levels).along(MemoryCurve.pressed(third), [first, last], 1)
+    assert asked == [first, last, ((first[0] + last[0]) / 2, (first[1] + last[1]) / 2), last]
 
 
 @settings(max_examples=8, deadline=None)

@@ -20,7 +20,7 @@ def dense() -> cr.Contact:
         spacing=2e-4, tip_radius=1.6e-3, within=8.5e-3, height_std=2e-7, seed=3
     )
     return cr.press(
-        cr.Scene(1.0, asperities, MATERIAL, friction=0.5, geometry="summit"),
+        cr.Scene(1.0, asperities, MATERIAL, 0.5, geometry="summit", units=("mm", "N")),
         approach=PAPER_APPROACH,
     )
 
@@ -51,7 +51,7 @@ def test_a_dense_stick_slip_map_is_a_mosaic() -> None:
 
 def test_a_dense_profile_is_density_and_median() -> None:
     contact = dense()
-    figures = plots.press_figures(contact, length_unit="mm", force_unit="N")
+    figures = plots.press_figures(contact)
     for figure in figures.values():
         fits(figure)
     _, profile, _ = figures["pressure"].axes

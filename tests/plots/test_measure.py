@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 import convexrough as cr
 from convexrough import plots
-from convexrough.plots.measure import measure, product, quantity
+from convexrough.plots.measure import measure, quantity
+from convexrough.tabular.units import UnitNames
 
 
 @pytest.mark.parametrize(
@@ -42,8 +43,8 @@ def test_axes_are_in_si_where_units_are_named() -> None:
     assert measure(3.0, "in", "a_H").label("x") == "$x$  [in]"
     assert measure(4.0, "", "a_H").label("x") == "$x\\,/\\,a_H$  ($a_H$ = 4)"
     assert measure(4.0, "").label("x") == "$x$"
-    assert product("N", under="mm") == "N/mm²"
-    assert product("N", under="") == product("", "mm") == ""
+    assert (UnitNames("mm", "N").pressure, UnitNames("mm", "N").work) == ("N/mm²", "N mm")
+    assert UnitNames("mm").pressure == UnitNames(force="N").work == ""
 
 
 def scattered(load: float = 2.0) -> cr.Contact:
@@ -51,12 +52,13 @@ def scattered(load: float = 2.0) -> cr.Contact:
     points = random.uniform(-0.12, 0.12, (90, 2))
     asperities = cr.Asperities(points, random.uniform(0.02, 0.06, 90), random.normal(0, 2e-4, 90))
     material = cr.Material.from_youngs(210e3, 0.3)
-    return cr.press(cr.Scene(10.0, asperities, material, friction=0.4), load=load)
+    scene = cr.Scene(10.0, asperities, material, friction=0.4, units=("mm", "N"))
+    return cr.press(scene, load=load)
 
 
 def test_scattered_asperities_are_all_in_the_right_panel() -> None:
     contact = scattered()
-    figure = plots.press_figures(contact, length_unit="mm", force_unit="N")["pressure"]
+    figure = plots.press_figures(contact)["pressure"]
     fits(figure)
     panel = figure.axes[1]
     (points,) = [line for line in panel.lines if line.get_marker() == "o"]
@@ -84,7 +86,7 @@ def test_fretting_is_drawn_with_units() -> None:
     contact = scattered()
     cycle = cr.cycle(contact, maximum=0.2 * contact.load)
     worn = cr.fretting(cycle)
-    figure = plots.fretting_figures(worn, length_unit="mm", force_unit="N")["fretting"]
+    figure = plots.fretting_figures(worn)["fretting"]
     fits(figure)
     said = " ".join(text.get_text() for text in texts(figure))
     for unit in ("nm]", "nJ]", "GPa]"):

@@ -1,20 +1,21 @@
 """Figures of load paths: they show the numbers of the results, and nothing in them collides."""
 
+from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
 from figure_checks import discs, fits, texts
 from numpy.testing import assert_allclose
-from path_scenes import LARGEST, ONE, PAPER, TWO, follow
+from path_scenes import LARGEST, ONE, PAPER, TWO, follow, path_of
 
 import convexrough as cr
 from convexrough import plots
 from convexrough.plots.asperity_map import LOOKS
 
 P = LARGEST["paper"]
-UNITS: Any = dict(length_unit="µm", force_unit="mN")
+UNITS = ("µm", "mN")
+NAMED = replace(PAPER, units=UNITS)
 
 
 @cache
@@ -24,7 +25,7 @@ def limits() -> dict[str, cr.Shakedown]:
         load=0.0, load_amplitude=0.09 * P, force_amplitude=0.09 * P, phase=0.8, friction=0.5
     )
     return {
-        "constant": cr.shakedown(PAPER, loads=P, force_amplitudes=swing),
+        "constant": cr.shakedown(NAMED, loads=P, force_amplitudes=swing),
         "about a mean": cr.shakedown(PAPER, loads=P, forces=0.1 * P, force_amplitudes=swing),
         "ellipse": cr.shakedown(PAPER, loads=0.9 * P, load_amplitudes=p, force_amplitudes=q),
         "elastic": cr.shakedown(PAPER, loads=P, force_amplitudes=swing, kind="elastic"),
@@ -37,7 +38,7 @@ def limits() -> dict[str, cr.Shakedown]:
 @cache
 def losses() -> cr.PhaseLosses:
     return cr.phase_losses(
-        PAPER,
+        NAMED,
         load=0.7 * P,
         load_amplitude=0.2 * P,
         force_amplitude=0.14 * P,
@@ -50,7 +51,9 @@ def losses() -> cr.PhaseLosses:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("points", [ONE, TWO, ONE[:1]])
 def test_figures_of_a_path_fit(points: list[tuple[float, float]]) -> None:
-    for figure in plots.path_figures(follow("paper", points), **UNITS).values():
+    scene, loads, forces = path_of("paper", points)
+    path = cr.load_path(replace(scene, units=UNITS), loads=loads, forces=forces)
+    for figure in plots.path_figures(path).values():
         fits(figure)
 
 
@@ -70,8 +73,8 @@ def test_the_path_and_its_memory_are_drawn() -> None:
 
 
 def test_what_a_closed_path_settles_to() -> None:
-    found = cr.steady(PAPER, loads=[0.9 * P, 0.5 * P], forces=[0.2 * P, -0.2 * P])
-    figure = plots.steady_figures(found, **UNITS)["steady"]
+    found = cr.steady(NAMED, loads=[0.9 * P, 0.5 * P], forces=[0.2 * P, -0.2 * P])
+    figure = plots.steady_figures(found)["steady"]
     fits(figure)
     plane, place = figure.axes
     pico = 1e-9  # of mN
@@ -84,7 +87,7 @@ def test_what_a_closed_path_settles_to() -> None:
 
 def test_losses_against_phase_are_drawn() -> None:
     found = losses()
-    figure = plots.phase_figures(found, **UNITS)["phase_losses"]
+    figure = plots.phase_figures(found)["phase_losses"]
     fits(figure)
     (axes,) = figure.axes
     half, _, whole, *_ = (line.get_ydata() for line in axes.lines)
@@ -96,7 +99,7 @@ def test_losses_against_phase_are_drawn() -> None:
 @pytest.mark.parametrize("name", ["constant", "about a mean", "ellipse", "elastic", "vector"])
 def test_limits_are_drawn(name: str) -> None:
     found = limits()[name]
-    figures = plots.shakedown_figures(found, **UNITS)
+    figures = plots.shakedown_figures(found)
     assert set(figures) == {"shakedown"} | ({"shakedown_map"} if found.kind == "exact" else set())
     for figure in figures.values():
         fits(figure)

@@ -88,7 +88,8 @@ def contact(request: pytest.FixtureRequest) -> cr.Contact:
 
 @pytest.mark.sample(4)
 def test_fit_to_print(contact: cr.Contact) -> None:
-    for figure in press_figures(contact, length_unit="µm", force_unit="mN").values():
+    scene = dataclasses.replace(contact.scene, units=("µm", "mN"))
+    for figure in press_figures(dataclasses.replace(contact, scene=scene)).values():
         fits(figure)
         for axes in figure.axes[:2] if contact.loads.any() else ():
             assert axes.get_xlabel()
@@ -149,7 +150,7 @@ def test_doubt_is_shown(scope: str, undecided: int) -> None:
 
 
 def test_no_contact_is_said() -> None:
-    for figure in press_figures(CASES["nothing"](), length_unit="mm").values():
+    for figure in press_figures(CASES["nothing"]()).values():
         assert "no contact" in {text.get_text() for text in texts(figure)}
 
 

@@ -19,7 +19,7 @@ from convexrough.plots.asperity_map import SLIDING
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import smooth
 
-UNITS: Any = dict(length_unit="µm", force_unit="mN")
+UNITS = ("µm", "mN")
 
 
 def pressed(name: str) -> cr.Contact:
@@ -29,8 +29,9 @@ def pressed(name: str) -> cr.Contact:
         "one": cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL, geometry="summit"),
         "nothing": paper(),
     }
-    scene = dataclasses.replace(scenes[name], friction=0.5)
-    return cr.press(scene, approach=-1e-6 if name == "nothing" else PAPER_APPROACH)
+    bare, *units = name.split(" in ")
+    scene = dataclasses.replace(scenes[bare], friction=0.5, units=UNITS if units else ("", ""))
+    return cr.press(scene, approach=-1e-6 if bare == "nothing" else PAPER_APPROACH)
 
 
 contact = cache(pressed)
@@ -55,7 +56,7 @@ def past(name: str, shares: Any) -> cr.LoadPath:
 
 @cache
 def of_paper(name: str) -> dict[str, Figure]:
-    return paper_figures(contact(name), **UNITS)
+    return paper_figures(contact(f"{name} in units"))
 
 
 def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
@@ -76,10 +77,11 @@ def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
      ("one", [0.5]), ("rough", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])],
 )  # fmt: skip
 def test_fit_to_print(name: str, shares: list[float]) -> None:
-    fits(plots.shear_figures(states(name, shares), **UNITS)["stick_slip"])
-    fits(plots.path_figures(past(name, shares), **UNITS)["history"])
+    name = f"{name} in units"
+    fits(plots.shear_figures(states(name, shares))["stick_slip"])
+    fits(plots.path_figures(past(name, shares))["history"])
     many = steady(name, np.abs(shares), np.minimum(shares, -np.abs(shares) / 9))
-    for figure in plots.cycle_figures(many, **UNITS).values():
+    for figure in plots.cycle_figures(many).values():
         fits(figure)
 
 
@@ -230,12 +232,12 @@ def test_the_crossing_is_marked_where_it_is() -> None:
 
 
 def test_no_contact_is_said() -> None:
-    nothing = contact("nothing")
+    nothing = contact("nothing in units")
     figures = (
-        plots.shear_figures([cr.shear(nothing, force=0.0)] * 2, **UNITS)
-        | plots.cycle_figures(cr.cycles(nothing, [0.0, 0.0]), **UNITS)
-        | plots.path_figures(cr.history(nothing, forces=[0.0, 0.0]), **UNITS)
-        | paper_figures(nothing, **UNITS)
+        plots.shear_figures([cr.shear(nothing, force=0.0)] * 2)
+        | plots.cycle_figures(cr.cycles(nothing, [0.0, 0.0]))
+        | plots.path_figures(cr.history(nothing, forces=[0.0, 0.0]))
+        | paper_figures(nothing)
     )
     assert len(figures) == 10
     for figure in figures.values():

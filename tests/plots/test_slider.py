@@ -17,9 +17,7 @@ from convexrough.paper import example
 from convexrough.plots import slider
 from convexrough.run.results import slider_page
 from convexrough.run.stages.normal import Normal, Pressed
-from convexrough.tabular.units import UnitNames
 
-UNITS = UnitNames("m", "N")
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 BROWSER = next((found for name in NAMES if (found := shutil.which(name))), None)
 in_browser = pytest.mark.skipif(
@@ -31,17 +29,17 @@ def pressed(scene: cr.Scene, approach: float = example.APPROACH) -> cr.Contact:
     return cr.press(scene, approach=approach)
 
 
-def page_of(contact: cr.Contact, units: UnitNames = UNITS) -> str:
-    return slider_page(pressed_result(contact), units)
+def page_of(contact: cr.Contact) -> str:
+    return slider_page(pressed_result(contact))
 
 
 def pressed_result(contact: cr.Contact) -> Pressed:
     return Normal(approach=contact.approach).compute(contact)
 
 
-def said(contact: cr.Contact, units: UnitNames = UNITS) -> list[str]:
+def said(contact: cr.Contact) -> list[str]:
     """What a run says of the contact."""
-    return pressed_result(contact).lines(units)
+    return pressed_result(contact).lines()
 
 
 def inside(text: str) -> Any:
@@ -51,7 +49,7 @@ def inside(text: str) -> Any:
 
 
 def data_of(contact: cr.Contact) -> Any:
-    return slider.slider_data(slider.Slides.of(contact), said(contact), UNITS)
+    return slider.slider_data(slider.Slides.of(contact), said(contact))
 
 
 @pytest.fixture(scope="module")
@@ -92,12 +90,6 @@ def test_states_are_those_of_shear_and_cycle(contact: cr.Contact) -> None:
         part = texts == "partial"
         stuck = state.stick_radii[touching] / radii
         assert codes[part] / 1000 == pytest.approx(stuck[part], abs=6e-4)
-
-
-def test_names_of_units_end_no_script(contact: cr.Contact) -> None:
-    text = page_of(contact, UnitNames("</script>", "<b>"))
-    assert text.count("</script>") == 2
-    assert inside(text)["units"] == {"length": "</script>", "force": "<b>"}
 
 
 def test_of_many_some_can_be_followed(contact: cr.Contact, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,8 +180,8 @@ def follow(shown: Opened, index: int) -> None:
 @in_browser
 def test_in_metres_the_list_has_room_for_both_coordinates(browser: Browser, tmp_path: Path) -> None:
     tiny = cr.Asperities.hexagonal(spacing=25e-6, tip_radius=2e-4, within=1.02e-4)
-    scene = cr.Scene(0.01, tiny, cr.Material(1e11, 0.3), friction=0.5, geometry="summit")
-    text = page_of(cr.press(scene, approach=5e-7), UnitNames("m", "N"))
+    scene = cr.Scene(0.01, tiny, cr.Material(1e11, 0.3), 0.5, "summit", ("m", "N"))
+    text = page_of(cr.press(scene, approach=5e-7))
     (tmp_path / "slider.html").write_text(text, encoding="utf-8")
     shown = Opened(browser, tmp_path / "slider.html")
     chooser = shown.page.locator("#follow")

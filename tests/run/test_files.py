@@ -15,7 +15,6 @@ from convexrough.run.results import MANIFEST, results_folder, write_results
 from convexrough.run.scene_file import read_scene
 from convexrough.run.stages import Normal
 from convexrough.tabular.table import read_table
-from convexrough.tabular.units import UnitNames
 from convexrough.verdict.claims import Manner, read_loads
 
 COLUMNS = ("x", "y", "height", "tip_radius", "load", "contact_radius", "gap", "status",
@@ -83,7 +82,7 @@ force = "N"
     )
     assert file.stages["history"].fractions == [1.0, -1.0, 0.25]
     assert file.solver == cr.solvers.Newton()
-    assert file.units == ("mm", "N")
+    assert file.scene.units == ("mm", "N")
 
 
 @pytest.mark.parametrize(
@@ -254,7 +253,7 @@ def test_the_default_within_loses_no_asperity(
 
 def written(folder: Path, contact: cr.Contact, *, figures: bool = False) -> list[str]:
     found = [Normal(approach=contact.approach).compute(contact)]
-    paths = write_results(folder, found, figures=figures, units=UnitNames("m", "N"))
+    paths = write_results(folder, found, figures=figures)
     assert all(path.stat().st_size > 0 for path in paths)
     assert {path.name for path in paths} == {path.name for path in folder.iterdir()}
     return [path.name for path in paths]

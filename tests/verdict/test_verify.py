@@ -204,7 +204,7 @@ def test_the_figure(contact: cr.Contact) -> None:
     forces = cr.shear(contact, force=force).forces.copy()
     forces[4] = 0.5 * contact.loads[4]
     sheared = verify_shear(contact, forces, force=force)
-    for figures in (verdict_figures(verdict), verdict_figures(verdict, sheared, length_unit="m")):
+    for figures in (verdict_figures(verdict), verdict_figures(verdict, sheared)):
         said = {text.get_text() for text in texts(figures["verdict"])}
         assert {"36", "50", "claimed open, proved to touch (1)"} < said
         fits(figures["verdict"])

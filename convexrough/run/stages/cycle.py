@@ -18,7 +18,6 @@ from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.run.stage import Columns, Result, Stage, Summary, limit, numbers_of
 from convexrough.run.values import Fractions, Mistake, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
-from convexrough.tabular.units import UnitNames
 
 #: Largest number of asperities whose loops are computed, unless the scene file names them.
 MOST_LOOPS = 12
@@ -175,13 +174,13 @@ class Cycled(Result):
         over = {key: it for key, it in self.printed.items() if not key.endswith("_normalised")}
         return self.printed if self.smooth else over
 
-    def lines(self, units: UnitNames) -> list[str]:
+    def lines(self) -> list[str]:
         said = "no W/W0: a flat base or a cylinder has no smooth reference"
-        return [*super().lines(units), *([] if self.smooth else [said])]
+        return [*super().lines(), *([] if self.smooth else [said])]
 
-    def figures(self, **units: Any) -> Mapping[str, Any]:
+    def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import cycle_figures, fretting_figures  # only when it draws
 
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
-        figures = cycle_figures(self.found, loops=self.loops, **units)
-        return {**figures, **fretting_figures(widest, **units)}
+        figures = cycle_figures(self.found, loops=self.loops)
+        return {**figures, **fretting_figures(widest)}

@@ -18,7 +18,6 @@ from convexrough.gradients.gradient import Holding
 from convexrough.run.stage import Columns, Single, Stage, Summary, limit
 from convexrough.run.values import Mistake, Share, expected
 from convexrough.tabular.columns import bound, labelled
-from convexrough.tabular.units import UnitNames
 
 #: Results whose gradient a scene file may ask for, and their symbols.
 LETTERS = {"loss": "W", "displacement": "X", "approach": "D_0", "load": "P"}
@@ -143,7 +142,7 @@ class Differentiated(Single):
         if not self.found:
             yield f"no gradient of the {self.stage.of} exists for this scene"
 
-    def lines(self, units: UnitNames) -> list[str]:
+    def lines(self) -> list[str]:
         said = self.known[0]
         if not self.found:
             return [f"gradient of the {said['of']}: none, {said['none_because']}"]
@@ -163,8 +162,8 @@ class Differentiated(Single):
             )
         return [f"gradient of the {said['of']}{under}, {held}", *labelled(rows, 22)]
 
-    def figures(self, **units: Any) -> Mapping[str, Any]:
+    def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import gradient_figures  # matplotlib: only when it draws
 
-        figures = [gradient_figures(it, of=LETTERS[self.stage.of], **units) for it in self.found]
+        figures = [gradient_figures(it, of=LETTERS[self.stage.of]) for it in self.found]
         return figures[0] if figures else {}

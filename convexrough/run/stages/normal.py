@@ -82,13 +82,13 @@ class Pressed(Single):
     def doubts(self) -> Iterator[str]:
         yield from doubts_of(self.known[0])
 
-    def figures(self, **units: Any) -> Mapping[str, Any]:
+    def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import press_figures  # matplotlib: only when it draws
 
-        return press_figures(self.contact, **units)
+        return press_figures(self.contact)
 
-    def lines(self, units: UnitNames) -> list[str]:
-        return describe(self.known[0], units)
+    def lines(self) -> list[str]:
+        return describe(self.known[0], self.units)
 
 
 def judged_loads(certificate: Certificate, loads: Array) -> Summary:

@@ -32,7 +32,6 @@ from convexrough.run.stage import (
 )
 from convexrough.run.values import FileTable, Finite, Mistake, NonNegative, Positive, expected
 from convexrough.tabular.columns import aligned
-from convexrough.tabular.units import UnitNames
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
 
@@ -133,8 +132,8 @@ class Pathed(Steps):
         yield from super().doubts()
         yield from unproved_order(self, self.found[0].order)
 
-    def lines(self, units: UnitNames) -> list[str]:
-        return [*super().lines(units), f"{INCREASE}{self.found[0].order}"]
+    def lines(self) -> list[str]:
+        return [*super().lines(), f"{INCREASE}{self.found[0].order}"]
 
 
 class Steady(_Points):
@@ -196,7 +195,7 @@ class Settled(Single):
 
     @cached_property
     def worn(self) -> Fretting:
-        """Slip, losses and tractions of each asperity."""
+        """The slip, losses and tractions of each asperity in the steady cycle."""
         return fretting(self.found[0])
 
     def prepare(self, *, figures: bool) -> None:
@@ -217,25 +216,25 @@ class Settled(Single):
         for each in self.found:
             yield from unproved_order(self, each.order)
 
-    def lines(self, units: UnitNames) -> list[str]:
-        said = [*super().lines(units), f"{INCREASE}{self.found[0].order}"]
+    def lines(self) -> list[str]:
+        said = [*super().lines(), f"{INCREASE}{self.found[0].order}"]
         for losses in self.found[1:]:
             columns = _by_phase(losses)
             printed = {name: name.replace("_", " ") for name in ("phase", "factor", "loss")}
             printed |= {"smooth": "smooth sphere"}
             rows = list(zip(*(columns[name].tolist() for name in printed), strict=True))
-            said += ["", titled("loss against phase", printed, units)]
+            said += ["", titled("loss against phase", printed, self.units)]
             if len(rows) > 20:
                 said.append(f"(the last 20 of {len(rows)} ellipses; all are in phase_losses.csv)")
             said += aligned([list(printed.values()), *rows[-20:]], digits=self.digits)
         return said
 
-    def figures(self, **units: Any) -> Mapping[str, Any]:
+    def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import phase_figures, steady_figures  # only when it draws
 
-        figures = dict(steady_figures(self.found[0], **units))
+        figures = dict(steady_figures(self.found[0]))
         for losses in self.found[1:]:
-            figures |= phase_figures(losses, **units)
+            figures |= phase_figures(losses)
         return figures
 
 

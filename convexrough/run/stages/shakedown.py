@@ -14,7 +14,6 @@ from convexrough.melan.shakedown import Theory, shakedown
 from convexrough.run.stage import Columns, Single, Stage, Summary
 from convexrough.run.stages.path import unproved_order
 from convexrough.run.values import Finite, Force, Mistake, Positive, expected
-from convexrough.tabular.units import UnitNames
 
 Kind = Annotated[Theory, expected('"exact", "elastic" or "vector"')]
 
@@ -97,11 +96,11 @@ class Limit(Single):
         if not found.proved:
             yield "not proved: any bounds on the limit of [shakedown]"
 
-    def lines(self, units: UnitNames) -> list[str]:
-        _, *table = super().lines(units)
+    def lines(self) -> list[str]:
+        _, *table = super().lines()
         return [f"shakedown  ({self.stage.kind})", *table]
 
-    def figures(self, **units: Any) -> Mapping[str, Any]:
+    def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import shakedown_figures  # matplotlib: only when it draws
 
-        return shakedown_figures(self.found[0], **units)
+        return shakedown_figures(self.found[0])

@@ -58,7 +58,7 @@ class Sheared(Result):
         each = [{"x": x, "y": y, **state.columns(*names)} for state in self.found]
         return {"shear": repeated({"fraction": np.array(self.stage.fractions)}, each)}
 
-    def figures(self, **units: Any) -> Mapping[str, Any]:
+    def figures(self) -> Mapping[str, Any]:
         from convexrough.plots import shear_figures  # matplotlib: only when it draws
 
-        return shear_figures(self.found, **units)
+        return shear_figures(self.found)
