@@ -204,5 +204,5 @@ def test_gross_sliding_at_an_approach_goes_by_that_name_too() -> None:
     objective = cr.Objective(
         scene=scene, of="loss", approach=5e-5, force=(scene.friction or 0.0) * contact.load
     )
-    with pytest.raises(cr.InputError, match=r"^force: .* with the approach held"):
+    with pytest.raises(cr.InputError, match=r"^force: .* at constant approach"):
         objective(objective.start)
