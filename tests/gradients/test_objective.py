@@ -39,6 +39,7 @@ OBJECTIVES = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_its_gradient(name: str) -> None:
     objective = OBJECTIVES[name]

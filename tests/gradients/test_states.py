@@ -132,6 +132,7 @@ def test_any_sum_of_forces_and_slips(
     assert abs(gradient.value - float(judge.at)) <= gradient.value_error * 1.01
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("holding", ["load", "approach"])
 def test_onset(holding: Any) -> None:
     contact = small(holding=holding)

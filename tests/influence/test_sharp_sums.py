@@ -181,7 +181,7 @@ def test_values_at_points(order: int) -> None:
     assert missed > 2
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("kind", ["smooth", "rough", "few"])
 def test_sharp_sums_against_ball_arithmetic(layout: str, kind: str) -> None:
@@ -290,7 +290,7 @@ def test_the_sharp_residual_and_what_it_proves(geometry: Any) -> None:
     assert certificate.load_error < 1e-11 * loads.max() * problem.units.force
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("by_load", [False, True])

@@ -101,6 +101,7 @@ def test_an_interrupt_at_any_moment(tmp_path: Path, delay: float) -> None:
     assert not [path for path in tmp_path.rglob(".*") if path.is_file()]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("arguments", [("--help",), ("run", "a.toml", "--no-figures")])
 def test_a_full_standard_output(tmp_path: Path, arguments: tuple[str, ...]) -> None:
     (tmp_path / "a.toml").write_text(scene_text())

@@ -231,7 +231,8 @@ def test_holes_are_filled_where_asked_and_counted(command: Any) -> None:
 
 @pytest.mark.usefixtures("surface")
 def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any) -> None:
-    outcome = command("summits", "scan.npz", "--radius", "1e4", "--approach", "-100")
+    asked = ("summits", "scan.npz", "--radius", "1e4", "--approach", "-100", "--no-figures")
+    outcome = command(*asked)
     assert "warning: at a pruning of 0.05 nothing touches, so the model is not" in outcome.err
     assert "to be trusted     nothing, as nothing touches" in outcome.out
 
