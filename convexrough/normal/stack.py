@@ -1,6 +1,6 @@
-"""Many normal problems with as many candidates each: a row for each.
+"""Many normal problems with equally many candidates, one in each row.
 
-They are refined and proved by the functions of `refine` and `proved` that do so for one.
+The functions of `refine` and `proved` take such a stack in place of a single problem.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from convexrough.roundoff import SAFETY
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """Problems in m rows, in own units; (m, n), or (n,) of what all rows share.
+    """Problems in m rows, in their own units: arrays (m, n), or (n,) where all rows share them.
 
-    coupled : slices of the rows, and a problem that has their coupling
-    exact  : k, also (1,) or (m, 1), and d;  shells : as of `NormalProblem`
-    exact_load, exact_approach : (m, 1) what is prescribed, of both one
+    coupled : slices of the rows, each with a problem that has the coupling of these rows
+    exact  : k, which may be (1,) or (m, 1), and d;  shells : as in `NormalProblem`
+    exact_load, exact_approach : (m, 1) the prescribed quantity; the other one is None
     """
 
     coupled: Sequence[tuple[slice, NormalProblem]]
@@ -40,7 +40,7 @@ class Stack:
 
     @cached_property
     def coefficients(self) -> Array:
-        """k to float64."""
+        """k, rounded to float64."""
         return self.exact.coefficients.value
 
     @property
@@ -62,7 +62,7 @@ class Stack:
 
     @cached_property
     def exact_depths(self) -> Ball:
-        """(m, n) D, at prescribed approaches."""
+        """(m, n) D, the indentations prescribed by the approaches."""
         return self.exact.offsets + self.depth
 
     @cached_property
@@ -82,7 +82,7 @@ class Stack:
         return values
 
     def only(self, rows: Indices) -> Stack:
-        """Some of the rows (sorted)."""
+        """The stack of the chosen rows, given in increasing order."""
         ends = np.searchsorted(rows, [0, *(some.stop for some, _ in self.coupled)]).tolist()
         slices = zip(map(slice, ends[:-1], ends[1:]), self.coupled, strict=True)
 
@@ -99,7 +99,7 @@ class Stack:
         )
 
     def apply(self, loads: Array) -> Array:
-        """(m, n) A P to float64."""
+        """(m, n) A P in float64."""
         found = np.empty(loads.shape)
         for rows, problem in self.coupled:
             found[rows] = loads[rows] @ problem.influence.matrix
@@ -110,7 +110,7 @@ class Stack:
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(m, n) A P of other loads: as sharp."""
+        """(m, n) A P of other loads, computed anew to as many digits."""
         return self.product(others)
 
     def convexity_at(self, stiffness: Array) -> Array:
@@ -122,9 +122,9 @@ class Stack:
         return np.asarray((2.0 / 3.0) * self.coefficients / np.cbrt(loads))
 
     def correct(self, slopes: Array, defect: Array, enough: Any, todo: NDArray[np.bool_]) -> Array:
-        """(m, n) a step of Newton's method as `convex.newton_step.correct`; nan where indefinite.
+        """(m, n) the step of `convex.newton_step.correct`; nan in rows with an indefinite matrix.
 
-        slopes : (m, n) c = dP/dn;  todo : (m,) rows that need one; 0 of others
+        slopes : (m, n) c = dP/dn;  todo : (m,) rows that need a step; the others get 0
         enough : not used, because a factor leaves nothing but rounding
         """
         from scipy.linalg.lapack import dposv  # 0.2 s to import: only when solving

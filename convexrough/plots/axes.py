@@ -1,4 +1,4 @@
-"""The main picture of a result in axes of one's own."""
+"""The main picture of a result, drawn into axes of the caller."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _draw_path(path: LoadPath, axes: Axes) -> None:
 
 
 def _draw_times(comparison: Comparison | PathComparison, axes: Axes) -> None:
-    """From above, what each took [s]; those without an answer say why."""
+    """Draw the time [s] of each solver, or the reason why it has no answer."""
     rows = [_took(entry) for entry in comparison.entries]
     for place, (_, seconds, outcome) in enumerate(rows):
         if seconds is None:

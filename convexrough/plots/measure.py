@@ -45,13 +45,13 @@ class Measure(NamedTuple):
         return values / self.size
 
     def short(self, name: str) -> str:
-        """A label of an axis, without how large the symbol is."""
+        """The label of an axis, without the size of the symbol."""
         if self.symbol:
             return f"${name}\\,/\\,{self.symbol}$"
         return f"${name}$  [{literal(self.said)}]" if self.said else f"${name}$"
 
     def label(self, name: str) -> str:
-        """A label of an axis."""
+        """The label of an axis, with the unit or the size of the symbol."""
         known = f"  (${self.symbol.strip('()')}$ = {self.said})" if self.symbol else ""
         return self.short(name) + known
 
@@ -163,21 +163,21 @@ class Scale:
 
     @cached_property
     def force(self) -> Measure:
-        """Of shear forces."""
+        """The measure of shear forces."""
         return measure(self.limit, self.units.force, "(fP)")
 
     @cached_property
     def displacement(self) -> Measure:
-        """Of displacements along the shear."""
+        """The measure of displacements along the shear."""
         return measure(self.travel, self.units.length, "X_0")
 
     def energy(self, largest: float) -> Measure:
-        """Of energies up to the largest."""
+        """The measure of energies up to the largest."""
         unit = self.units.work
         return measure(largest if unit else self.work, unit, "W_0")
 
     def footnote(self) -> str:
-        """What f P and X0 are."""
+        """A line that says what f P and X0 are."""
         whose = f"the {self.name}'s" if self.sphere else "this contact's"
         X0 = quantity(self.travel, self.units.length)
         limit = quantity(self.limit, self.units.force)
