@@ -3,6 +3,7 @@
 Opened pages ask the network for nothing: formulas are MathML in the page (formulas.py).
 """
 
+import logging
 import re
 import sys
 from pathlib import Path
@@ -14,6 +15,9 @@ from sphinx.application import Sphinx
 from sphinx.util.inspect import TypeAliasForwardRef
 
 from convexrough import __version__
+
+# A library of the theme prints what every logger says; runs of the course say much at INFO.
+logging.getLogger("convexrough").setLevel(logging.WARNING)
 
 project = "convexrough"
 author = "the authors of convexrough"
