@@ -69,8 +69,8 @@ Order = Literal["proved", "proved for one step", "fails"]
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
 #: For at most so many touching asperities the inverse costs no more than the levels themselves. If
-#: more touch, weights of least total are computed for at most MOST asperities.
-INVERTED, MOST = 800, 1000
+#: more touch, up to TOUCHING times MOST, weights of least total are sought for at most MOST.
+INVERTED, MOST, TOUCHING = 800, 1000, 10
 
 #: Numbers of levels between that are tried: with an inverse, and without one.
 BETWEEN, FEW_BETWEEN = 7, 1
@@ -130,7 +130,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     rates = span.rates(np.ones(len(span.c)))
     if (rates[span.support] > 0).all() and not len(span.unsettled(rates, rising)):
         return True
-    if not span.mu > 0:
+    if not span.mu > 0 or len(span.support) > max(INVERTED, TOUCHING * most):
         return False
     if len(span.support) > INVERTED:
         spare = np.where(rising, 0.0, span.spare)
