@@ -176,7 +176,10 @@ def _headed(
         return (named if len(named) == len(rows[0].cells) and wanted(named) else None), rows
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
     headers = [_header(row.text, style) for row in rows[: min(first, SAMPLE)]]
-    place = max(range(len(headers)), key=lambda i: (wanted(headers[i]), -i))
+    width = len(rows[first].cells) if first < len(rows) else 0
+    place = max(
+        range(len(headers)), key=lambda i: (wanted(headers[i]), len(headers[i]) == width, -i)
+    )
     header, line, rows = headers[place], rows[place], rows[place + 1 :]
     if style.separator == " ":
         header, rows = _listed(header, line, rows, style)

@@ -275,6 +275,7 @@ class _Placing:
         far = distances > allowed
         self.how = f"matched by position, to {distances.max():.2g}"
         doubtful = far.any() if len(points) == len(positions) else far.mean() > 0.5
+        doubtful |= len(np.unique(owners)) < len(owners)
 
         def fits(points: Array) -> bool:
             distances, owners = _nearest(positions, points)

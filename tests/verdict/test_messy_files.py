@@ -278,6 +278,9 @@ REFUSED: dict[str, tuple[Callable[[Path, Case], str], str]] = {
         to, case.table("x y pressure")), "expected a column 'area', or x and y on a regular grid"),
     "another name, not said": (lambda to, case: text()(to, case.table("x y Fz")),
                                "expected a column 'load'; --column load=Fz names another"),
+    "another name below titles": (
+        lambda to, case: raw(to, ansys(case).replace("load", "FZ"), "a.lis"),
+        "found NODE, x, y, FZ, expected a column 'load'"),
     "totals of Abaqus": (lambda to, case: raw(
         to, abaqus(case) + f"\n   Total  0  0  {case.loads.sum()}\n", "a.rpt"),
         "from the nearest asperity"),
@@ -422,12 +425,16 @@ def test_a_scale_that_is_not_the_units(tmp_path: Path, command: Any, case: Case)
     assert "column x: found a factor 1e-06, expected 0.001, as mm are 0.001 m" in outcome.err
 
 
-def test_places_in_another_unit_that_nobody_named(tmp_path: Path, command: Any, case: Case) -> None:
-    table = case.table(x=1e3 * PLACES[case.order, 0], y=1e3 * PLACES[case.order, 1])
-    outcome = command("verify", "scene.toml", text()(tmp_path, table))
+@pytest.mark.parametrize(("factor", "back"), [(1e3, "0.001"), (1e-6, "1e+06")])
+def test_places_in_another_unit_that_nobody_named(
+    tmp_path: Path, command: Any, case: Case, factor: float, back: str
+) -> None:
+    x, y = factor * PLACES[case.order].T
+    outcome = command("verify", "scene.toml", text()(tmp_path, case.table(x=x, y=y)))
     assert outcome.status == 2
-    assert "10^3 times as far out" in outcome.err
-    assert "--scale x=0.001 --scale y=0.001" in outcome.err
+    assert outcome.err.count("\n") == 1
+    assert "times as far out" in outcome.err
+    assert f"--scale x={back} --scale y={back}" in outcome.err
 
 
 @pytest.mark.parametrize(
