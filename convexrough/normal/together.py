@@ -1,7 +1,7 @@
-"""Normal problems in rows, solved and proved together: the levels of one scene, or many scenes.
+"""Many normal problems, one in each row of an array, solved and proved in one computation.
 
-One Newton's method, one refinement to pairs and one theorem go over all rows at once. A row that
-the cheapest argument does not settle is left to the way of one by one.
+The rows are levels of one scene or of several scenes. The caller must solve and prove a row one by
+one where `Solved.good` is false.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from convexrough.normal.stack import Stack
 from convexrough.numbers.balls import Ball
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: Newton steps, at most.
+#: Largest number of Newton steps.
 STEPS = 30
 
-#: A rough contact reaches further than Hertz's, in the square of its radius. A heuristic.
+#: Squared radius of a rough contact over that of Hertz's contact. A heuristic.
 WIDER = 1.1
 
-#: Newton's method ends where a step leaves this part of the indentations: a correction leaves its
-#: square. A heuristic.
+#: A row is solved where the residual expected after its last step is at most this fraction of the
+#: indentations (in the 2-norm). A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
-#: Numbers of an array of rows: some dozens of these are in use at once.
+#: Largest number of elements m n of an array; some dozens of such arrays exist at once.
 NUMBERS = 2**17
 
 quietly = np.errstate(all="ignore")
 
 
 class Rows(NamedTuple):
-    """Levels of one scene, or of several: (k,) and, in own units, (k, n), as of `level.Level`."""
+    """k levels in the problems' units, arrays (k,) or (k, n). `level.Level` explains the fields."""
 
     load: Ball
     approach: Ball
@@ -50,13 +50,13 @@ class Rows(NamedTuple):
     open: NDArray[np.bool_]
 
     def at(self, which: Indices) -> Rows:
-        """Some of them."""
+        """The levels with these indices."""
         return Rows._make(each[which] for each in self)
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Solutions, in rows, as of `proved.Proved`; nothing is proved of rows that are not `good`."""
+    """Solutions in rows, proved where `good`. `proved.Proved` explains the other fields."""
 
     trial: Trial
     box: Box
@@ -69,20 +69,20 @@ class Solved:
 
     @cached_property
     def rows(self) -> Rows:
-        """With the proved statuses."""
+        """The levels with their proved statuses."""
         touching = self.indentation.positive | self.loads.positive
         known = self.approach[:, 0], self.loads, self.indentation
         return Rows(self.total, *known, touching, self.indentation.negative)
 
     @cached_property
     def total(self) -> Ball:
-        """(m,) the sums of the loads: as of `Proved`."""
+        """(m,) the sums of the loads, bounded as in `Proved.total`."""
         trial = Ball.exact(self.trial.loads).sum()
         spread = self.distance * np.sqrt(summed(1.0 / self.stiffness)) * (1 + SAFETY)
         return Ball.around(trial.mid, trial.radius + (spread + self.trial.missing.size)[:, 0])
 
     def row(self, k: int, problem: NormalProblem) -> Proved:
-        """One of them, of a problem, in a box that all share."""
+        """Row k as the solution of a problem; its `box` is that of all rows."""
         it, of = self.trial, problem
         own = it.loads.at(k), it.product[k], it.local[k], it.gap[k]
         return Proved(
@@ -98,7 +98,7 @@ class Solved:
 
 
 class _Pressed(NamedTuple):
-    """A point of Newton's method: as of `solvers.pressing`."""
+    """An iterate of Newton's method, as in `solvers.pressing`."""
 
     own: Array
     loads: Array
@@ -119,9 +119,9 @@ class _Pressed(NamedTuple):
 
 @quietly
 def pressed(stack: Stack, guess: Array) -> Array:
-    """(m, n) loads by full steps of Newton's method; not finite where these do not get there.
+    """(m, n) loads by full steps of Newton's method; not finite in rows that diverge.
 
-    guess : (m, n) indentations, of which some are positive in each row
+    guess : (m, n) indentations; each row needs a positive one
     """
     state, before = _pressed(stack, guess), np.full(len(stack), np.inf)
     for _ in range(STEPS):
@@ -153,11 +153,11 @@ def _pressed(stack: Stack, indentation: Array) -> _Pressed:
 def solved(
     stack: Stack, prescribed: Array, squares: Array, reach: Array, box: Box | None = None
 ) -> Solved:
-    """The solutions, of the rows where one box is enough.
+    """The solutions of all rows, with `good` where they are proved in the given box.
 
-    Rows with a residual above rounding, or an undecided status, are not `good`, either.
+    A row with a residual above rounding or an undecided status is not `good`.
 
-    prescribed, squares, reach : as of `guessed`;  box : default `widest`
+    prescribed, squares, reach : see `guessed`;  box : default `widest`
     """
     loads = pressed(stack, guessed(stack, prescribed, squares, reach))
     finite = np.where(np.isfinite(loads).all(axis=1, keepdims=True), loads, 0.0)
@@ -175,11 +175,11 @@ def solved(
 
 @quietly
 def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Array:
-    """(m, n) first indentations: each rides on the displacement of Hertz's pressure.
+    """(m, n) initial indentations from the displacement of Hertz's pressure, as in `solvers.start`.
 
-    As `solvers.start` does.
-
-    prescribed : (m, n) or (n,) d, or D;  squares : r^2 likewise;  reach : (m, 1) a^2, or infinite
+    prescribed : (m, n) or (n,) offsets d at prescribed loads, else D = D0 + d
+    squares    : (m, n) or (n,) squared distances from the axis
+    reach      : (m, 1) squared contact radius of the smooth sphere, or infinite
     """
     s = np.sqrt(np.maximum(1.0 - squares / (WIDER * reach), 0.0)) + 0.0 * prescribed
     alone = s.sum(axis=1) == 0
@@ -200,7 +200,7 @@ def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Ar
 
 @quietly
 def widest(stack: Stack, state: Trial) -> Box:
-    """Boxes that hold every solution and these loads, by shells: as `boxes.tried` begins."""
+    """Boxes that hold every solution and these loads: the first boxes of `boxes.tried`."""
     if stack.load is None:
         highest = stack.depth.upper
     else:
