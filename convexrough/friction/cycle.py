@@ -322,7 +322,7 @@ def cycles(
         lower = checks.bearable("minimum", lower, limit)
     if (upper < lower).any():
         i = int(np.argmax(upper < lower))
-        expected = f"at least the minimum, {lower[i]:g}; which is -maximum by default"
+        expected = f"at least the minimum, {lower[i]:g} (-maximum by default)"
         raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
     forces = list(zip(upper.tolist(), lower.tolist(), strict=True))
     LOGGER.info("pressing at the level of a cycle")

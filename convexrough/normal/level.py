@@ -1,4 +1,4 @@
-"""Normal solutions of a scene at total loads L: all that friction and gradients are made of.
+"""Normal solutions of a scene at total loads L, the basis of friction and gradients.
 
 At a total load L the scene has one solution in the box where it was proved: loads P_i(L), approach
 D0(L), indentations n_i(L) (minus the gap where open), and the energy
@@ -35,13 +35,13 @@ from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
-#: A residual that refinement cannot bring below this part of its first size is no rounding.
+#: Relative residual above which a refined result is not accepted as exact up to rounding.
 SOLVED = 1e-6
 
-#: Candidates of levels that are found together, at most: more gain nothing.
+#: Largest number of candidates of levels that are solved together: more gain nothing.
 MOST = 512
 
-#: Loads of the candidates (own units) at a total load, from any solver.
+#: Returns loads of the candidates (problem's units) at a total load, from any solver.
 Press = Callable[[NormalProblem], Array]
 
 
@@ -93,7 +93,7 @@ class Level:
 
     @classmethod
     def of(cls, found: Proved, load: Ball) -> Level:
-        """A proved solution whose total load is known."""
+        """The level of a proved solution with known total load."""
         return cls(
             found.problem,
             load,
@@ -108,7 +108,7 @@ class Level:
 
     @classmethod
     def unproved(cls, problem: NormalProblem, state: Trial, load: Ball) -> Level:
-        """Trial loads of which nothing is proved: every radius is infinite."""
+        """The level of trial loads without a proof: every error radius is infinite."""
         unknown = Ball.around(state.loads, np.inf)
         none = np.zeros(len(problem), dtype=bool)
         approach = Ball.around(state.approach.mid, np.inf if problem.load else 0.0)
@@ -132,7 +132,7 @@ class Level:
 
     @cached_property
     def energy(self) -> Ball:
-        """V(L)."""
+        """The complementary energy V(L)."""
         return energies([self])[0]
 
     @cached_property
@@ -275,8 +275,8 @@ class Level:
 class Levels:
     """The normal solutions of one scene at total loads up to that of the first, each found once.
 
-    top : the level with the highest load: of a pressed contact
-    together : several at once may be solved by Newton's method, in rows of a stack
+    top : the level with the highest load, that of a pressed contact
+    together : true if Newton's method may solve several levels at once, in rows of a stack
     """
 
     def __init__(self, top: Level, press: Press, *, together: bool = False) -> None:
@@ -285,11 +285,11 @@ class Levels:
 
     @property
     def presses(self) -> int:
-        """How many normal problems were solved beside the first."""
+        """The number of normal problems solved after the first."""
         return len(self._known)
 
     def below(self, drop: Ball) -> Level:
-        """The level at the top's load less some of it, in own units."""
+        """The level at the load of the top level less `drop`, in the problem's units."""
         return self.at(self.top.load - drop)
 
     def at(self, load: Ball) -> Level:
@@ -307,7 +307,7 @@ class Levels:
         return self._solved(self.problem.at_load(load), load)
 
     def prepare(self, loads: Ball) -> list[Level | None]:
-        """Levels of positive loads (k,), found together; None of those that are better alone."""
+        """Levels of positive loads (k,), solved together; None for those to be solved alone."""
         found, problem = self.top.solution, self.problem
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or found is None or found.box.fixed_open.any():
@@ -337,7 +337,7 @@ def _key(load: Ball) -> tuple[float, float, float]:
 
 
 def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | None]:
-    """The levels of these loads, in one box; None of those that are not proved there."""
+    """The levels of these loads, in one box; None for those without a proof in it."""
     scene, exact, m, total = problem.scene, problem.exact, len(loads), loads[:, None]
     rows = Stack([(slice(0, m), problem)], exact, problem.shells, total, None)
     force, modulus = total.value * problem.units.force, scene.material.contact_modulus

@@ -1,6 +1,6 @@
-"""Many normal problems with as many candidates each: a row for each.
+"""Many normal problems with equal numbers of candidates, one in each row of an array.
 
-They are refined and proved by the functions of `refine` and `proved` that do so for one.
+The functions of `refine` and `proved` refine and prove them as they do a single problem.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from convexrough.roundoff import SAFETY
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """Problems in m rows, in own units; (m, n), or (n,) of what all rows share.
+    """Problems in m rows, in their own units. Arrays are (m, n), or (n,) if all rows are equal.
 
-    coupled : slices of the rows, and a problem that has their coupling
-    exact  : k, also (1,) or (m, 1), and d;  shells : as of `NormalProblem`
-    exact_load, exact_approach : (m, 1) what is prescribed, of both one
+    coupled : slices of the rows, each with a problem that has their compliance operator
+    exact  : k, also (1,) or (m, 1), and d;  shells : see `NormalProblem`
+    exact_load, exact_approach : (m, 1) the prescribed quantity; the other is None
     """
 
     coupled: Sequence[tuple[slice, NormalProblem]]
@@ -40,7 +40,7 @@ class Stack:
 
     @cached_property
     def coefficients(self) -> Array:
-        """k to float64."""
+        """The local coefficients k in float64."""
         return self.exact.coefficients.value
 
     @property
@@ -62,7 +62,7 @@ class Stack:
 
     @cached_property
     def exact_depths(self) -> Ball:
-        """(m, n) D, at prescribed approaches."""
+        """(m, n) D = D0 + d at prescribed approaches D0."""
         return self.exact.offsets + self.depth
 
     @cached_property
@@ -82,7 +82,7 @@ class Stack:
         return values
 
     def only(self, rows: Indices) -> Stack:
-        """Some of the rows (sorted)."""
+        """The stack of some rows; their indices are sorted."""
         ends = np.searchsorted(rows, [0, *(some.stop for some, _ in self.coupled)]).tolist()
         slices = zip(map(slice, ends[:-1], ends[1:]), self.coupled, strict=True)
 
@@ -99,18 +99,18 @@ class Stack:
         )
 
     def apply(self, loads: Array) -> Array:
-        """(m, n) A P to float64."""
+        """(m, n) A P in float64."""
         found = np.empty(loads.shape)
         for rows, problem in self.coupled:
             found[rows] = loads[rows] @ problem.influence.matrix
         return found
 
     def product(self, loads: Pair) -> Ball:
-        """(m, n) A P to some thirty digits."""
+        """(m, n) A P to about thirty digits."""
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(m, n) A P of other loads: as sharp."""
+        """(m, n) A P of other loads, as accurate as `product`."""
         return self.product(others)
 
     def convexity_at(self, stiffness: Array) -> Array:
@@ -124,10 +124,10 @@ class Stack:
     def correct(self, slopes: Array, defect: Array, enough: Any, todo: NDArray[np.bool_]) -> Array:
         """(m, n) a step of Newton's method as `convex.newton_step.correct`; nan where indefinite.
 
-        slopes : (m, n) c = dP/dn;  todo : (m,) rows that need one; 0 of others
-        enough : not used, because a factor leaves nothing but rounding
+        slopes : (m, n) c = dP/dn;  todo : (m,) rows to correct; others get 0
+        enough : not used, because a direct solution leaves only rounding errors
         """
-        from scipy.linalg.lapack import dposv  # 0.2 s to import: only when solving
+        from scipy.linalg.lapack import dposv  # takes 0.2 s to import
 
         root = np.sqrt(slopes)
         count = max(1, int((root > 0).sum(axis=1).max()))

@@ -17,7 +17,7 @@ def fretting_figures(worn: Fretting) -> Figures:
     """The figure of fretting in a steady cycle.
 
     "fretting" : maps of the slip amplitude at the rim of each disc, the energy lost per cycle, the
-        mean shear traction and the largest, both at the largest force
+        mean and the largest shear traction, both at the largest force
     """
     if not worn.contact.loads.any():
         return no_contact("fretting")
@@ -48,7 +48,7 @@ def draw_slip(axes: Axes, worn: Fretting, scale: Scale) -> None:
 
 
 def _largest(values: Array) -> float:
-    """Of those that are known."""
+    """The largest finite value, at least 0."""
     return float(values.max(initial=0.0, where=np.isfinite(values)))
 
 

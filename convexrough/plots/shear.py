@@ -1,4 +1,4 @@
-"""Which asperities slide, and which stick in part: the map of a friction state."""
+"""The map of a friction state: asperities that slide, and those that stick in part."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ MOST_PANELS = 12
 
 
 def shear_figures(states: Sequence[ShearState]) -> Figures:
-    """The map of each friction state of one contact, at most 12 of them, evenly chosen.
+    """The maps of friction states of one contact, at most 12, evenly chosen.
 
     "stick_slip" : contact discs with their stick discs inside, sliding asperities, open ones; and
         the smooth sphere's contact and stick discs under the same forces
@@ -80,7 +80,7 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
 
 
 def draw_state(axes: Axes, state: State, scale: Scale) -> None:
-    """Contact discs, stick discs, open dots; and those of the smooth sphere, for comparison."""
+    """Draw contact and stick discs, dots where open, and the outlines of the smooth sphere's."""
     radii, points = state.contact.contact_radii, state.contact.scene.contact_points
     draw_contact(axes, scale, status_layers(state.status, radii, state.stick_radii))
     left = max(1.0 - float(np.linalg.norm(state.force)) / scale.limit, 0.0)
@@ -94,7 +94,7 @@ def draw_state(axes: Axes, state: State, scale: Scale) -> None:
 
 
 def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
-    """What each look means, of those that occur."""
+    """The legend entries of the statuses that occur."""
     loads = states[0].contact.loads
     statuses = {status for state in states for status in np.unique(state.status[loads > 0])}
     marks: list[Any] = status_handles(statuses - {"undecided"}, stick=True)
@@ -106,13 +106,13 @@ def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
 
 
 def _doubtful(state: State) -> Any:
-    """(n,) which asperities to mark; where nothing is proved, those with a load."""
+    """(n,) true for asperities to mark; those with a load if nothing is proved."""
     unsure = state.status == "undecided"
     return unsure & (state.contact.loads > 0) if state.certificate.scope == "none" else unsure
 
 
 def state_title(state: State, scale: Scale, *, narrow: bool) -> str:
-    """The shear force, of a vector its size, and how many slide."""
+    """The shear force (or the size of a vector) and the number of sliding asperities, as text."""
     touching = state.contact.loads > 0
     slide = int((touching & (state.status == "sliding")).sum())
     force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)

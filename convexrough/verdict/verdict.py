@@ -207,9 +207,9 @@ def verify_on(
     given = checks.array("loads", loads, length=len(problem.scene))
     if (given < -floor).any():
         first = int(np.argmax(given < -floor))
-        expected = "a load that is not negative; with a floor, smaller noise counts as 0"
+        expected = "a load that is not negative; a floor lets noise below it count as 0"
         if given.max() <= floor:
-            expected = "positive loads in compression; none is positive: is the sign reversed?"
+            expected = "compression to be positive; no load is positive: is the sign reversed?"
         raise InputError(f"loads[{first}]", found=given[first], expected=expected)
     claimed = np.where(given > floor, given, 0.0)
     total = None if problem.load is None else problem.load * problem.units.force
