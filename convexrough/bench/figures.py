@@ -47,7 +47,7 @@ def bench_figures(bench: Bench) -> dict[str, Figure]:
 
 
 def work_figure(bench: Bench) -> Figure:
-    """Below and to the left is better."""
+    """Time against true error, a panel for each scene; lower left is better."""
     panels = bench.panels()
     columns = min(COLUMNS, max(1, len(panels)))
     rows = max(1, -(-len(panels) // columns))
@@ -92,7 +92,7 @@ def _coordinates(rows: Iterable[Row]) -> tuple[Any, Any]:
 
 
 def cost_figure(bench: Bench) -> Figure:
-    """Log-log, with the fitted exponent, and slope 1 to compare."""
+    """Time of a press against size, on log-log axes, with the fitted exponent and slope 1."""
     figure = Figure(figsize=(SINGLE, 2.9), layout="constrained")
     axes = figure.subplots()
     axes.set(xscale="log", yscale="log")

@@ -1,4 +1,4 @@
-"""On what, and beside what, the times were taken."""
+"""The machine on which the times were taken, and its load."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB
 
 
 def describe_machine() -> dict[str, Any]:
-    """Processor, memory, threads, versions, the date, and how busy it is now."""
+    """Processor, memory, threads, versions, date, and the present load of the machine."""
     import psutil
 
     limits = [f"{name}={os.environ[name]}" for name in THREADS if name in os.environ]

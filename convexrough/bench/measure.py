@@ -65,8 +65,8 @@ class Attempt:
 
 
 class Task(NamedTuple):
-    """prepare : what `work` is given, by what makes the scene; anew for each run, and not timed
-    work : what is timed
+    """prepare : makes the argument of `work`, anew for each run; not timed
+    work : the function that is timed
     """
 
     prepare: Callable[[Make], Any]
@@ -107,7 +107,7 @@ TASKS: dict[str, Task] = {
 
 
 class Reference(NamedTuple):
-    """loads : (n,) [force];  bound : proved on the error of each, over the largest"""
+    """loads : (n,) [force];  bound : proved bound on each error, over the largest load"""
 
     loads: Array
     bound: float
@@ -118,7 +118,7 @@ class Reference(NamedTuple):
 
 
 def reference(scene: Scene, approach: float) -> Reference:
-    """The loads at an approach. Raises SolverError where they are not proved to be so accurate."""
+    """The loads at an approach. Raises SolverError if the proof does not make them a reference."""
     contact = press(scene, approach=approach)
     bound = float(contact.certificate.load_errors.max() / contact.loads.max())
     if not bound <= ACCURATE:
@@ -130,7 +130,7 @@ def reference(scene: Scene, approach: float) -> Reference:
 def measure_attempt(
     family: Family, scene: Scene, attempt: Attempt, reference: Reference | None, patience: float
 ) -> Row:
-    """Assembling and solving, the least of what fits into `patience` [s]."""
+    """The row of an attempt: least time of assembling and solving, in runs of `patience` [s]."""
     row = Row("solve", family, len(scene), solver=attempt.solver, setting=attempt.setting)
     memory = MemoryRise()
 
@@ -158,7 +158,7 @@ def measure_attempt(
 
 
 def measure_task(name: str, family: Family, size: int, patience: float) -> Row:
-    """One of TASKS on a scene of about this size."""
+    """The row of one of TASKS on a scene of about this size."""
     make, task = partial(scene, family, REFINEMENTS[size]), TASKS[name]
     row = Row(name, family, len(make()), product=plain_product(make()))
     memory = MemoryRise()
@@ -203,7 +203,7 @@ def _outcome(error: InputError | SolverError) -> Literal["refused", "failed"]:
 def least(
     prepare: Callable[[], Any], work: Callable[[Any], object], patience: float
 ) -> tuple[float, int]:
-    """[s] of the fastest run, and how many there were."""
+    """The time [s] of the fastest run, and the number of runs."""
     times: list[float] = []
     while len(times) < LEAST_RUNS or (sum(times) < patience and len(times) < MOST_RUNS):
         given = prepare()

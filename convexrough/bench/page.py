@@ -1,4 +1,4 @@
-"""What was measured, for people: aligned lines, files, and a page of the documentation."""
+"""The measurements as aligned lines, as files, and on a page of the documentation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OTHERS = [task for task in TASKS if task not in ("press", "from nothing")]
 
 
 def describe(bench: Bench) -> list[str]:
-    """Aligned lines for people."""
+    """Aligned lines for the terminal."""
     lines = [machine_line(bench)]
     for (family, n), rows in bench.panels().items():
         lines += ["", f"{n:,} asperities ({family})", *aligned(_work_table(rows), left=2)]
@@ -33,7 +33,7 @@ def describe(bench: Bench) -> list[str]:
 
 
 def page_block(bench: Bench) -> list[str]:
-    """Lines of Markdown: on what, one figure, one table of sizes, and what follows from them."""
+    """Lines of Markdown: the machine, a figure, a table of sizes, and the conclusions."""
     return [
         machine_line(bench),
         "",
@@ -46,7 +46,7 @@ def page_block(bench: Bench) -> list[str]:
 
 
 def machine_line(bench: Bench) -> str:
-    """On what it ran, and beside what."""
+    """A line about the machine and its load."""
     on = bench.machine
     versions = ", ".join(f"{name} {number}" for name, number in on["versions"].items())
     load = on["load_average"] or 0.0

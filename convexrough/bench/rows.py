@@ -1,4 +1,4 @@
-"""What was measured, a row each, and what follows from it."""
+"""The measurements, one in each row, and the conclusions from them."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Row:
 
     @property
     def default(self) -> bool:
-        """Of the default solver, as it is set by default."""
+        """Whether the row is of the default solver with its default settings."""
         return (self.solver, self.setting) == ("newton", "default")
 
     @property
@@ -60,7 +60,7 @@ class Row:
 
     @property
     def known(self) -> bool:
-        """An answer, and its error."""
+        """Whether the row has an answer whose error is known."""
         return self.outcome == "answered" and math.isfinite(self.error)
 
 
@@ -93,7 +93,7 @@ class Bench:
         return exponent([row.asperities for row in large], [row.seconds for row in large])
 
     def summary(self) -> dict[str, Any]:
-        """For programs. Errors are relative to the largest load, times in seconds."""
+        """The measurements for JSON; errors are relative to the largest load, times in seconds."""
         return {
             "schema": 2,
             "version": __version__,

@@ -1,4 +1,4 @@
-"""What is measured, on which scenes, and how patiently."""
+"""The list of measurements: tasks, scenes, and time limits."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def attempts(quick: bool) -> list[Attempt]:
 
 
 def run(*, quick: bool) -> Bench:
-    """Measure all of it."""
+    """The measurements of the whole list, or of its quick part."""
     patience = 0.1 if quick else 1.0
     began, machine, rows = time.perf_counter(), describe_machine(), list[Row]()
     for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # have them import what they need

@@ -39,7 +39,7 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 @click.command()
 @click.argument("sweep", type=PATH, required=False)
 @json_option
-@click.option("--part", metavar="K/N", callback=_part, help="The K-th of N parts of the sweep.")
+@click.option("--part", metavar="K/N", callback=_part, help="Compute only the K-th of N parts.")
 @force_option
 @click.option("--resume", is_flag=True, help="Compute the missing parts.")
 @click.option(

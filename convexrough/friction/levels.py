@@ -248,9 +248,11 @@ def prove_order(contact: Contact, *, most: int = 5000) -> Order:
 
     The result is "proved", "proved for one step" or "fails", as in `Cycle.order`. Later results for
     this contact reuse the proof. It may take a search for some asperities, mostly those at the edge
-    of the contact; without this call, the search is made for at most 1,000 asperities.
+    of the contact; without this call, the search is made for at most 1,000 asperities, and only if
+    at most 10,000 touch.
 
-    most : largest number of asperities for which the search is made, some milliseconds for each
+    most : largest number of asperities for which the search is made, if at most ten times as many
+        touch; it takes some milliseconds for each
 
     >>> cr.prove_order(contact)
     'proved'

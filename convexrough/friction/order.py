@@ -69,9 +69,9 @@ Order = Literal["proved", "proved for one step", "fails"]
 #: Rates dn_i / dD0 below -RATE_ROUNDING are negative; SOLVED is the tolerance of the linear solve.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: The inverse is computed for at most INVERTED asperities on the support (which costs no more than
-#: the levels), weights of least total (`sweeping`) for at most MOST asperities.
-INVERTED, MOST = 800, 1000
+#: For at most so many touching asperities the inverse costs no more than the levels themselves. If
+#: more touch, up to TOUCHING times MOST, weights of least total are sought for at most MOST.
+INVERTED, MOST, TOUCHING = 800, 1000, 10
 
 #: Largest numbers of intermediate levels of the bisection: with an inverse, and without one.
 BETWEEN, FEW_BETWEEN = 7, 1
@@ -131,7 +131,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     rates = span.rates(np.ones(len(span.c)))
     if (rates[span.support] > 0).all() and not len(span.unsettled(rates, rising)):
         return True
-    if not span.mu > 0:
+    if not span.mu > 0 or len(span.support) > max(INVERTED, TOUCHING * most):
         return False
     if len(span.support) > INVERTED:
         spare = np.where(rising, 0.0, span.spare)

@@ -35,7 +35,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +61,9 @@ SEARCHES = 8
 #: What the total of weights is less than 1, so that rates are positive, and not just 0.
 SHORT = 1e-10
 
-#: Directions in which the extent of the support is known, and numbers held at once.
-DIRECTIONS, NUMBERS = 256, 2**20
+#: Directions in which the extent of the support is known, and numbers held at once; from how many
+#: times the distance of its charges a potential is looked at by its terms first.
+DIRECTIONS, NUMBERS, NEARBY = 256, 2**20, 2.0
 
 
 def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Array:
@@ -262,50 +263,51 @@ class _Swept:
         total = weights.sum(axis=1, keepdims=True)
         known = total[:, 0] > 0
         weights = np.divide(weights, total, out=np.zeros_like(weights), where=known[:, None])
-        reach, beyond = self._reach(which, near, weights)
-        reach = np.where(known, reach, 0.0)
-        centres = self._plane(self.places[which])
-        counts = self._tree.query_ball_point(centres, reach, return_length=True)
-        blocks = np.cumsum(counts) * near.shape[1] // NUMBERS
-        worst, place = beyond, near[:, 0].copy()
-        for block in np.unique(blocks):
-            rows = np.flatnonzero(blocks == block)
-            within = self._tree.query_ball_point(centres[rows], reach[rows])
-            row = np.repeat(rows, counts[rows])
-            seen = self.support[np.concatenate(within).astype(np.intp)]
+        away = (self.places[near] - self.places[which][:, None]) * (weights > 0)
+        potential = _Potential.of(weights, away)
+        reach, worst = self._reach(which, potential)
+        reach, place = np.where(known, reach, 0.0), near[:, 0].copy()
+
+        def look(row: Indices, seen: Indices) -> None:
             row, seen = row[seen != which[row]], seen[seen != which[row]]
             swept = self.potentials(near[row], seen[:, None])
-            swept = np.einsum("ij,ij->i", weights[row], swept)
-            ratio = self.potentials(which[row], seen) / swept
+            ratio = self.potentials(which[row], seen) / np.einsum("ij,ij->i", weights[row], swept)
             np.maximum.at(worst, row, ratio)
             most = ratio == worst[row]
             place[row[most]] = seen[most]
+
+        for row in np.flatnonzero(reach >= self.extent).tolist():
+            reach[row] = min(NEARBY * potential.most[row], self.extent)
+            others = self.places[self.support] - self.places[which[row]]
+            room = potential.room(row, others) - self.lost * self.extent**2
+            unclear = self.support[(np.abs(others) > reach[row]) & ~(room > 0)]
+            look(np.full(len(unclear), row), unclear)
+        centres = self._plane(self.places[which])
+        counts = self._tree.query_ball_point(centres, reach, return_length=True)
+        blocks = np.cumsum(counts) * near.shape[1] // NUMBERS
+        for block in np.unique(blocks):
+            rows = np.flatnonzero(blocks == block)
+            within = self._tree.query_ball_point(centres[rows], reach[rows])
+            seen = self.support[np.concatenate(within).astype(np.intp)]
+            look(np.repeat(rows, counts[rows]), seen)
         t = (1.0 - SHORT) * (1.0 + self.lost - 2 * SHORT) * worst
         return np.where(known, 1.0 - t, -np.inf), place
 
-    def _reach(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Array]:
+    def _reach(self, which: Indices, potential: _Potential) -> tuple[Array, Array]:
         """(m,) a distance, or more than all are, and t beyond it over the total of the weights.
 
         That is 1, or else, as a charge moved by d has at r at least the potential 1 / (r + d),
         1 + d / r, where so much may be spared.
         """
-        away = (self.places[near] - self.places[which][:, None]) * (weights > 0)
-        apart = np.abs(away)
-        first, second, third, mixed = (
-            (weights * moment).sum(axis=1) for moment in (away, away**2, away**3, apart**2 * away)
-        )
-        room = self._least_along(first) - (first.conj() * self.places[which]).real
-        room += ((weights * apart**2).sum(axis=1) - 3 * np.abs(second)) / 4
-        room -= self.lost * self.extent**2
-        odd = (5 * np.abs(third) + 3 * np.abs(mixed)) / 8
-        rest = (weights * apart**4).sum(axis=1)
-        most, spare = apart.max(axis=1), self.spare[which] / 2
+        p = potential
+        room = self._least_along(p.first) - (p.first.conj() * self.places[which]).real
+        room += p.plain - self.lost * self.extent**2
+        spare = self.spare[which] / 2
         with np.errstate(divide="ignore", invalid="ignore"):
-            expanded = most + (odd + np.sqrt(odd**2 + 4 * room * rest)) / (2 * room)
-            spared = most / spare
+            expanded = p.most + (p.odd + np.sqrt(p.odd**2 + 4 * room * p.rest)) / (2 * room)
+            spared = p.most / spare
         expanded = np.where(room > 0, np.minimum(1.01 * expanded, self.extent), self.extent)
-        reach = np.minimum(expanded, spared)
-        return reach, np.where(spared < expanded, 1.0 + spare, 1.0)
+        return np.minimum(expanded, spared), np.where(spared < expanded, 1.0 + spare, 1.0)
 
     def _least_along(self, directions: NDArray[np.complex128]) -> Array:
         """(...) lower bounds on Re(conj(p) z) over the support, from two directions near p."""
@@ -316,3 +318,35 @@ class _Swept:
         k = np.minimum(angle.astype(int), DIRECTIONS - 1)
         before, after = np.sin(step * np.stack((k + 1 - angle, angle - k)).clip(0.0)) / np.sin(step)
         return np.asarray(np.abs(directions) * (before * least[k] + after * least[k + 1]))
+
+
+class _Potential(NamedTuple):
+    """Potentials of swept charges far away, less 1 / r: the terms of the head of this module.
+
+    first : (m,) sum w_j d_j;  plain : those of degree 2;  odd, rest : of degree 3, and of all more
+    most  : the largest |d_j|
+    """
+
+    first: NDArray[np.complex128]
+    plain: Array
+    odd: Array
+    rest: Array
+    most: Array
+
+    @classmethod
+    def of(cls, weights: Array, away: NDArray[np.complex128]) -> _Potential:
+        """Of weights (m, s) at d_j."""
+        apart = np.abs(away)
+        first, second, third, mixed = (
+            (weights * moment).sum(axis=1) for moment in (away, away**2, away**3, apart**2 * away)
+        )
+        plain = ((weights * apart**2).sum(axis=1) - 3 * np.abs(second)) / 4
+        odd = (5 * np.abs(third) + 3 * np.abs(mixed)) / 8
+        return cls(first, plain, odd, (weights * apart**4).sum(axis=1), apart.max(axis=1))
+
+    @np.errstate(divide="ignore", invalid="ignore")
+    def room(self, row: int, others: NDArray[np.complex128]) -> Array:
+        """(k,) lower bounds on r^3 times the potential of one at places farther than `most`."""
+        r = np.abs(others)
+        rest = self.odd[row] / r + self.rest[row] / (r * (r - self.most[row]))
+        return np.asarray((self.first[row].conj() * others).real + self.plain[row] - rest)

@@ -1,4 +1,4 @@
-"""The gallery as a folder: an index for people and for programs, and the programs of each case."""
+"""The gallery as a folder: index.md, index.json, and the files of each case."""
 
 from __future__ import annotations
 

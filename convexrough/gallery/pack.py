@@ -1,4 +1,4 @@
-"""A hard case for the developers of solvers: its programs as files, and what to know of them."""
+"""A hard case for developers of solvers: its optimisation programs as files, and their data."""
 
 from __future__ import annotations
 

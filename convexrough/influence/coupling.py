@@ -1,4 +1,4 @@
-"""What every way of coupling asperities elastically can do, and how accurate it says it is.
+"""The interface of all elastic couplings of asperities, with bounds on their rounding errors.
 
 A point force at one asperity moves another, at a distance r, by 1 / (pi E* r) (Boussinesq;
 equation (3) of the source). The coupling has a zero diagonal: an asperity's own displacement is
@@ -41,7 +41,7 @@ class Rounding(NamedTuple):
     each: float
 
     def of(self, displacement: Array) -> Array:
-        """A bound for each component; `displacement` is A |P| as computed."""
+        """Bounds on the errors of all components; `displacement` is A |P| as computed."""
         return self.relative * np.maximum(displacement, 0.0) + 1.01 * self.each
 
     def negligible(self, displacement: Array) -> float:
@@ -55,7 +55,7 @@ class Rounding(NamedTuple):
 
 
 class Coupling(Protocol):
-    """From loads at the asperities to displacements at some points."""
+    """A linear map from loads at the asperities to displacements at some points."""
 
     def apply(self, loads: Array) -> Array:
         """(m,) A P for loads (n,); in float32 where the loads are, if that is faster."""

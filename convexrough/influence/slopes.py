@@ -40,7 +40,7 @@ def pulls(box: SiteBox, over_cube: Callable[[Array], Array]) -> list[Kernel]:
 
 
 def by_mesh(product: Product, smooth: list[Kernel], values: Array) -> Array:
-    """(n, 2) the same sums: smooth at a distance, pair by pair nearby."""
+    """(n, 2) the two sums above: by the mesh for distant pairs, one by one for near pairs."""
     ordered = values[product.order.places]
     total = _nearby(product, ordered)
     if product.weights is not None:
@@ -54,7 +54,7 @@ def by_mesh(product: Product, smooth: list[Kernel], values: Array) -> Array:
 
 
 def mesh_pulls(product: Product) -> list[Kernel]:
-    """Those of the smooth part of a product; none where it has none."""
+    """The odd kernels of the smooth part of a product; an empty list if it has none."""
     return [] if product.weights is None else pulls(product.mesh, _softer(product).smooth)
 
 
@@ -64,7 +64,7 @@ def _softer(product: Product) -> Softened:
 
 
 def _nearby(product: Product, ordered: Array) -> Array:
-    """What the smooth part leaves to near pairs, some rows of them at a time."""
+    """The part of the sums that near pairs add to the smooth part."""
     upper, points, kernel = product.near.upper, product.order.points, _softer(product)
     total, n = np.zeros_like(points), len(points)
     edges = np.searchsorted(upper.indptr, np.arange(0, upper.nnz + BLOCK, BLOCK))

@@ -158,7 +158,7 @@ def lagrange(places: Array, order: int) -> Array:
 
 
 def twofold_lagrange(places: Array, order: int) -> Pair:
-    """The same in pairs."""
+    """Lagrange's polynomials as in `lagrange`, in pairs of float64 numbers."""
     nodes = range(1 - order // 2, order // 2 + 1)
     away = [Pair(*two_sum(places, -float(node))) for node in nodes]
     left, right = [Pair.exact(np.ones(len(places)))], [Pair.exact(np.ones(len(places)))]
@@ -186,7 +186,7 @@ def _series(order: int, power: int) -> Array:
 
 
 def exact_series(order: int, power: int) -> list[Fraction]:
-    """The same, exactly."""
+    """The coefficients of `_series` as fractions."""
     terms = [Fraction(1)]
     for k in range(1, order + 1):
         terms.append(terms[-1] * (2 * k - 2 + power) / (2 * k))

@@ -1,4 +1,4 @@
-"""Normal solutions of a scene at total loads L, the basis of friction and gradients.
+"""Normal solutions of a scene at total loads L, from which friction and gradients are computed.
 
 At a total load L the scene has one solution in the box where it was proved: loads P_i(L), approach
 D0(L), indentations n_i(L) (minus the gap where open), and the energy
@@ -35,18 +35,18 @@ from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
-#: Relative residual above which a refined result is not accepted as exact up to rounding.
+#: A residual that refinement leaves above this fraction of its first size is more than rounding.
 SOLVED = 1e-6
 
-#: Largest number of candidates of levels that are solved together: more gain nothing.
+#: Largest number of candidates for which levels are solved together: beyond, nothing is gained.
 MOST = 512
 
-#: Returns loads of the candidates (problem's units) at a total load, from any solver.
+#: A solver: from a problem to the loads of its candidates, in the problem's own units.
 Press = Callable[[NormalProblem], Array]
 
 
 class Response(NamedTuple):
-    """Loads that springs and half-space carry, as balls in own units: `Level.response`.
+    """What `Level.response` returns, as balls in the problem's own units.
 
     loads : (n,) x, 0 where open;  approach : beta
     """
@@ -56,11 +56,11 @@ class Response(NamedTuple):
 
 
 class Springs(NamedTuple):
-    """The contacts of a level as linear springs: what `Level.response` solves with.
+    """The contacts of a level as linear springs, for the system that `Level.response` solves.
 
-    touching  : (n,) whose springs are known;  doubtful : others that may touch, or just do
+    touching  : (n,) asperities whose stiffness is known;  doubtful : others that may touch
     slopes    : (n,) c = dP/dn, 0 where not touching;  stiffness : 1/c, likewise
-    bound     : (n,) h, at most 1/c of any that may touch; infinite where open
+    bound     : (n,) h, at most 1/c where the asperity may touch; infinite where open
     margin    : mu of the theorem, with H = diag(h); 0 where nothing is proved
     """
 
@@ -93,7 +93,7 @@ class Level:
 
     @classmethod
     def of(cls, found: Proved, load: Ball) -> Level:
-        """The level of a proved solution with known total load."""
+        """The level of a proved solution whose total load is `load`."""
         return cls(
             found.problem,
             load,
@@ -108,7 +108,7 @@ class Level:
 
     @classmethod
     def unproved(cls, problem: NormalProblem, state: Trial, load: Ball) -> Level:
-        """The level of trial loads without a proof: every error radius is infinite."""
+        """The level of unproved trial loads: the radii of the loads are infinite."""
         unknown = Ball.around(state.loads, np.inf)
         none = np.zeros(len(problem), dtype=bool)
         approach = Ball.around(state.approach.mid, np.inf if problem.load else 0.0)
@@ -142,7 +142,7 @@ class Level:
 
     @cached_property
     def springs(self) -> Springs:
-        """What `response` solves with; raises ProofError at no load, where nothing is elastic."""
+        """The springs that `response` solves with. Raises ProofError at no load."""
         found, state = self.solution, self.trial
         if state is None:
             raise ProofError("at no load the approach has no derivative")
@@ -172,13 +172,13 @@ class Level:
     def response(self, right: Ball, total: Ball) -> Response:
         """x and beta:  x / c + A x = right + beta  where touching, x = 0 elsewhere, sum x = total.
 
-        Of an asperity that may or may not touch, all that it could contribute. Refined in pairs
-        until the residual no longer halves; then proved by the theorem of `convex.theorem`, first
-        with the doubtful ones at x = 0, which bounds what they carry, then without them.
+        The solution is refined in pairs of float64 numbers until the residual no longer halves. The
+        theorem of `convex.theorem` then bounds the error: first what doubtful asperities could
+        carry, then the error of the others, with that included.
 
         right : (n,);  total : ()
 
-        Raises SolverError where the system is singular, or nearly: there is no derivative.
+        Raises SolverError where the system is singular or nearly so, and no derivative exists.
         """
         problem, springs = self.problem, self.springs
         touching, c, stiffness = springs.touching, springs.slopes, springs.stiffness
@@ -191,7 +191,7 @@ class Level:
             return Pair(high, low)
 
         def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
-            """x / c + A x - right - beta, and beta as it fits best."""
+            """x / c + A x - right - beta, and beta, the mean weighted by c that is subtracted."""
             above = stiffness * x + product - right
             mean = float(weights @ above.value)
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)
@@ -242,7 +242,7 @@ class Level:
         short = float((total - Ball.exact(x).sum()).size)
 
         def excess(others: float) -> tuple[Array, float, float]:
-            """e, where j carries what is missing of the total, and others carry at most so much."""
+            """Bounds e on the residual if j makes up the total and others carry up to `others`."""
             missing = short + others
             missing_effect = (missing + others) * problem.largest_entry
             e = left.size + missing_effect
@@ -273,10 +273,10 @@ class Level:
 
 
 class Levels:
-    """The normal solutions of one scene at total loads up to that of the first, each found once.
+    """The normal solutions of one scene at total loads up to that of `top`; each is cached.
 
     top : the level with the highest load, that of a pressed contact
-    together : true if Newton's method may solve several levels at once, in rows of a stack
+    together : Newton's method may solve several levels at once, as rows of a stack
     """
 
     def __init__(self, top: Level, press: Press, *, together: bool = False) -> None:
@@ -285,15 +285,15 @@ class Levels:
 
     @property
     def presses(self) -> int:
-        """The number of normal problems solved after the first."""
+        """The number of levels found besides `top`."""
         return len(self._known)
 
     def below(self, drop: Ball) -> Level:
-        """The level at the load of the top level less `drop`, in the problem's units."""
+        """The level at the load of `top` minus `drop`, in the problem's own units."""
         return self.at(self.top.load - drop)
 
     def at(self, load: Ball) -> Level:
-        """The level at a total load in own units; raises ProofError where nothing is proved."""
+        """The level at a total load. Raises ProofError if an inexact load may be 0 or less."""
         key = _key(load)
         if key not in self._known:
             self._known[key] = self._level(load)
@@ -307,7 +307,7 @@ class Levels:
         return self._solved(self.problem.at_load(load), load)
 
     def prepare(self, loads: Ball) -> list[Level | None]:
-        """Levels of positive loads (k,), solved together; None for those to be solved alone."""
+        """The levels at positive loads (k,), solved together; None where `at` must solve alone."""
         found, problem = self.top.solution, self.problem
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or found is None or found.box.fixed_open.any():
@@ -319,7 +319,7 @@ class Levels:
         return levels
 
     def at_approach(self, approach: Ball) -> Level:
-        """The level at a prescribed approach in own units, above that of the first touch."""
+        """The level at an approach, in own units, which is above that of first touch."""
         return self._solved(self.problem.at_approach(approach), None)
 
     def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
@@ -337,7 +337,7 @@ def _key(load: Ball) -> tuple[float, float, float]:
 
 
 def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | None]:
-    """The levels of these loads, in one box; None for those without a proof in it."""
+    """The levels at these loads; None where the solution is not proved in the box."""
     scene, exact, m, total = problem.scene, problem.exact, len(loads), loads[:, None]
     rows = Stack([(slice(0, m), problem)], exact, problem.shells, total, None)
     force, modulus = total.value * problem.units.force, scene.material.contact_modulus

@@ -1,6 +1,6 @@
-"""Many normal problems with equal numbers of candidates, one in each row of an array.
+"""Many normal problems with equally many candidates, one in each row.
 
-The functions of `refine` and `proved` refine and prove them as they do a single problem.
+The functions of `refine` and `proved` take such a stack in place of a single problem.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from convexrough.roundoff import SAFETY
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """Problems in m rows, in their own units. Arrays are (m, n), or (n,) if all rows are equal.
+    """Problems in m rows, in their own units: arrays (m, n), or (n,) where all rows share them.
 
-    coupled : slices of the rows, each with a problem that has their compliance operator
-    exact  : k, also (1,) or (m, 1), and d;  shells : see `NormalProblem`
-    exact_load, exact_approach : (m, 1) the prescribed quantity; the other is None
+    coupled : slices of the rows, each with a problem that has the coupling of these rows
+    exact  : k, which may be (1,) or (m, 1), and d;  shells : as in `NormalProblem`
+    exact_load, exact_approach : (m, 1) the prescribed quantity; the other one is None
     """
 
     coupled: Sequence[tuple[slice, NormalProblem]]
@@ -40,7 +40,7 @@ class Stack:
 
     @cached_property
     def coefficients(self) -> Array:
-        """The local coefficients k in float64."""
+        """k, rounded to float64."""
         return self.exact.coefficients.value
 
     @property
@@ -62,7 +62,7 @@ class Stack:
 
     @cached_property
     def exact_depths(self) -> Ball:
-        """(m, n) D = D0 + d at prescribed approaches D0."""
+        """(m, n) D, the indentations prescribed by the approaches."""
         return self.exact.offsets + self.depth
 
     @cached_property
@@ -82,7 +82,7 @@ class Stack:
         return values
 
     def only(self, rows: Indices) -> Stack:
-        """The stack of some rows; their indices are sorted."""
+        """The stack of the chosen rows, given in increasing order."""
         ends = np.searchsorted(rows, [0, *(some.stop for some, _ in self.coupled)]).tolist()
         slices = zip(map(slice, ends[:-1], ends[1:]), self.coupled, strict=True)
 
@@ -110,7 +110,7 @@ class Stack:
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(m, n) A P of other loads, as accurate as `product`."""
+        """(m, n) A P of other loads, computed anew to as many digits."""
         return self.product(others)
 
     def convexity_at(self, stiffness: Array) -> Array:
@@ -122,10 +122,10 @@ class Stack:
         return np.asarray((2.0 / 3.0) * self.coefficients / np.cbrt(loads))
 
     def correct(self, slopes: Array, defect: Array, enough: Any, todo: NDArray[np.bool_]) -> Array:
-        """(m, n) a step of Newton's method as `convex.newton_step.correct`; nan where indefinite.
+        """(m, n) the step of `convex.newton_step.correct`; nan in rows with an indefinite matrix.
 
-        slopes : (m, n) c = dP/dn;  todo : (m,) rows to correct; others get 0
-        enough : not used, because a direct solution leaves only rounding errors
+        slopes : (m, n) c = dP/dn;  todo : (m,) rows that need a step; the others get 0
+        enough : not used, because a factor leaves nothing but rounding
         """
         from scipy.linalg.lapack import dposv  # takes 0.2 s to import
 

@@ -1,7 +1,7 @@
 """Many normal problems, one in each row of an array, solved and proved in one computation.
 
-The rows are levels of one scene or of several scenes. The caller must solve and prove a row one by
-one where `Solved.good` is false.
+Newton's method, the refinement in pairs of float64 numbers and the theorem treat all rows at once.
+A row that the cheapest proof does not settle is solved on its own by the caller.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 #: Largest number of Newton steps.
 STEPS = 30
 
-#: Squared radius of a rough contact over that of Hertz's contact. A heuristic.
+#: Squared radius of a rough contact over that of Hertz's smooth contact. A heuristic.
 WIDER = 1.1
 
-#: A row is solved where the residual expected after its last step is at most this fraction of the
-#: indentations (in the 2-norm). A heuristic.
+#: Newton's method ends where the expected residual is below this fraction of the norm of the
+#: indentations. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
-#: Largest number of elements m n of an array; some dozens of such arrays exist at once.
+#: Largest size of an array (rows, asperities): some dozens of such arrays are in use at once.
 NUMBERS = 2**17
 
 quietly = np.errstate(all="ignore")
 
 
 class Rows(NamedTuple):
-    """k levels in the problems' units, arrays (k,) or (k, n). `level.Level` explains the fields."""
+    """The fields of `level.Level` for k levels: (k,) or (k, n), in the problems' own units."""
 
     load: Ball
     approach: Ball
@@ -50,13 +50,13 @@ class Rows(NamedTuple):
     open: NDArray[np.bool_]
 
     def at(self, which: Indices) -> Rows:
-        """The levels with these indices."""
+        """The chosen levels."""
         return Rows._make(each[which] for each in self)
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Solutions in rows, proved where `good`. `proved.Proved` explains the other fields."""
+    """The fields of `proved.Proved` for many problems; only rows that are `good` are proved."""
 
     trial: Trial
     box: Box
@@ -69,20 +69,20 @@ class Solved:
 
     @cached_property
     def rows(self) -> Rows:
-        """The levels with their proved statuses."""
+        """The solutions as levels, with the proved statuses."""
         touching = self.indentation.positive | self.loads.positive
         known = self.approach[:, 0], self.loads, self.indentation
         return Rows(self.total, *known, touching, self.indentation.negative)
 
     @cached_property
     def total(self) -> Ball:
-        """(m,) the sums of the loads, bounded as in `Proved.total`."""
+        """(m,) the sums of the loads of each row, with error bounds."""
         trial = Ball.exact(self.trial.loads).sum()
         spread = self.distance * np.sqrt(summed(1.0 / self.stiffness)) * (1 + SAFETY)
         return Ball.around(trial.mid, trial.radius + (spread + self.trial.missing.size)[:, 0])
 
     def row(self, k: int, problem: NormalProblem) -> Proved:
-        """Row k as the solution of a problem; its `box` is that of all rows."""
+        """The solution in row k, which is that of `problem`, in the box that all rows share."""
         it, of = self.trial, problem
         own = it.loads.at(k), it.product[k], it.local[k], it.gap[k]
         return Proved(
@@ -98,7 +98,7 @@ class Solved:
 
 
 class _Pressed(NamedTuple):
-    """An iterate of Newton's method, as in `solvers.pressing`."""
+    """A point of Newton's method, with the same quantities as in `solvers.pressing`."""
 
     own: Array
     loads: Array
@@ -119,9 +119,9 @@ class _Pressed(NamedTuple):
 
 @quietly
 def pressed(stack: Stack, guess: Array) -> Array:
-    """(m, n) loads by full steps of Newton's method; not finite in rows that diverge.
+    """(m, n) loads by full steps of Newton's method; nan in rows that do not converge.
 
-    guess : (m, n) indentations; each row needs a positive one
+    guess : (m, n) indentations, in each row at least one of them positive
     """
     state, before = _pressed(stack, guess), np.full(len(stack), np.inf)
     for _ in range(STEPS):
@@ -153,11 +153,11 @@ def _pressed(stack: Stack, indentation: Array) -> _Pressed:
 def solved(
     stack: Stack, prescribed: Array, squares: Array, reach: Array, box: Box | None = None
 ) -> Solved:
-    """The solutions of all rows, with `good` where they are proved in the given box.
+    """The solutions of all rows, `good` where they are proved in one box.
 
-    A row with a residual above rounding or an undecided status is not `good`.
+    Rows with a residual above rounding or with an undecided status are not `good` either.
 
-    prescribed, squares, reach : see `guessed`;  box : default `widest`
+    prescribed, squares, reach : arguments of `guessed`;  box : default `widest`
     """
     loads = pressed(stack, guessed(stack, prescribed, squares, reach))
     finite = np.where(np.isfinite(loads).all(axis=1, keepdims=True), loads, 0.0)
@@ -175,11 +175,10 @@ def solved(
 
 @quietly
 def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Array:
-    """(m, n) initial indentations from the displacement of Hertz's pressure, as in `solvers.start`.
+    """(m, n) indentations to start from: those under the displacement of Hertz's pressure.
 
-    prescribed : (m, n) or (n,) offsets d at prescribed loads, else D = D0 + d
-    squares    : (m, n) or (n,) squared distances from the axis
-    reach      : (m, 1) squared contact radius of the smooth sphere, or infinite
+    prescribed : (m, n) or (n,) d at a prescribed load, D at a prescribed approach
+    squares : r^2 likewise;  reach : (m, 1) squared contact radius of the smooth body, or infinite
     """
     s = np.sqrt(np.maximum(1.0 - squares / (WIDER * reach), 0.0)) + 0.0 * prescribed
     alone = s.sum(axis=1) == 0
@@ -200,7 +199,7 @@ def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Ar
 
 @quietly
 def widest(stack: Stack, state: Trial) -> Box:
-    """Boxes that hold every solution and these loads: the first boxes of `boxes.tried`."""
+    """Boxes that contain every solution and these loads, with convexity shown by `shells`."""
     if stack.load is None:
         highest = stack.depth.upper
     else:

@@ -18,7 +18,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.plots.measure import Measure, Scale
 from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH, bar, label, round_ticks
 
-#: Numbers of discs above which vector files have them as pixels, and a mosaic replaces them.
+#: From these numbers on, discs are pixels inside a vector file, and a mosaic replaces them.
 DENSE, CROWDED = 200, 3000
 
 #: Width of a mosaic in pixels.
@@ -38,7 +38,7 @@ LOOKS = {
 class Layer(NamedTuple):
     """Discs of one status; later layers cover earlier ones.
 
-    radii  : (n,) [length], 0 for no disc;  shades : (n, 4) colours, or one colour for all
+    radii  : (n,) [length], 0 where no disc is drawn;  shades : (n, 4), or one colour for all
     rim    : colour of the outlines; None draws no outlines
     """
 
@@ -105,7 +105,7 @@ def draw_map(
 
 
 def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> Window:
-    """`draw_map` of a contact, with the outline of its smooth reference."""
+    """Draw the map of a contact, with the outline of its smooth reference."""
     points = scale.contact.scene.contact_points
     return draw_map(axes, points, layers, scale.length, smooth=scale.axes)
 
@@ -113,7 +113,7 @@ def draw_contact(axes: Axes, scale: Scale, layers: Sequence[Layer]) -> Window:
 def draw_values(
     axes: Axes, scale: Scale, values: Array, name: str, *, signed: bool = False
 ) -> None:
-    """Draw the discs of a contact coloured by values, and a colour bar with this name.
+    """Draw the discs of a contact in the colours of their values, and a named colour bar.
 
     signed : the colours run from dark for negative values to light for positive ones
     """
@@ -152,7 +152,7 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
 def draw_outline(
     axes: Axes, semi_axes: Sequence[float], style: Any = DASHED, colour: str = SMOOTH
 ) -> None:
-    """Draw a circle or ellipse about the origin, or nothing without semi-axes."""
+    """Draw a circle or ellipse about the origin; None draws nothing."""
     if semi_axes:
         width, height = (2.0 * axis for axis in semi_axes)
         axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=style, lw=0.9, ec=colour))
@@ -161,7 +161,7 @@ def draw_outline(
 def status_layers(
     status: NDArray[np.str_], radii: Array, stick_radii: Array | None = None
 ) -> list[Layer]:
-    """A layer for each status, and one of the stick discs of partially slipping asperities."""
+    """A layer for each status, and one of the stick discs of partly slipping asperities."""
     layers = [
         Layer(name, np.where(status == name, radii, 0.0), colour)
         for name, (colour, _) in LOOKS.items()
@@ -173,7 +173,7 @@ def status_layers(
 
 
 def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line2D]:
-    """The entries of a legend: each status that occurs, and stick discs."""
+    """Legend entries for each status that occurs, and for stick discs."""
     entries = [each for status, each in LOOKS.items() if status in statuses]
     if stick and "partial" in statuses:
         entries.insert(0, (STICK, "stick disc"))
@@ -181,7 +181,7 @@ def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line
 
 
 def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
-    """The legend entries of the outlines of the smooth contact and of its stick disc."""
+    """Legend entries for the outlines of the smooth contact and of its stick disc."""
     if scale.sphere is None:
         return []
     styles = {"contact": DASHED} | ({"stick": DOTTED} if stick else {})
@@ -192,7 +192,7 @@ def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
 
 
 def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
-    """(n,) one radius for the chosen asperities, 0.42 of a typical spacing; 0 for others."""
+    """(n,) one radius for all chosen points, so small that discs stay apart; 0 for the others."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     size = float(np.ptp(points, axis=0).max()) or 1.0
@@ -223,14 +223,14 @@ def map_window(
 
 
 def _draw_open(axes: Axes, points: Array, colour: str) -> None:
-    """Draw open asperities as faint dots, smaller if there are many."""
+    """Draw open asperities as faint dots, smaller if they are many."""
     size = float(np.clip(25.0 / np.sqrt(len(points) + 1), 0.4, 1.5))
     axes.plot(*points.T, "o", ms=size, mew=0, color=colour, rasterized=len(points) >= CROWDED,
               label="open")  # fmt: skip
 
 
 def _blended(layers: Sequence[Layer], whole: Array) -> Array:
-    """(n, 4) the mean colour over each disc, where later layers cover earlier ones."""
+    """(n, 4) the mean colour of each asperity, with later layers above earlier ones."""
     mean = np.tile(to_rgba("white"), (len(whole), 1))
     for each in layers:
         part = np.divide(each.radii, whole, out=np.zeros(len(whole)), where=whole > 0) ** 2

@@ -1,4 +1,4 @@
-"""`plot`, which draws the main picture of a result in given axes, and `thumbnail`."""
+"""The main picture of a result, drawn into axes of the caller."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _draw_path(path: LoadPath, axes: Axes) -> None:
 
 
 def _draw_times(comparison: Comparison | PathComparison, axes: Axes) -> None:
-    """Draw the time [s] of each entry, or its outcome where it has no result; first on top."""
+    """Draw the time [s] of each solver, or the reason why it has no answer."""
     rows = [_took(entry) for entry in comparison.entries]
     for place, (_, seconds, outcome) in enumerate(rows):
         if seconds is None:

@@ -19,7 +19,7 @@ MOST_SEGMENTS = 24
 
 
 def between(path: LoadPath) -> LoadPath:
-    """The path with equally many points added on each segment; unchanged if this costs too much."""
+    """The path with points added between its own; the path itself if these cost too much."""
     m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
     each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)
     if not path.load_constant:

@@ -41,14 +41,14 @@ def fretting_figures(worn: Fretting) -> Figures:
 
 
 def draw_slip(axes: Axes, worn: Fretting, scale: Scale) -> None:
-    """The map of slip amplitudes."""
+    """Draw the map of slip amplitudes."""
     most = _largest(worn.slip_amplitudes)
     slip = measure(most if scale.units.length else scale.travel, scale.units.length, "X_0")
     _draw(axes, scale, worn.slip_amplitudes, slip, "slip amplitude at the rim", "s_i")
 
 
 def _largest(values: Array) -> float:
-    """The largest finite value, at least 0."""
+    """The largest of the values that are known."""
     return float(values.max(initial=0.0, where=np.isfinite(values)))
 
 

@@ -45,13 +45,13 @@ class Measure(NamedTuple):
         return values / self.size
 
     def short(self, name: str) -> str:
-        """The label of an axis, without the value of the symbol."""
+        """The label of an axis, without the size of the symbol."""
         if self.symbol:
             return f"${name}\\,/\\,{self.symbol}$"
         return f"${name}$  [{literal(self.said)}]" if self.said else f"${name}$"
 
     def label(self, name: str) -> str:
-        """The label of an axis, with the value of the symbol."""
+        """The label of an axis, with the unit or the size of the symbol."""
         known = f"  (${self.symbol.strip('()')}$ = {self.said})" if self.symbol else ""
         return self.short(name) + known
 
@@ -177,7 +177,7 @@ class Scale:
         return measure(largest if unit else self.work, unit, "W_0")
 
     def footnote(self) -> str:
-        """The values of f P and X0."""
+        """A line that says what f P and X0 are."""
         whose = f"the {self.name}'s" if self.sphere else "this contact's"
         X0 = quantity(self.travel, self.units.length)
         limit = quantity(self.limit, self.units.force)

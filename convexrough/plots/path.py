@@ -71,7 +71,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
 
 
 def draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
-    """Q against X."""
+    """Draw Q against X."""
     x, q = scale.displacement, scale.force
     _draw_darkening(axes, path, fine, x.of(fine.displacements), q.of(fine.forces))
     mark_points(axes, x.of(path.displacements), q.of(path.forces))
@@ -80,7 +80,7 @@ def draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
 
 
 def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
-    """Energy lost since the beginning against the point."""
+    """Draw the energy lost since the beginning against the number of the point."""
     m = len(path.losses)
     energy = scale.energy(float(path.losses.max(initial=0.0)))
     at = np.arange(1.0, len(fine.losses) + 1) * m / max(1, len(fine.losses))

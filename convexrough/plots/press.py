@@ -148,7 +148,7 @@ def _draw_points(axes: Axes, x: Array, y: Array, top: float, label: str) -> bool
 
 
 def census(contact: Contact) -> str:
-    """The number of touching asperities, and how many are undecided, as text."""
+    """A line that says how many asperities touch, and what of that is proved."""
     text = f"touching: {np.count_nonzero(contact.loads):,} of {len(contact.loads):,}"
     return text + not_proved(contact.certificate.scope, contact.status)
 

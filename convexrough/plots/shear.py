@@ -80,7 +80,7 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
 
 
 def draw_state(axes: Axes, state: State, scale: Scale) -> None:
-    """Draw contact and stick discs, dots where open, and the outlines of the smooth sphere's."""
+    """Draw contact discs, stick discs and open dots, and the outlines of the smooth sphere's."""
     radii, points = state.contact.contact_radii, state.contact.scene.contact_points
     draw_contact(axes, scale, status_layers(state.status, radii, state.stick_radii))
     left = max(1.0 - float(np.linalg.norm(state.force)) / scale.limit, 0.0)
@@ -94,7 +94,7 @@ def draw_state(axes: Axes, state: State, scale: Scale) -> None:
 
 
 def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
-    """The legend entries of the statuses that occur."""
+    """Legend entries for the colours and marks that occur."""
     loads = states[0].contact.loads
     statuses = {status for state in states for status in np.unique(state.status[loads > 0])}
     marks: list[Any] = status_handles(statuses - {"undecided"}, stick=True)
@@ -112,7 +112,7 @@ def _doubtful(state: State) -> Any:
 
 
 def state_title(state: State, scale: Scale, *, narrow: bool) -> str:
-    """The shear force (or the size of a vector) and the number of sliding asperities, as text."""
+    """The title: the size of the shear force, and how many asperities slide."""
     touching = state.contact.loads > 0
     slide = int((touching & (state.status == "sliding")).sum())
     force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)

@@ -45,7 +45,7 @@ class Slides:
 
     @classmethod
     def of(cls, contact: Contact) -> Slides:
-        """The states of a contact. InputError without friction, or if the base is not a sphere."""
+        """The slides of a contact. Raises InputError without friction or a spherical base."""
         sphere_radius(contact.scene.sphere_radius, "slider page")
         limit = checks.friction(contact.scene.friction) * contact.load
         fractions = np.linspace(0.0, 1.0, _forces(int(np.count_nonzero(contact.loads))))
@@ -180,7 +180,7 @@ def _digits(values: ArrayLike) -> Any:
 
 
 def _letters(limit: float, a_H: float, X0: float, *units: str) -> list[list[str]]:
-    """Symbols, their values and meanings."""
+    """Rows of a symbol, its value and its meaning."""
     length, force = (f" {unit}".rstrip() for unit in units)
     return [
         ["f P", f"{limit:.5g}{force}", "the largest shear force: gross sliding"],

@@ -80,7 +80,7 @@ def legend_below(axes: Axes, ncols: int = 2, **more: Any) -> None:
 
 
 def legend_outside(figure: Any, handles: Sequence[Any], place: str, ncols: int) -> None:
-    """Draw one legend for all panels, outside them."""
+    """Add one legend for all panels."""
     figure.legend(handles=list(handles), loc=f"outside {place}", ncols=ncols, fontsize=TICK,
                   frameon=False, handletextpad=0.5, columnspacing=1.4, borderpad=0.2)  # fmt: skip
 
@@ -94,13 +94,13 @@ def no_contact(*stems: str) -> Figures:
 
 
 def say_nothing(axes: Axes, why: str = "no contact") -> None:
-    """Leave the axes empty, with the reason as text."""
+    """Remove the ticks of an empty panel, and write the reason into it."""
     axes.set(xticks=[], yticks=[])
     axes.text(0.5, 0.5, why, transform=axes.transAxes, fontsize=LABEL, ha="center", va="center")
 
 
 def not_proved(scope: str, status: Any) -> str:
-    """The number of undecided statuses, or "not proved", in brackets; "" if all are proved."""
+    """What is not proved of a state, in brackets; "" if everything is proved."""
     if scope == "none":
         return " (not proved)"
     unsure = int((status == "undecided").sum())

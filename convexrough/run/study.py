@@ -1,4 +1,4 @@
-"""The model of a scene file: its tables, the values each key may have, and messages of mistakes.
+"""The tables of a scene file as one model: the type of each key, and messages for all mistakes.
 
 `read_scene` imports this when a file is read, and not before.
 """
@@ -46,7 +46,7 @@ class Sphere(FileTable):
 
 
 class Material(FileTable):
-    """The material of both bodies."""
+    """The table of the material of both bodies."""
 
     alternatives = ("contact_modulus", "youngs_modulus")
     contact_modulus: Positive | None = None
@@ -62,7 +62,7 @@ class Body(FileTable):
 
 
 class Bodies(FileTable):
-    """Two bodies that differ."""
+    """The table of two bodies of different materials."""
 
     elsewhere = ("two bodies", frozenset(Material.model_fields))
     sphere: Body
@@ -70,7 +70,7 @@ class Bodies(FileTable):
 
 
 class Summits(FileTable):
-    """Asperities from a file."""
+    """The table of asperities that are read from a file."""
 
     elsewhere = (
         "this pattern",
@@ -84,7 +84,7 @@ class Summits(FileTable):
 
 
 class Lattice(FileTable):
-    """Asperities in a pattern."""
+    """The table of asperities in a pattern."""
 
     needs: ClassVar[Mapping[str, str]] = {"height_std": "seed", "tip_radius_cv": "seed"}
     elsewhere = ("this pattern", frozenset(Summits.model_fields))
@@ -150,7 +150,7 @@ def _is_file(table: Any) -> str:
     return "(file)" if isinstance(table, dict) and table.get("pattern") == "file" else "(lattice)"
 
 
-#: Tables without which there is no scene.
+#: Tables that every scene file must have.
 REQUIRED: dict[str, type[FileTable]] = {
     "sphere": Sphere,
     "material": Material,
@@ -178,13 +178,13 @@ class Study(FileTable):
 
     @property
     def stages(self) -> dict[str, Stage]:
-        """The stages in the file, in the order of results."""
+        """The stages that the file asks for, in the order of results."""
         found = {name: getattr(self, name) for name in STAGES}
         return {name: stage for name, stage in found.items() if stage is not None}
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes: tables that are unknown, or missing though others need them."""
+        """Mistakes: unknown or missing tables, and tables that require each other."""
         for name, keys_within in keys.items():
             if name == "sweep":
                 yield name, "[sweep]: many scenes, which `convexrough sweep` computes"
@@ -246,7 +246,7 @@ def _model(stages: tuple[type[Stage], ...]) -> type[Study]:
 
 
 def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
-    """The tables of a parsed file, or None and all mistakes, in the order of the file."""
+    """The tables of a parsed file, or None and all messages, in the order of the file."""
     model = _model(tuple(STAGES.values()))
     try:
         return model.model_validate(dict(contents)), []
@@ -262,7 +262,7 @@ T = TypeVar("T", bound=FileTable)
 
 
 def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list[str]]:
-    """One table, or None and all mistakes in it."""
+    """One table, or None and the messages of all mistakes in it."""
     try:
         return model.model_validate(keys), []
     except ValidationError as error:

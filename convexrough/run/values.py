@@ -149,7 +149,7 @@ def _mistake(key: str, said: str, keys: Any) -> InitErrorDetails:
 
 
 def _again(error: ErrorDetails) -> InitErrorDetails:
-    """The same mistake, to be told beside others."""
+    """The same mistake, in the form in which pydantic collects it with others."""
     kind = error["type"] if error["type"] in ("told", "missing") else "expected"
     expects = "a table" if error["type"] == "model_type" else error["msg"]
     again = PydanticCustomError(kind, "{said}", {"said": expects})
@@ -157,7 +157,7 @@ def _again(error: ErrorDetails) -> InitErrorDetails:
 
 
 def phrased(error: ErrorDetails) -> str:
-    """[table] key.key[i]: what was found, what is expected."""
+    """The message of a mistake: where it is, what was found, and what is expected."""
     table, *inner = (each for each in error["loc"] if not str(each).startswith("("))
     place = "".join(f"[{each}]" if isinstance(each, int) else f".{each}" for each in inner)
     where = f"[{table}] {place.removeprefix('.')}".rstrip()
@@ -170,6 +170,6 @@ def phrased(error: ErrorDetails) -> str:
 
 
 def shown(value: object) -> str:
-    """A value as a message says it, not too long."""
+    """A value as text for a message, shortened if it is long."""
     text = str(value).lower() if isinstance(value, bool) else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."

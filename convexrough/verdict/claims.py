@@ -150,7 +150,7 @@ def _spread(values: NDArray[Any], owners: Indices, rest: str, count: int) -> NDA
 
 
 def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
-    """Areas of nodes, or of the pixels of a regular grid."""
+    """The areas of nodes, or of the pixels of a regular grid."""
     if "area" in columns:
         return columns["area"]
     try:
@@ -163,7 +163,7 @@ def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
 
 
 def _explained(table: ReadTable) -> Iterator[str]:
-    """How each column is read, one line each."""
+    """Lines that say how many rows there are, and how each column is read."""
     yield f"rows: {len(table.rows):,}{f', {table.style}' if table.style else ''}"
     for name, called in table.called.items():
         unit = f" in {table.units[name]}" if name in table.units else ""
@@ -192,7 +192,7 @@ class _Placing:
         self.points = np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
 
     def owners(self) -> Indices:
-        """The asperity of each row, if rows are asperities."""
+        """The asperity of each row, where rows are asperities."""
         count, rows = len(self.scene), len(self.table.rows)
         found = np.arange(rows) if self.points is None else self._matched(self.points)
         by = "positions"
@@ -212,7 +212,7 @@ class _Placing:
         return found
 
     def nearest(self, values: Array) -> Indices:
-        """The asperity nearest to each node or pixel; loaded ones must be near it."""
+        """The nearest asperity of each node or pixel; a loaded one must be near its asperity."""
         assert self.points is not None
         distances, owners = _nearest(self.scene.contact_points, self.points)
         apart = np.full(len(self.scene), self.scene.sphere_radius)

@@ -40,7 +40,7 @@ class Verified(NamedTuple):
 
     @property
     def claims(self) -> list[Claim]:
-        """One or two verdicts."""
+        """The claim on loads, and the one on shear forces if there is one."""
         return [self.verdict, *([] if self.sheared is None else [self.sheared])]
 
     @property
@@ -93,13 +93,13 @@ def describe_verdict(found: Verified) -> list[str]:
 
 
 def describe_scene(scene: Scene) -> list[str]:
-    """Lines about the scene: geometry and contact modulus."""
+    """Aligned lines on the geometry and the contact modulus of a scene."""
     modulus = described_modulus(scene.material.contact_modulus, scene.units)
     return labelled([("geometry", scene.geometry), ("contact modulus", modulus)])
 
 
 def _proved(claim: Claim) -> str:
-    """One line: the part of a claim that is proved."""
+    """One line that says what is proved of a claim."""
     if len(claim.wrongly_claimed):
         return f"{claim.proved} wrong"
     if len(claim.undecided):
@@ -174,7 +174,7 @@ def junit(found: Verified | ConvexroughError) -> bytes:
 
 
 def _cases(found: Verified) -> Iterator[tuple[str, str]]:
-    """Each check with its failure, or ""."""
+    """Pairs of a question and its failure message, "" if there is no failure."""
     for claim in found.claims:
         wrong = {what: which for what, which in claim.wrong.items() if len(which)}
         asked = {

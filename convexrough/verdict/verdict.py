@@ -108,7 +108,7 @@ class Verdict(Claim, Table, Plottable):
         return None if found is None else (found.loads, found.certificate.load_errors)
 
     def hints(self) -> Iterator[str]:
-        """Possible causes of wrong loads."""
+        """Lines that suggest where wrong loads may come from."""
         small = self.loads[self.wrongly_loaded]
         if len(small) and 0 < (noise := float(small.max())) <= NOISE * self.largest:
             yield (
@@ -149,7 +149,7 @@ class Verdict(Claim, Table, Plottable):
 
 
 def rounded_up(value: float) -> str:
-    """The value rounded up to one digit."""
+    """The value as text, rounded up to one digit."""
     power = 10.0 ** math.floor(math.log10(value))
     return f"{math.ceil(value / power * (1 - 1e-12)) * power:.0e}"
 
@@ -201,7 +201,7 @@ def verify_on(
     within: float | None = None,
     floor: float = 0.0,
 ) -> Verdict:
-    """`verify` for an assembled problem; `verify` explains the other arguments."""
+    """The verdict of `verify`, for a problem that is already assembled."""
     floor = checks.non_negative("floor", floor)
     within = None if within is None else checks.positive("within", within)
     given = checks.array("loads", loads, length=len(problem.scene))

@@ -2,9 +2,9 @@ r"""
 6. Active sets without guesswork
 ================================
 
-**Claim.** A common loop (solve, drop negative loads, add penetrations) can cycle for ever with
-only four asperities. Newton's method on the *normal map*, which guesses no set, solves the same
-scene. A certificate, which uses neither method, shows which of the two results is right.
+**Claim.** A common loop (solve, drop negative loads, add penetrations) can cycle for ever with only
+four asperities. Newton's method on the *normal map* guesses nothing, and solves the same scene. A
+certificate, which uses neither method, bounds the error of both results.
 
 Which asperities touch is the *active set*. If it were known, the loads would follow from a system
 with as many equations as unknowns.
@@ -99,7 +99,7 @@ assert period > 1
 
 # %%
 # Why? The loads on the other asperities lower one asperity so far that it only just touches. Alone
-# it would carry far more, and the loop starts it with that load. From there Newton's method for
+# it would carry far more, and the loop starts from this larger load. From there Newton's method for
 # :math:`x^{2/3}`, which is concave, overshoots zero; the asperity is dropped, then it penetrates,
 # is added with the same large load, and so on for ever. The loop decides by signs at an
 # intermediate point, not at the solution.
@@ -147,7 +147,7 @@ assert np.allclose(delta + A @ (np.maximum(delta, 0) / k) ** 1.5, D, atol=1e-13)
 figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
 left.imshow([[int(c) for c in one] for one in sets[:24]], cmap="Greys", aspect="auto", vmax=1.6)
 left.set(xlabel="asperity", ylabel="pass", xticks=range(4), xticklabels=range(1, 5))
-left.set_title("thought to touch (dark), pass by pass")
+left.set_title("in the set (dark), pass by pass")
 contact = cr.press(scene, approach=APPROACH)
 right.set(aspect="equal", xlim=(-0.0025, 0.0025), ylim=(-0.0025, 0.0025))
 for number, (point, a) in enumerate(zip(points, contact.contact_radii, strict=True), start=1):
@@ -157,16 +157,16 @@ for number, (point, a) in enumerate(zip(points, contact.contact_radii, strict=Tr
     look = dict(color="white" if inside else "black", ha="center", va="center")
     right.annotate(str(number), place, **look)
 right.set(xlabel="x / R [1]", ylabel="y / R [1]", xticks=(-0.002, 0, 0.002))
-right.set_title("contact discs of the answer")
+right.set_title("contact discs of the solution")
 plt.show()
 
 # %%
 # An independent check: the certificate
 # -------------------------------------
 #
-# ``certify`` takes loads from any source and bounds their distance from the exact solution. Here
-# it proves the same statuses from both results. But the error of the loop's loads is nearly a
-# third of the largest load, while those of the normal map are accurate to rounding.
+# ``certify`` takes loads from any source and bounds their distance from the exact solution. Here it
+# proves the same statuses from both results. But its bound on the error of the loop's loads is
+# nearly a third of the largest load; its bound for the normal map is as small as rounding errors.
 
 force = contact.loads.max() / ((np.maximum(delta, 0) / k) ** 1.5).max()
 by_map = force * (np.maximum(delta, 0) / k) ** 1.5
@@ -184,7 +184,7 @@ assert bad.load_error > 0.01 * contact.loads.max()
 assert (abs(force * loads - contact.loads) <= bad.load_errors).all()
 
 # %%
-# The loop is not close to the solution either. Its largest error, over the largest load, is
+# The bound is close to the true error. The largest error, over the largest load, is
 
 off = abs(force * loads - contact.loads).max() / contact.loads.max()
 print(f"{off:.3f}")

@@ -8,7 +8,8 @@ lose if the total load were reduced by :math:`Q / f`. The asperities that would 
 those that slide. So a solver for normal contact also solves shear.
 
 This is Ciavarella and Jäger's theorem. It holds if a tangential force displaces the surface as a
-normal force does, up to a factor :math:`c_t = (2 - \nu) / (2 (1 - \nu))`.
+normal force does, up to a factor :math:`c_t = (2 - \nu) / (2 (1 - \nu))`, and if no indentation
+falls as the load rises.
 """
 
 # %%
@@ -45,7 +46,7 @@ ratio = (2 - NU) / (2 * (1 - NU))  # c_t
 
 
 def own_displacement(forces: Array) -> Array:
-    """Mindlin's law of one asperity, both bodies: of those that touch."""
+    """Displacement of each touching asperity by Mindlin's law, both bodies together."""
     P, a = pressed.loads[touching], pressed.contact_radii[touching]
     part = np.clip(forces[touching] / (FRICTION * P), 0, 1)
     scale = 3 * (2 - NU) * FRICTION * P / (8 * material.shear_modulus * a)
@@ -53,7 +54,7 @@ def own_displacement(forces: Array) -> Array:
 
 
 def needed(forces: Array) -> Array:
-    """Displacement of the deep points that each touching asperity needs if nothing slides."""
+    """Displacement of the bodies at which each touching asperity would not slide."""
     return np.asarray(own_displacement(forces) + ratio * (A @ forces)[touching])
 
 
@@ -65,8 +66,8 @@ assert shares.max() > 1.2 * shares.min()
 # %%
 # All asperities connect the same two bodies, so all must have the same displacement, not 37
 # different ones. The neighbours displace the inner asperities as well, so the assumption gives
-# these too much force, and the outer ones too little. It also gives a result beyond the limit of
-# friction, where there is none:
+# these too much force, and the outer ones too little. The assumption also gives a result beyond the
+# limit of friction, where no equilibrium exists:
 
 try:
     cr.shear(pressed, force=1.01 * limit)
@@ -156,8 +157,8 @@ assert ((state.status == "sliding")[touching] == (slips > 0)).all()
 #
 # At which shear force does the outermost ring start to slide? Use ``press`` only.
 #
-# *Answer.* It slides when it would lose contact: reduce the total load until its load is 0, at
-# :math:`L_A`. Then :math:`Q / (f P) = 1 - L_A / P = 0.3517`.
+# *Answer.* It slides when it would lose contact: reduce the total load until the ring's load is 0,
+# at :math:`L_A`. Then :math:`Q / (f P) = 1 - L_A / P = 0.3517`.
 
 outermost = touching[-1]
 low, high = 0.0, pressed.approach

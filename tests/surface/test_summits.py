@@ -73,7 +73,7 @@ def test_a_map_turned_or_scaled_has_the_same_summits() -> None:
         ({"fit": 4}, "fit: found 4, expected an odd number of pixels, at least 3"),
         ({"fit": 3.0}, "fit: found 3.0"),
         ({"fit": True}, "fit: found True"),
-        ({"fit": 257}, "map: found 256 by 256 pixels, expected at least the 257 by 257 of a fit"),
+        ({"fit": 257}, "map: found 256 by 256 pixels, expected at least 257 by 257, as fit is 257"),
     ],
 )
 def test_wrong_questions(options: dict[str, object], message: str) -> None:
