@@ -69,8 +69,8 @@ Order = Literal["proved", "proved for one step", "fails"]
 #: Rates dn_i / dD0 below -RATE_ROUNDING are negative; SOLVED is the tolerance of the linear solve.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: For at most so many touching asperities the inverse costs no more than the levels themselves. If
-#: more touch, up to TOUCHING times MOST, weights of least total are sought for at most MOST.
+#: For at most INVERTED touching asperities the inverse costs no more than the levels. If more touch,
+#: up to TOUCHING times MOST, weights of least total (`sweeping`) are sought for at most MOST.
 INVERTED, MOST, TOUCHING = 800, 1000, 10
 
 #: Largest numbers of intermediate levels of the bisection: with an inverse, and without one.

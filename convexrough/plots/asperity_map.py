@@ -152,7 +152,7 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
 def draw_outline(
     axes: Axes, semi_axes: Sequence[float], style: Any = DASHED, colour: str = SMOOTH
 ) -> None:
-    """Draw a circle or ellipse about the origin; None draws nothing."""
+    """Draw a circle or ellipse about the origin, or nothing without semi-axes."""
     if semi_axes:
         width, height = (2.0 * axis for axis in semi_axes)
         axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=style, lw=0.9, ec=colour))
@@ -192,7 +192,7 @@ def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
 
 
 def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
-    """(n,) one radius for all chosen points, so small that discs stay apart; 0 for the others."""
+    """(n,) one radius for the chosen points, about 0.42 of their spacing; 0 for the others."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     size = float(np.ptp(points, axis=0).max()) or 1.0
