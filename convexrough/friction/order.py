@@ -69,7 +69,7 @@ Order = Literal["proved", "proved for one step", "fails"]
 #: Rates dn_i / dD0 below -RATE_ROUNDING are negative; SOLVED is the tolerance of the linear solve.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: For at most INVERTED touching asperities the inverse costs no more than the levels. If more touch,
+#: Up to INVERTED touching asperities the inverse costs no more than the levels. If more touch,
 #: up to TOUCHING times MOST, weights of least total (`sweeping`) are sought for at most MOST.
 INVERTED, MOST, TOUCHING = 800, 1000, 10
 
