@@ -67,12 +67,12 @@ class Stack:
 
     @cached_property
     def row_norm(self) -> Array:
-        """(m, 1) as of `NormalProblem`."""
+        """(m, 1) as in `NormalProblem`."""
         return self._each("row_norm")
 
     @cached_property
     def largest_entry(self) -> Array:
-        """(m, 1) as of `NormalProblem`."""
+        """(m, 1) as in `NormalProblem`."""
         return self._each("largest_entry")
 
     def _each(self, name: str) -> Array:
@@ -114,7 +114,7 @@ class Stack:
         return self.product(others)
 
     def convexity_at(self, stiffness: Array) -> Array:
-        """(m, 1) as of `NormalProblem`."""
+        """(m, 1) as in `NormalProblem`."""
         return np.asarray(largest(self.shells / stiffness) * (1 + SAFETY))
 
     def stiffness(self, loads: Array) -> Array:

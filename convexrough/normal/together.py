@@ -82,7 +82,7 @@ class Solved:
         return Ball.around(trial.mid, trial.radius + (spread + self.trial.missing.size)[:, 0])
 
     def row(self, k: int, problem: NormalProblem) -> Proved:
-        """The solution in row k, which is that of `problem`; its box has all rows."""
+        """The solution in row k, which is that of `problem`, in the box that all rows share."""
         it, of = self.trial, problem
         own = it.loads.at(k), it.product[k], it.local[k], it.gap[k]
         return Proved(
