@@ -113,7 +113,7 @@ class Contact(Cached, Table, Plottable):
     def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
         """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.
 
-        sheared : shear states of this contact to prove as well, with the losses of their cycles
+        sheared : shear states of this contact, which the proof includes with their cycle losses
 
         Raises InputError for scenes too large for exact arithmetic, and ProofError where nothing is
         proved.
@@ -284,7 +284,7 @@ def _contact(
             assert state is not None
             found = proved(problem, state)
             certificate = certificate_of(problem, loads, state, found)
-            known = (problem, state, found) if problem.influence.stored else None  # it is small
+            known = (problem, state, found) if problem.influence.stored else None  # a small problem
         else:
             certificate = certify_on(problem, loads)
     contact = Contact(
@@ -304,13 +304,13 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
-    # An unpickled copy has only the solver's name, and proves its loads again.
+    # Pickles keep neither; from a copy `levels_of` proves the loads again.
     contact.__dict__.update(_by=solver, _known=known)
     return contact
 
 
 def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solution:
-    """The checked solution; the last loads in a SolverError are in scene units and order."""
+    """The checked solution. SolverErrors keep the last loads, in the scene's units and order."""
     try:
         solution = solver.solve(problem, start)
     except SolverError as error:
@@ -352,16 +352,16 @@ def _covered(scene: Scene, radii: Array) -> int:
 
 
 def closest_changes(contact: Contact) -> Array:
-    """First-order load changes (n,) [force] if the geometry were "closest"; 0 if it is.
+    """First-order load changes (n,) [force] on a change to the "closest" geometry.
 
-    In that geometry an asperity of tip radius rho, at a distance r from the axis of a base of
-    radius R, meets the base at r R / (R + rho). Its drop is smaller by r^2 rho / (2 R (R + rho)),
-    and influences 1 / (pi E* r) are greater by about rho / R. At the same approach,
+    They are 0 if the scene has this geometry. There an asperity of tip radius rho, at a distance r
+    from the axis of a base of radius R, meets the base at r R / (R + rho). Its offset is greater by
+    r^2 rho / (2 R (R + rho)), and compliances 1 / (pi E* r) by about rho / R. At the same approach,
 
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 
-    where H = (2/3) indentation / P is the local part of the Hessian. A base with two radii
-    contributes both terms along x and along y.
+    where H = (2/3) indentation / P is the local part of the Hessian. With two radii
+    of the base, the terms of x and y are added.
     """
     scene, touching = contact.scene, np.flatnonzero(contact.loads)
     gains = np.zeros(len(scene))
@@ -385,7 +385,7 @@ def closest_changes(contact: Contact) -> Array:
 
 
 def _nearer(scene: Scene, touching: Indices, A: Influence, loads: Array) -> Array:
-    """The increase (n,) of the displacements when points move inwards by rho / R of positions."""
+    """The increase (n,) of the displacements when points move inwards by the fraction rho / R."""
     rho, radii = scene.asperities.tip_radii[touching], along(scene.sphere_radius)
     if radii[0] == radii[1]:
         return np.asarray(rho / radii[0] * A.apply(loads))

@@ -96,7 +96,7 @@ class Contacts(Table):
                 checks.bearable(f"{name}[{k}]", forces[k], float(f[k] * self.loads[k]))
         if (upper < lower).any():
             k = int(np.argmax(upper < lower))
-            expected = f"at least the minimum, {lower[k]:g}; by default that is its negative"
+            expected = f"at least the minimum, {lower[k]:g} (-maximum by default)"
             raise InputError(f"maximum[{k}]", found=upper[k], expected=expected)
         fields: dict[str, NDArray[Any]] = {name: np.zeros(m) for name in CYCLE}
         fields["order"] = np.full(m, "proved", dtype="<U19")

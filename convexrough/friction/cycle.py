@@ -2,10 +2,10 @@
 
 The load is P, the shear force Q, the coefficient of friction f, and T = Q / f. Let m+ and m- be the
 least P + T and the least P - T along the path. From the second cycle on, the memory curve passes
-through the point with L* = (m+ + m-) / 2 and T* = (m+ - m-) / 2. Below the load L* nothing slips
-again; above it the state repeats and does not depend on what came before. At constant load the loss
-is a multiple of the error of the trapezoid rule on the curve of approach against load, between L*
-and P (docs/theory/losses.md, where c_t is Mindlin's ratio).
+through the point with L* = (m+ + m-) / 2 and T* = (m+ - m-) / 2. At levels below L* nothing
+slips again; above it the state repeats and does not depend on the path before. At constant load the
+loss is a multiple of the error of the trapezoid rule on the curve of approach against load, between
+L* and P (docs/theory/losses.md).
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Cycle(Table, Plottable):
     contact          : the contact, pressed with the highest load of the path
     loads, forces    : (m,) [force] load P and shear force Q at the points of the path
     loss             : [force length] energy lost per cycle by both bodies, from the second cycle on
-    loss_first       : [force length] energy lost from the unloaded start to the end of cycle 1
+    loss_first       : [force length] energy lost from the unsheared start to the end of cycle 1
     loss_error, loss_first_error : proved bounds on |loss - solution|; infinite without a proof
     status           : "stuck" (no slip in the cycle), "partial" (a disc always sticks), "sliding"
         (the whole asperity slides once in each direction per cycle), "intermittent" (contact is
@@ -67,8 +67,8 @@ class Cycle(Table, Plottable):
     slips            : [length] gross slip in each direction per cycle; nan where intermittent
     stick_radii      : [length] radius of the disc that always sticks
     slip_errors, stick_radius_errors : [length] proved bounds on their errors
-    level, force_level : [force] the load L* and the shear force f T* of the head of this module
-    balance_defect   : relative difference from the loss by the trapezoid rule; nan if P varies
+    level, force_level : [force] the load L* and the shear force f T* below which nothing slips
+    balance_defect   : relative error of the loss by the trapezoid rule; nan if P varies
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) at the highest load P:
         Poisson's ratio nu, shear modulus G, contact radius a_H of the smooth sphere
     smooth_normalised : the same for the smooth sphere; nan if P varies. Both are nan if nothing is
@@ -76,10 +76,10 @@ class Cycle(Table, Plottable):
     displacement_amplitude : [length] half the range of the displacement at the points
     displacement_error : [length] proved bound on its error; infinite without a proof
     order            : "proved": no indentation decreases with the load between L* and P, so loss
-        and statuses are proved; "proved for one step": the loss is not proved; "fails": the
-        results are computed by general steps
+        and statuses are proved; "proved for one step": the loss is not proved; "fails": nothing
+        is proved, and Newton's method computes the results step by step
     presses          : number of normal problems that were solved
-    start            : [force] load of the pressed contact at the start; 0 without one
+    start            : [force] load at the start of the path, without shear; 0 if unloaded
 
     >>> cycle = cr.cycle(contact, maximum=0.25 * contact.load)
     >>> print(f"{cycle.loss_factor:.4f}", f"{cycle.secant_stiffness:.4g}")
@@ -154,7 +154,7 @@ class Cycle(Table, Plottable):
 
     @property
     def asperity_loss_errors(self) -> Array:
-        """(n,) [force length] bounds on |`asperity_losses` - solution|; infinite without order."""
+        """(n,) [force length] bounds on |`asperity_losses` - solution|; infinite unless proved."""
         return self._shares[2]
 
     @cached_property
@@ -209,7 +209,7 @@ class Cycle(Table, Plottable):
         >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.load:.4g}")
         5.907e-10 -9.964e-07
         """
-        from convexrough.gradients.losses import cycle_gradient  # a floor above: when asked
+        from convexrough.gradients.losses import cycle_gradient  # a higher layer
 
         return cycle_gradient(self, holding=holding)
 
@@ -236,7 +236,7 @@ class Loop(Table):
     forces        : (m,) [force] shear force
     displacements : (m,) [length] displacement of distant points, both bodies
     asperity_forces : (m, k) [force] shear force on each of these asperities
-    asperity_displacements : (m, k) [length] own deflection plus slip of each
+    asperity_displacements : (m, k) [length] local deflection plus slip of each
 
     >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
     >>> len(loop.forces), loop.asperity_forces.shape
@@ -308,7 +308,7 @@ def cycles(
     checks.exactly_one("maximum", maximum, "displacement", displacement)
     if displacement is not None:
         if minimum is not None:
-            expected = "none: the cycle of a displacement is symmetric"
+            expected = "no minimum: a cycle of given displacement is symmetric"
             raise InputError("minimum", found=minimum, expected=expected)
         amplitudes = checks.array("displacement", displacement, sign="not negative")
         heights = [levels.load - levels.displaced(x) for x in amplitudes]
@@ -322,7 +322,7 @@ def cycles(
         lower = checks.bearable("minimum", lower, limit)
     if (upper < lower).any():
         i = int(np.argmax(upper < lower))
-        expected = f"at least the minimum, {lower[i]:g}; by default that is its negative"
+        expected = f"at least the minimum, {lower[i]:g} (-maximum by default)"
         raise InputError(f"maximum[{i}]", found=upper[i], expected=expected)
     forces = list(zip(upper.tolist(), lower.tolist(), strict=True))
     LOGGER.info("pressing at the level of a cycle")
@@ -334,7 +334,7 @@ def _at_the_load(
     heights: Sequence[Sequence[Fraction]],
     forces: Sequence[tuple[float, float]],
 ) -> list[Cycle]:
-    """The cycles between two values of T each, at the load of the contact."""
+    """The cycles at the load of the contact, each between two values of T."""
     load = contact.cached(FrictionLevels).load
     paths = [[(load, T) for T in each] for each in heights]
     load_twice = np.full(2, float(load))
@@ -398,7 +398,7 @@ class _Closed(Walk):
 
     @cached_property
     def stuck(self) -> Point:
-        """The load L* and T* of the head of this module."""
+        """(L*, T*), through which all later memory curves pass."""
         plus, minus = min(p + t for p, t in self.points), min(p - t for p, t in self.points)
         return (plus + minus) / 2, (plus - minus) / 2
 
@@ -417,7 +417,7 @@ class _Closed(Walk):
 def _cycles(
     contact: Contact, start: MemoryCurve, asked: Sequence[tuple[list[Point], Array, Array]]
 ) -> list[Cycle]:
-    """The steady cycles of closed paths, given by points, loads and forces, from one state."""
+    """The steady cycles of closed paths, each given by points, loads and forces, from one start."""
     levels = contact.cached(FrictionLevels)
     closed = [_Closed.around(levels, start, points) for points, _, _ in asked]
     levels.prepare(load for each in closed for load in each.needed)
@@ -435,7 +435,7 @@ def _cycles(
 def _cycle(
     contact: Contact, loads: Array, forces: Array, closed: _Closed, spent: Ball, moved: Ball
 ) -> Cycle:
-    """The cycle with these losses (first and later cycles) and displacements at its points."""
+    """The cycle with the losses of the first and of a later cycle, and displacements at points."""
     levels, order = closed.levels, closed.order
     (first, loss), (first_error, error) = rounded(spent * levels.loss_unit)
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
@@ -473,7 +473,7 @@ def _cycle(
     doubtful = levels.to_scene(~(rest.touching | rest.open))
     slip_errors = np.where(slides | doubtful, slip_errors, 0.0) if statuses else slip_errors
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
-    whole, smooth = reference.energy_scale if reference else np.nan, np.nan  # W0, and e
+    whole, smooth = reference.energy_scale if reference else np.nan, np.nan  # W0, and loss / W0
     if constant and reference:
         smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
     found = Cycle(
@@ -543,7 +543,7 @@ def _loop(cycle: Cycle, way: Array, chosen: Indices) -> Loop:
     heights = [top, bottom, *(max(top - drop, bottom) for drop in drops)]
     heights += [min(bottom + drop, top) for drop in drops[1:]]
     heights[len(way) + 1], heights[-1] = bottom, top
-    LOGGER.info(f"{len(way) - 1} levels of a loop")
+    LOGGER.info(f"computing {len(way) - 1} levels of a loop")
     walk = Walk(levels, MemoryCurve.pressed(P), [(P, height) for height in heights], steps=1)
     if cycle.order == "fails" and levels.proved:
         found, some = walk.states(), chosen

@@ -6,8 +6,8 @@ n = D0 + d - A P, the rates y = dn / dD0 solve (I + A C) y = 1. Levels from P do
 have order if y_i >= 0 for every i that may touch at P, and all others stay open. The level at one
 load L1 proves this from L1 down to L0, as follows.
 
-The *support* are the asperities not proved open at L1. Let C~ >= C(L1) be diagonal and 0 off the
-support, W = C~^(1/2), and B = I + W A W >= mu I > 0 on it; so I + A C is regular for all
+The *support* is the set of asperities not proved open at L1. Let C~ >= C(L1) be diagonal and 0 off
+the support, W = C~^(1/2), B = I + W A W >= mu I > 0 on the support; so I + A C is regular for all
 0 <= C <= C~. Let y = (I + A C~)^-1 1 and G = (I + A C~)^-1 A. For C = C~ - D with
 0 <= D <= delta <= C~ we have (I + A C~) y(C) = 1 + A D y(C), that is
 
@@ -15,15 +15,15 @@ support, W = C~^(1/2), and B = I + W A W >= mu I > 0 on it; so I + A C is regula
 
 On the support G = W^-1 (I - B^-1) W^-1 and G_ii <= 0, as (B^-1)_ii >= 1 / B_ii = 1.
 
-(a) Start with m = 1; m <- min(m, y + G+ (delta m)) improves it, where G+ are the positive entries
+(a) Start with m = 1; m <- min(m, y + G+ (delta m)) improves m, where G+ are the positive entries
 of G off its diagonal. If on the support
 
     y_i > sum over k != i of max(-G_ik, 0) delta_k m_k,   or   m = 1 and 1 > sum over k of A_ik C~_k
 
 for all i, then 0 < y_i(C) <= m_i on the support for all C from C~ - delta to C~. In the first case
-follow y(C~ - s D) from s = 0, where it is positive. While it is not negative, y(C) = 1 - A C y(C)
+follow y(C~ - s D) from s = 0, where y is positive. While y is not negative, y(C) = 1 - A C y(C)
 is at most 1, hence at most m by (1), and at least a positive constant by (1), as 1 - G_ii D_i is
-bounded; by continuity it stays so. In the second case follow y(s C) from y(0) = 1 up to s = 1.
+bounded; by continuity y stays positive. In the second case follow y(s C) from y(0) = 1 up to s = 1.
 
 (b) Let delta_k >= C~_k - c_k(n_k(L1) - m_k (D0(L1) - D0(L0))), c_k(n) = dP_k / dn_k. Let each
 asperity outside the support have y_i >= -s_i by (1) with D_i = 0, and a gap
@@ -36,7 +36,7 @@ the box where it is the only one. For L0 = 0 all this holds down to every L > 0.
 If a range of loads is proved in parts, asperities that touch at P but are open at L1 need s_i <= 0.
 The second case of (a) needs no inverse. The first computes an approximation X of B^-1: with
 R = I - B X, column k of B^-1 - X is at most || R_k || / mu in the 2-norm. If too many asperities
-touch for an inverse, weights of near neighbours prove the same: `friction.sweeping`.
+touch for an inverse, `friction.sweeping` proves the same without one.
 """
 
 from __future__ import annotations
@@ -60,19 +60,20 @@ from convexrough.normal.stack import Stack
 from convexrough.normal.together import Rows
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
-#: "proved": for all loads between the levels in use. "proved for one step": no load P_i falls from
-#: a level in use to the next, and no rate is negative there or at some levels between; states are
-#: then solutions of one general step. "fails": some indentation falls, or nothing is proved.
+#: "proved": order holds at all loads between the levels used. "proved for one step": no load P_i
+#: is lower at a level used than at the next lower level, and no rate is negative at the tested
+#: levels; each state solves one general step (`general_step`). "fails": some indentation falls,
+#: or nothing is proved.
 Order = Literal["proved", "proved for one step", "fails"]
 
 #: Rates dn_i / dD0 below -RATE_ROUNDING are negative; SOLVED is the tolerance of the linear solve.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: For at most so many touching asperities the inverse costs no more than the levels themselves. If
-#: more touch, up to TOUCHING times MOST, weights of least total are sought for at most MOST.
+#: Up to INVERTED touching asperities the inverse costs no more than the levels. If more touch,
+#: up to TOUCHING times MOST, weights of least total (`sweeping`) are sought for at most MOST.
 INVERTED, MOST, TOUCHING = 800, 1000, 10
 
-#: Numbers of levels between that are tried: with an inverse, and without one.
+#: Largest numbers of intermediate levels of the bisection: with an inverse, and without one.
 BETWEEN, FEW_BETWEEN = 7, 1
 
 #: Number of improvements of m, and the least entry of C~ relative to the largest. Heuristics.
@@ -82,7 +83,7 @@ IMPROVEMENTS, LEAST = 4, 2.0**-30
 def order_between(
     at: Callable[[Fraction], Level], loads: Iterable[Fraction], most: int = MOST
 ) -> Order:
-    """What is proved of the order between the lowest and the highest of some loads, by bisection.
+    """The order that is proved between the lowest and the highest of some loads, by bisection.
 
     at   : returns the level at a load
     most : as in `swept_rates`
@@ -98,13 +99,13 @@ def order_between(
         return "fails"
     unproved = [(used[0], used[-1])]
     left = BETWEEN if rising.sum() <= INVERTED else FEW_BETWEEN
-    while len(unproved) <= left:  # each takes one level at least
+    while len(unproved) <= left:  # each interval needs at least one level
         left -= 1
         high, low = unproved.pop(0)
         middle = (high + low) / 2
         try:
             level = at(middle)
-        except SolverError:  # nothing is proved between
+        except SolverError:  # no intermediate level exists to test
             return "proved for one step"
         if _falls(at(high), level, rising) or _falls(level, at(low), rising):
             return "fails"
@@ -200,7 +201,7 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
 
 
 def _columns(rows: Stack, which: Indices) -> Array:
-    """(m, n, s) columns of the influence matrix of each row, at the indices (m, s)."""
+    """(m, n, s) columns, with indices (m, s), of the influence matrices of the m problems."""
     entries = np.empty((*which.shape, len(rows.coupled[0][1])))
     for some, problem in rows.coupled:
         entries[some] = problem.influence.matrix[which[some]]
@@ -216,7 +217,7 @@ def _delta(c: Array, depth: Array, steep: Array, fallen: Array) -> Array:
 class _Span(NamedTuple):
     """The quantities of the proof for one upper level.
 
-    support : indices;  c : (n,) C~, 0 off the support;  drop : D0(L1) - D0(L0);  mu : B >= mu I
+    support : its indices;  c : (n,) diagonal of C~;  drop : D0(L1) - D0(L0);  mu : B >= mu I
     """
 
     upper: Level
@@ -250,13 +251,13 @@ class _Span(NamedTuple):
         )
 
     def delta(self, m: Array) -> Array:
-        """(s,) delta on the support, for these m."""
+        """(s,) delta on the support, for bounds m (s,) on the rates there."""
         k = np.broadcast_to(self.upper.problem.exact.coefficients.upper, self.c.shape)
         depth, c = self.upper.indentation.lower[self.support], self.c[self.support]
         return _delta(c, depth, k[self.support] ** 1.5, m * self.drop)
 
     def inverse(self) -> _Inverse:
-        """The inverse for the support, as one row."""
+        """The inverse for the support, with m = 1."""
         influence = self.upper.problem.influence
         entries, c = influence.submatrix(self.support)[None], self.c[self.support][None]
         return _Inverse.of(
@@ -278,7 +279,7 @@ class _Span(NamedTuple):
 class _Inverse(NamedTuple):
     """Computed B^-1 and v = B^-1 w for m supports of s asperities, w the diagonal of W.
 
-    errors : (m, s) bounds on the errors of columns of B^-1 in the 2-norm;  error : (m, 1) of v
+    errors : (m, s) bounds on the 2-norm errors of columns of B^-1;  error : (m, 1) the same for v
     lost   : (m, 1) bound on the relative rounding of a product with A
     """
 
@@ -315,7 +316,7 @@ class _Inverse(NamedTuple):
     def bounds(self, delta: Callable[[Array], Array]) -> tuple[Array, Array]:
         """(m, s) lower bounds on the rates on the supports, and upper bounds m, by (1).
 
-        delta : as a function of m
+        delta : returns delta for bounds m
         """
         high = np.maximum(self.matrix + self.errors[:, None, :], 0.0)
         low = np.maximum(self.errors[:, None, :] - self.matrix, 0.0)
@@ -333,7 +334,7 @@ class _Inverse(NamedTuple):
     def elsewhere(self, entries: Array, change: Array) -> Array:
         """(m, e) lower bounds on the rates of open asperities outside the supports, by (1).
 
-        entries : (m, e, s) of A, from the supports to these;  change : (m, s) delta m
+        entries : (m, e, s) of A, from supports to open asperities;  change : (m, s) delta m
         """
         weighted, change = entries * self.w[:, None, :], change / np.where(self.w > 0, self.w, 1.0)
         sizes = np.linalg.norm(weighted, axis=2)
@@ -346,7 +347,7 @@ class _Inverse(NamedTuple):
 
 
 def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
-    """False if each asperity is proved open at the lower level, or is rising and proved to rise."""
+    """False if each asperity is proved open at `lower`, or rising and indented more at `upper`."""
     if upper.solution is None:
         return True
     if lower.solution is None:

@@ -21,8 +21,9 @@ from convexrough.numbers.balls import Ball
 def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
     """The result of `Cycle.gradient`.
 
-    At constant load W = 8 c_t f^2 [V(P) - V(L) - T (D0(P) + D0(L)) / 2] with L = P - T and
-    T = (max - min) / (2 f). Otherwise W is the loss of the second cycle on the path.
+    At constant load the loss is W = 8 c_t f^2 [V(P) - V(L) - T (D0(P) + D0(L)) / 2], L = P - T,
+    T = (max - min) / (2 f), with the complementary energy V and the approach D0
+    (docs/theory/losses.md). Otherwise W is the loss of the second cycle on the path.
     """
     contact, sheared = cycle.contact, Frictional.of(cycle)
     holding = control_held(contact, holding)
@@ -70,7 +71,7 @@ def path_gradient(
     )
     if losses is None and displacements is None:
         spent = np.eye(m)[-1]
-    later = np.cumsum(spent[::-1])[::-1]  # the loss of a step is part of all later losses
+    later = np.cumsum(spent[::-1])[::-1]  # every later cumulative loss includes a step's loss
     steps = [(k, Fraction(later[k]), Fraction(far[k])) for k in range(m)]
     along = Along.of(sheared.known, Fraction(path.start), steps, path.loads, path.forces)
     sliding = [load == abs(T) for load, T in zip(along.loads, along.heights, strict=True)]
@@ -81,9 +82,9 @@ def path_gradient(
 
 
 def _gradient(sheared: Frictional, along: Along, holding: Holding, *, paths: bool) -> Gradient:
-    """The gradient of a weighted sum along a path; with derivatives by loads if `paths` is true."""
+    """The gradient of a weighted sum along a path; with derivatives by loads if `paths`."""
     if paths and holding == "approach":
-        expected = '"load": the loads of all points are prescribed'
+        expected = '"load", because the loads of all points are prescribed'
         raise InputError("holding", found='"approach"', expected=expected)
     m, T = len(along.loads), along.heights
     parts, spent, far = along.parts({} if paths else sheared.top_moves)

@@ -39,7 +39,7 @@ Made = TypeVar("Made")
 #: Relative error, in roundoffs, of a computed scale / |i b1 + j b2| on a reduced basis b1, b2.
 ENTRY_ROUNDOFFS = 24
 
-#: Numbers that are processed together, chosen to fit into a processor's cache.
+#: Number of array elements in a block, chosen to fit into a processor's cache.
 CHUNK = 2**14
 
 #: Fill ratio of a box below which neighbours are found by a k-d tree. A heuristic: it affects speed
@@ -49,8 +49,8 @@ FILLED = 0.2
 #: Number of asperities above which rarely needed spectra are not cached.
 MOST_KEPT = 2**21
 
-#: Magnitude, rounded down, of the minimum -2 log 2 of the symbol of a row of points. The minimum of
-#: any lattice is at least as low. It affects speed only.
+#: 2 log 2, rounded down. The symbol of a row of points has the minimum -2 log 2, and that of every
+#: lattice is at least as low. The constant affects speed only.
 LEAST_NEGATIVE = 1.386
 
 
@@ -89,7 +89,7 @@ class LatticeCoupling:
         return Rounding(relative, self._unit * norm, self._unit * each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        """Computed in single precision; a bound on the rounding error is added."""
+        """Upper bounds in single precision, which include a bound on the rounding error."""
         kernel = self.box.kernel(power, np.float32)
         largest = float(strengths.max(initial=0.0)) or 1.0
         shares = (strengths / largest).astype(np.float32)
@@ -148,8 +148,8 @@ class LatticeInfluence(LatticeCoupling):
     """The compliance operator of asperities on a lattice.
 
     array       : (N, 2) [length] points, with errors of at most `point_error`
-    members     : (n,) indices into `array` of these asperities
-    layout      : the exact points, up to the factor by which `lattice` is smaller than its lattice
+    members     : (n,) indices of the operator's asperities in `array`
+    layout      : the exact points; its lattice is `lattice` up to the factor `lattice.shrink`
     lattice     : the lattice of the points
     """
 
@@ -165,7 +165,7 @@ class LatticeInfluence(LatticeCoupling):
 
     @classmethod
     def assemble(cls, points: Array, lattice: Lattice, scale: float) -> LatticeInfluence:
-        """The operator of points (n, 2) [length] on the lattice. Raises ValueError if not on it."""
+        """The operator of points (n, 2) [length]. ValueError if some are not on the lattice."""
         places = lattice.sites(points)
         if places is None:
             raise ValueError("points off the lattice")
@@ -182,7 +182,7 @@ class LatticeInfluence(LatticeCoupling):
         scale: float,
         point_error: float = 0.0,
     ) -> LatticeInfluence:
-        """The operator of some members of a layout whose sites are known."""
+        """The operator of the given members of a layout with known sites."""
         assert layout.sites is not None
         box, index = _boxed(lattice, layout.sites[members])
         spacing = lattice.spacing
@@ -259,7 +259,7 @@ class LatticeInfluence(LatticeCoupling):
         return even(nearest, len(self))
 
     def crowding(self, radii: Array) -> float:
-        """The largest over pairs of sites; nearer pairs come first, and most are skipped."""
+        """The largest crowding of a pair. Near pairs come first, so that most are skipped."""
         if not self._filled:
             return crowding(self.points, radii)
         field = np.full(self.box.shape, -np.inf)
@@ -277,7 +277,7 @@ class LatticeInfluence(LatticeCoupling):
             yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if the minimum of the symbol, less the effect of deviations, proves it."""
+        """True if proved by the minimum of the symbol less the effect of deviations from sites."""
         if radius * LEAST_NEGATIVE > self.spacing:
             return False
         least = self.lattice.cached(_least_symbol) - self._displaced
@@ -286,8 +286,8 @@ class LatticeInfluence(LatticeCoupling):
     def sums(self, loads: Pair, slices: int | None = None) -> Ball:
         """(n,) sum_j P_j / r_ij [force / length], with many more digits than `apply`.
 
-        slices : number of slices of loads and kernel, of 10 to 18 bits each: the method of
-            docs/theory/operators-lattice.md, "Slices"; default 3, and 4 on a large box
+        slices : number of slices of 10 to 18 bits into which loads and kernel are divided; default
+            3, and 4 on a large box (docs/theory/operators-lattice.md, "Slices")
         """
         slices = slices or SLICES + int(math.prod(self.box.shape) > LARGE)
         off_sites = self._off_sites(np.asarray(loads.high))

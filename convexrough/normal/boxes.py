@@ -1,7 +1,7 @@
 """Boxes of loads on which the energy is convex: docs/theory/certificate.md, "Which box".
 
-`tried` gives them one by one, the widest first. Of crowded contacts only those that touch can be in
-one: `box_of_touching`, docs/theory/crowded.md. The letters of those pages, and the names here:
+`tried` yields them, the widest first. Boxes of crowded contacts can only have touching asperities:
+`box_of_touching`, docs/theory/crowded.md. Symbols of these pages, and names in the code:
 
     B, h, mu              loads, stiffness, 1 - convexity_number
     theta, s_i            convexity_number, problem.shells (1 / (pi E* s_i))
@@ -28,38 +28,38 @@ from convexrough.roundoff import ROUNDOFF
 
 Scope = Literal["global", "local", "none"]
 
-#: Convexity number of the loads themselves from which shells fitted to them are tried. A heuristic:
-#: if it is wrong, work is wasted, or a bound is less sharp than it could be.
+#: Convexity number of the loads from which shells are fitted to them. A heuristic: a wrong value
+#: wastes work, or makes a bound less sharp.
 FIT_FROM = 0.8
 
 #: Margins mu that Cholesky's factorisation is tried with, the best first. Any will do, as the
 #: bounds are sharpened afterwards on a smaller box.
 MARGINS = (0.1, 1e-3)
 
-#: Part by which loads may grow at least in a box of those that touch, and part of the largest by
-#: which any may. Heuristic: any box proves what it says.
+#: Least growth of each load in a box of touching asperities, as a fraction of the load and of the
+#: largest load (the sum of both). Heuristics: the proof allows any box.
 LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
 
-#: Up to so many of those that touch, a Cholesky factor costs no more than shells that overlap.
+#: Touching asperities up to which a Cholesky factor costs no more than overlapping shells.
 FACTORISED = 1500
 
-#: Margins mu of such a box: its convexity may hang by a thread.
+#: Margins mu of a box of touching asperities, some small: it may be barely convex.
 CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 
 class Box(NamedTuple):
-    """A box of loads that holds the solution, and how convex the energy is on it; or in rows."""
+    """A box of loads that holds the solution, and the convexity of the energy on it; or rows."""
 
     scope: Scope
-    problem: NormalProblem | Stack  # with the shells that prove it
+    problem: NormalProblem | Stack  # with the shells that prove convexity
     loads: Array  # the upper corner
     stiffness: Array  # h there
     convexity_number: Any  # 1 - mu
-    faces: Array  # upper faces that the solution must be shown to stay below; else infinite
-    fixed_open: NDArray[np.bool_]  # taken to be open, which has to be shown of the solution
+    faces: Array  # upper bounds that the solution is yet to be proved below; or infinite
+    fixed_open: NDArray[np.bool_]  # assumed open, which is yet to be proved
 
     def at(self, rows: Indices) -> Box:
-        """Some of the rows."""
+        """The boxes of some rows."""
         return self._replace(
             loads=self.loads[rows],
             stiffness=self.stiffness[rows],
@@ -70,12 +70,12 @@ class Box(NamedTuple):
 
     @property
     def closed(self) -> Box:
-        """The same box for another load or approach, of which it may not hold every solution."""
+        """The same box for another load or approach, where it may not hold every solution."""
         return self._replace(faces=np.where(self.loads > 0, self.loads, np.inf))
 
 
 def tried(problem: NormalProblem, loads: Array, displacement: Array) -> Iterator[Box]:
-    """Global from the a priori bound by shells, then by Cholesky; else local."""
+    """Boxes: a global one, convex by shells or by Cholesky, or else a local one."""
     approach_bound = lowest_approach_bound(problem, loads, displacement)
     corner = np.maximum(problem.bounds(approach_bound), loads)  # the box must hold both states
     h = problem.stiffness(corner)
@@ -110,11 +110,11 @@ def lowest_approach_bound(problem: NormalProblem, loads: Array, displacement: Ar
 def box_of_touching(
     problem: NormalProblem, loads: Array, touching: NDArray[np.bool_], room: Array
 ) -> Box | None:
-    """Local, all others fixed open: by shells fitted to those that touch, or by `crowded_margin`.
+    """A local box of the touching asperities, with all others fixed open; None if not convex.
 
-    docs/theory/crowded.md
+    Fitted shells or `crowded_margin` prove convexity: docs/theory/crowded.md.
 
-    room : (n,) by which loads must be able to grow in the box
+    room : (n,) least growth of the loads in the box
     """
     which = np.flatnonzero(touching)
     influence = problem.influence.restricted(which)
@@ -131,7 +131,7 @@ def box_of_touching(
 
 
 def crowded_margin(influence: Influence, stiffness: Array) -> float:
-    """The largest mu by Cholesky where a matrix is cheap, else by shells that overlap."""
+    """The largest proved mu: by Cholesky where a matrix is cheap, else by overlapping shells."""
     if not influence.stored and len(influence) > FACTORISED:
         return overlapping_margin(influence, influence.scale / stiffness, CROWDED_MARGINS)
     scaled, error = _scaled(influence, stiffness), influence.entry_error + 8 * ROUNDOFF
@@ -146,7 +146,7 @@ def _scaled(influence: Influence, stiffness: Array) -> Array:
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
-    """Asperities in a pair that can be no least of the energy, or else in one whose shells meet."""
+    """Asperities in pairs that no energy minimum can have, else in pairs whose shells meet."""
     which = np.flatnonzero(loads)
     if len(which) < 2:
         return which
@@ -159,7 +159,7 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
 
 
 def _shells(influence: Influence, stiffness: Array, which: Indices) -> Array:
-    """Of those of one box, 0 elsewhere."""
+    """(n,) shells fitted to the asperities `which`, 0 elsewhere."""
     shells = np.zeros(len(stiffness))
     radii = (np.pi / 2.0) * influence.scale / stiffness[which]
     shells[which] = fitted_shells(influence, radii, FITTED)
@@ -169,7 +169,7 @@ def _shells(influence: Influence, stiffness: Array, which: Indices) -> Array:
 def convex_margin(influence: Influence, stiffness: Array, margins: Sequence[float]) -> float:
     """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved, else 0: "Which box", 2.
 
-    Only where there is a matrix: a factorisation costs as the cube of its size.
+    0 without a stored matrix: the cost of a factorisation grows as the cube of its size.
     """
     if not influence.stored:
         return 0.0

@@ -38,7 +38,7 @@ STATUSES = np.array(["undecided", "contact", "open"])
 class Certificate(Table):
     """What is proved about given loads. Arrays are (n,), in the order of the given loads.
 
-    The solution is the one that `scope` names.
+    `scope` says in which set the solution is unique.
 
     scope : "global": the scene has exactly one solution; "local": it has exactly one solution with
         contact radii near these (`meaning` describes the others that are possible); "none":
@@ -55,17 +55,17 @@ class Certificate(Table):
     approach_error : [length] bound on |approach - solution|; 0 where prescribed
     duality_gap : [force length] upper bound on the excess energy of these loads over the minimum:
         0 up to rounding at a solution, infinite where nothing is proved. If the total load is
-        prescribed, it is the gap of the loads scaled to that total
+        prescribed, the loads are first scaled to it
 
-    fixed_open : number of asperities fixed open for the proof, and then proved to be open; 0 unless
-        contacts are crowded. The solution is then the only one near it with these open
+    fixed_open : number of asperities that the proof first assumes and then proves to be open; 0
+        unless contacts are crowded. No other solution nearby has the same asperities open
     other_solutions_crowding : every other solution has a larger crowding than this; infinite where
         there is no other solution, 0 where nothing is known. The crowding is the largest sum of
         two contact radii over the distance of their asperities
     other_solutions_cover : True if, in every other solution, a contact disc covers the summit of
         its nearest neighbour
     in_the_way : (m,) asperities that prevent a proof; empty where there is one
-    obstacle : why they prevent it, as a sentence
+    obstacle : a sentence that says why these asperities prevent a proof
 
     >>> judged = contact.certificate
     >>> judged.scope, judged.holds, judged.load_error < 1e-12 * contact.load
@@ -100,8 +100,8 @@ class Certificate(Table):
         if self.scope == "global":
             return "the only solution"
         if self.scope == "none":
-            why = f"; {self.obstacle}" if self.obstacle else ""
-            return f"nothing is proved, {len(self.in_the_way):,} asperities in the way{why}"
+            why = f": {self.obstacle}" if self.obstacle else ""
+            return f"nothing is proved because of {len(self.in_the_way):,} asperities{why}"
         others = []
         if self.other_solutions_cover:
             others.append("a disc that covers its nearest neighbour's summit")
@@ -163,7 +163,7 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     """The certificate of loads (n,) [force] of the whole scene, for an assembled problem."""
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
-        expected = "a load on some asperity that could touch, as the total is prescribed"
+        expected = "a positive load on an asperity that can touch: the total is prescribed"
         raise InputError("loads", found="none", expected=expected)
     pair, missing = completed(problem, Pair.exact(given))
     product = problem.product(pair) if refines(problem) else problem.plain_product(pair)
@@ -200,7 +200,7 @@ def certificate_of(
         moved = (Ball.exact(start.loads) - found.loads).size
         errors = (found.indentation - known.value).size
         shift = float((found.approach - start.approach.value).size)
-    # Asperities that cannot touch carry nothing; loads too small for own units are lost there.
+    # Asperities that cannot touch have no load. Tiny loads underflow in the problem's units.
     load_errors = loads.copy()
     load_errors[problem.candidates] = off * force + np.abs(given - given / force * force)
     errors = problem.to_scene(errors)
@@ -235,10 +235,10 @@ def certificate_of(
 
 
 def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Array) -> float:
-    """Bound on the excess energy: Phi(P) - Phi(P*) <= e'|P - P*| where Phi is convex between.
+    """Bound on the excess energy: Phi(P) - Phi(P*) <= e'|P - P*| if Phi is convex from P to P*.
 
     P are the loads, P* the solution, and e the residuals of the contact law at P. Loads q on
-    asperities that are fixed open add at most e'q; without them the residuals differ by A q.
+    asperities fixed open add at most e'q; removing q changes the residuals by A q.
     """
     box = found.box
     excess = np.where(box.fixed_open & (start.loads.high == 0), 0.0, start.excess)
@@ -247,7 +247,7 @@ def _energy_error(problem: NormalProblem, start: Trial, found: Proved, moved: Ar
         displacement = problem.influence.apply(q)
         excess += displacement + problem.influence.rounding(q).of(displacement)
     most = np.where(box.fixed_open, 0.0, np.maximum(box.loads, start.loads.high * (1 + SAFETY)))
-    # A >= -theta H, and where loads are larger H is at least this part of what it is in the box.
+    # A >= -theta H in the box; for larger loads H is at least this fraction of H in the box.
     part = np.cbrt(np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0))
     convex = part.min(initial=1.0) > box.convexity_number * (1 + SAFETY)
     if not (convex or box.problem.convexity_at(problem.stiffness(most)) < 1):
@@ -260,9 +260,9 @@ class _Screened(NamedTuple):
     """The asperities that cannot touch, and their negative gaps."""
 
     which: Indices  # in the scene
-    coupling: Coupling | None  # from the asperities that can touch; None if there are no others
+    coupling: Coupling | None  # from asperities that can touch; None if all can
     indentation: Array  # prescribed approach less displacement
-    rounding: Array  # bound on its error
+    rounding: Array  # bounds on errors of the indentation
 
 
 def _screened(problem: NormalProblem, start: Trial) -> _Screened:
@@ -283,7 +283,7 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on the energy due to given loads on asperities that cannot touch, in own units.
+    """Bound on the energy, in the problem's units, of loads on asperities that cannot touch.
 
     Loads s on these add  sum (3/5) k s^(5/3) + g's + s'A s / 2,  with their gaps g >= 0, the local
     coefficients k and the compliance operator A.
@@ -293,7 +293,7 @@ def _screened_energy(
     which = np.flatnonzero(screened)
     if len(which) == 0 or problem.load is not None:
         return 0.0
-    # Numbers that own units would lose are counted as the least that they hold.
+    # Loads that underflow in the problem's units count as the smallest positive number.
     s = np.maximum(loads[which] / problem.units.force, checks.SMALLEST)
     coefficients = hertz.local_coefficient(
         problem.scene.material.contact_modulus, problem.scene.relative_radii[which]

@@ -16,7 +16,7 @@ from convexrough.roundoff import SAFETY
 #: Largest relative error of a total, where `within` is not given.
 TOTAL_WITHIN = 1e-6
 
-#: A suspect has at least this part of the largest error.
+#: Smallest error of a suspect, as a fraction of the largest error.
 SUSPICIOUS = 1e-3
 
 
@@ -26,10 +26,10 @@ class Claim(ABC):
     one, many : names of a force and of the forces;  proved : name of the claimed set
     kinds     : ways in which a status can be wrong: attributes with indices, and their descriptions
     claims    : the statuses that are claimed where `claimed` is True and where it is False
-    within : largest error allowed, as a fraction of the largest force; None: as accurate as needed
-        to prove every status from the forces alone
+    within : largest error allowed, as a fraction of the largest force; None: errors must only
+        be small enough to prove every status from the forces alone
     total_prescribed : [force] None where it is not prescribed
-    certificate : of the forces as given
+    certificate : the certificate of the given forces
     solution    : a solution with its own statuses; None where it is not needed or not found
     """
 
@@ -48,12 +48,12 @@ class Claim(ABC):
     @property
     @abstractmethod
     def values(self) -> Array:
-        """(n,) [force] as given."""
+        """(n,) [force] the given forces."""
 
     @property
     @abstractmethod
     def errors_alone(self) -> Array:
-        """(n,) [force] what the forces alone prove of |force - solution|; infinite for nothing."""
+        """(n,) [force] bounds on |force - solution| by the forces alone, or infinite."""
 
     @property
     def wrong(self) -> dict[str, Indices]:
@@ -66,7 +66,7 @@ class Claim(ABC):
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
-        """(n,) proved from the forces or else from the solution; "undecided" without one."""
+        """(n,) statuses proved from the forces, else from the solution, else "undecided"."""
         status: NDArray[np.str_] = self.certificate.status
         if self.solution is None:
             return status
@@ -74,7 +74,7 @@ class Claim(ABC):
 
     @property
     def decided_alone(self) -> bool:
-        """All statuses are proved from the given forces alone."""
+        """True if all statuses are proved from the given forces alone."""
         return bool(self.certificate.holds)
 
     @cached_property
@@ -109,12 +109,12 @@ class Claim(ABC):
 
     @property
     def error(self) -> float:
-        """The largest of `errors`, in parts of the largest force."""
+        """The largest of `errors`, as a fraction of the largest force."""
         return float(self.errors.max()) / self.largest if self.largest > 0 else np.inf
 
     @cached_property
     def off(self) -> Indices:
-        """(m,) not proved to be `within`, furthest first; none where that is None."""
+        """(m,) asperities with an error above `within`, largest first; empty without `within`."""
         order = np.argsort(-self.errors, kind="stable")
         limit = np.inf if self.within is None else self.within * self.largest
         return frozen(order[~(self.errors[order] <= limit)])
@@ -131,7 +131,7 @@ class Claim(ABC):
 
     @property
     def total_holds(self) -> bool:
-        """The forces add up to a prescribed total, within `within` of it or else 1e-6."""
+        """True if the total is as prescribed, to a relative error of `within` (default 1e-6)."""
         if self.total_prescribed is None:
             return True
         missing = abs(self.total_given - self.total_prescribed)
@@ -139,11 +139,10 @@ class Claim(ABC):
 
     @cached_property
     def suspects(self) -> Indices:
-        """(m,) wrongly claimed, or whose forces are far from the solution; likeliest first.
+        """(m,) asperities claimed wrongly or with forces far from the solution, likeliest first.
 
-        A single force that is missing, spurious or wrong is the first; two that were exchanged are
-        the first two. Forces that do not add up to the solution's total are also tried in the unit
-        in which they do.
+        A single missing, spurious or wrong force comes first; two exchanged forces are the first
+        two. Forces with another total than the solution are also compared after scaling to it.
         """
         wrong, nearby = self.wrongly_claimed, self.nearby()
         if nearby is None or (self.near_enough and not len(wrong)):

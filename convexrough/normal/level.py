@@ -132,7 +132,7 @@ class Level:
 
     @cached_property
     def energy(self) -> Ball:
-        """V(L)."""
+        """The complementary energy V(L)."""
         return energies([self])[0]
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What a total load implies before the problem is solved: shifts, the approach, the reach."""
+"""Bounds by a total load, before the problem is solved, on the approach and the contact radius."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: A scene reaches so many times the smooth contact radius at least, and to find out how far it has
-#: to reach, the approach is bounded on one so many times wider.
+#: Smallest radius of a scene over the smooth contact radius, and the factor by which the scene is
+#: wider on which the approach is bounded to find the radius.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
-#: A shift that changes by less than this part of itself has come to all its digits: a heuristic,
-#: as it is solved for again where a load is judged.
+#: Relative change below which a shift counts as converged. A heuristic: certificates do not rely on
+#: the shift.
 STRAIGHT = 1e-11
 
 
@@ -37,7 +37,7 @@ def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, softness = indentation - highest, 1.0 / coefficients
-    most = hertz.indentation(load, largest(coefficients))  # one that carries it all
+    most = hertz.indentation(load, largest(coefficients))  # if one asperity bears the whole load
     shift = np.minimum(most, np.maximum(highest, 1e-9 * most))
     for steps in range(200):
         ratio = np.maximum(indentation + shift, 0.0) * softness
@@ -77,7 +77,7 @@ def approach_bound(
     cubes = (q * coefficients) ** 3
     highest, wanted = largest(c), 27.0 * load / 8.0
     if q.ndim == 1:
-        active, cubes = c[cubes > 0], cubes[cubes > 0]  # others count for nothing
+        active, cubes = c[cubes > 0], cubes[cubes > 0]  # others do not matter
     else:
         active = np.where(cubes > 0, c, -np.inf)
     # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L: Newton's method for
@@ -89,7 +89,7 @@ def approach_bound(
         parts = cubes * (nearer * nearer * nearer)
         excess, slope = summed(parts), summed(parts * nearer)
         step = (np.cbrt(excess / wanted) - 1.0) * excess / slope
-        height = height + np.fmax(step, 0.0)  # where nothing is left in float64, it is high enough
+        height = height + np.fmax(step, 0.0)  # nan in float64: high enough
         if not (step > 1e-3 * (height - least)).any():
             break  # any height gives a bound; this one is close to the best
     height = np.maximum(height, highest)
@@ -131,7 +131,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:
-    """(n,) [force] of this total, on asperities that ride on the surface under a smooth sphere."""
+    """(n,) [force] loads of this total, if the surface moves as under a smooth sphere."""
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
@@ -139,9 +139,9 @@ def smooth_loads(scene: Scene, load: float) -> Array:
 
 
 def smooth_displacement(scene: Scene, distances: Array, load: float) -> Array:
-    """[length] of the surface under a smooth sphere of this load, at distances from the axis.
+    """[length] surface displacement under a loaded smooth sphere, at distances from the axis.
 
-    A guess for other bases: the sphere of their mean curvature; 0 where flat, as all sinks alike.
+    Other bases are replaced by a sphere of mean curvature; flat bases have displacement 0.
     """
     if not scene.curved:
         return np.zeros_like(distances)
@@ -155,14 +155,14 @@ def all_that_could_touch(
     farthest: Callable[[float], float],
     load: float,
 ) -> tuple[Scene, float]:
-    """The scene as far as any asperity could touch under a load, and a bound on the approach there.
+    """The scene with all asperities that could touch under a load, and a bound on its approach.
 
-    scene_within : the scene as far as a distance from the axis [length]; further out it only has
-        more asperities
-    farthest     : how far from the axis any could touch at an approach [length]
+    scene_within : returns the scene within a distance from the axis [length]; a greater distance
+        only adds asperities
+    farthest     : returns the largest distance of asperities that can touch at an approach [length]
 
-    The bound of a wide scene also holds for the same scene cut back, as long as no trial load is
-    cut off: its height is at least the displacement at every asperity, so at those that are left.
+    The bound of a wide scene also holds for a smaller one that keeps all trial loads: lambda is at
+    least the displacement c_i at every asperity.
     """
     axis = scene_within(0.0)
     modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))

@@ -1,8 +1,8 @@
-"""What any other solution would have to be like: docs/theory/crowded.md, "Other solutions".
+"""Bounds that every other solution meets: docs/theory/crowded.md, "Other solutions".
 
 Two solutions have contact radii a and b. With t_i = (2 / pi) m_i, m = (2/3) (a^2 + a b + b^2) /
-(a + b), they are one and the same if t_i + t_j <= r_ij for all pairs, or where the diagonal
-1 / (pi E* t_i) is known to make A semidefinite otherwise.
+(a + b), they are equal if t_i + t_j <= r_ij for all pairs, or if another proof shows that A plus
+the diagonal 1 / (pi E* t_i) is semidefinite.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ ROOMY = 0.52
 
 
 class OtherSolutions(NamedTuple):
-    """Other solutions than the one found."""
+    """Properties of all solutions other than the one found."""
 
     possible: bool
-    crowding: float  # theirs is above this; infinite if there are none
-    cover: bool  # each has a disc that covers its nearest neighbour's summit
+    crowding: float  # their crowding is above this; infinite if none is possible
+    cover: bool  # each of them has a disc over its nearest neighbour's summit
 
     @classmethod
     def of(cls, problem: NormalProblem, near: Array, approach_bound: float) -> OtherSolutions:
-        """For loads (n,) of at most `near` and approaches of at most `approach_bound`."""
+        """The bounds for loads (n,) up to `near` and approaches up to `approach_bound`."""
         A = problem.influence
         perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
         a, most = (_radii(problem, loads) for loads in (near, problem.bounds(approach_bound)))
@@ -45,13 +45,13 @@ NO_OTHERS, UNKNOWN = OtherSolutions(False, np.inf, True), OtherSolutions(True, 0
 
 
 def _radii(problem: NormalProblem, loads: Array) -> Array:
-    """(n,) [length] contact radii of loads, or a little more."""
+    """(n,) [length] contact radii under loads, rounded up."""
     radii: Array = np.pi / 2.0 * problem.influence.scale / problem.stiffness(loads) * (1 + SAFETY)
     return radii
 
 
 def _mean(a: Array, b: Array) -> Array:
-    """m, such that scale / t is the mean stiffness between contact radii a and b; grows in both."""
+    """m, such that scale / t is the mean stiffness from contact radius a to b; grows with both."""
     total = a + b
     product = np.divide(a * b, total, out=np.zeros_like(total), where=total > 0)
     return np.asarray(2.0 / 3.0 * (total - product) * (1 + SAFETY))

@@ -21,20 +21,20 @@ from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
-#: Radii of shells over t that are tried, the cheapest first; wider for a pair that is nearly as
-#: close as can be, and beside wider ones. Heuristics: any radii prove what they say.
+#: Radii of shells over t, the cheapest first; factor for nearly singular pairs; most by which a
+#: neighbour's radius is smaller, over its distance. Heuristics: the proof allows any radii.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
-#: Neighbours looked at for each point before any others.
+#: Number of nearest neighbours that set the radii of shells.
 NEAREST = 8
 
-#: No more pairs of shells are looked at than so many for each asperity: what memory holds.
+#: Largest number of pairs of shells for each asperity, limited by memory.
 MOST_PAIRS = 200
 
-#: Shells wider than this many times the middle one are looked at one by one: for speed only.
+#: Shells wider than this many times the median are searched one by one: for speed only.
 WIDE = 2.0
 
-#: Nor at more asperities than this: elimination takes 5 s at 100,000, several times if it succeeds.
+#: Largest number of asperities: an elimination takes 5 s at 100,000, and a proof needs several.
 MOST_ELIMINATED = 200_000
 
 
@@ -74,8 +74,8 @@ class Nearest(NamedTuple):
 
     distances: Array  # (n, m)
     which: Indices  # (n, m)
-    closest: Array  # (n,) the largest (t_i t_j)^(1/2) / r_ij with any of them
-    meeting: NDArray[np.bool_]  # (n,) whether t_i + t_j > r_ij with one
+    closest: Array  # (n,) the largest (t_i t_j)^(1/2) / r_ij with a neighbour
+    meeting: NDArray[np.bool_]  # (n,) true if t_i + t_j > r_ij with a neighbour
 
     @classmethod
     def of(cls, points: Array, lengths: Array) -> Nearest:
@@ -100,11 +100,11 @@ class Nearest(NamedTuple):
 
 def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:
     """All pairs whose shells overlap; None if they are too many."""
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+    from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     tree = cKDTree(points)
     usual = WIDE * float(np.median(radii)) if len(radii) else 0.0
-    wide = np.flatnonzero(radii > usual)  # few: looked at one by one
+    wide = np.flatnonzero(radii > usual)  # few: searched one by one
     reach = radii[wide] + float(radii.max(initial=0.0))
     counts = tree.query_ball_point(points[wide], reach, return_length=True)
     many = tree.count_neighbors(tree, 2.0 * usual) + int(np.sum(counts))

@@ -45,14 +45,14 @@ from convexrough.sphere import hertz
 #: box", 3).
 FITTED = 0.9
 
-#: Candidates looked at together: what a cache holds.
+#: Number of candidates in a block, chosen to fit into a cache.
 CHUNK = 2**14
 
 
-#: A change of loads, over the largest, up to which float64 gives a matrix times it to 29 digits.
+#: Change of loads relative to the largest, up to which its float64 product with A gives 29 digits.
 NEARBY = 1e-13
 
-#: To 66 digits.
+#: 1 / pi to 66 digits.
 INVERSE_PI = Fraction("0.318309886183790671537767526745028724068919291480912897495334688118")
 
 
@@ -133,7 +133,7 @@ class NormalProblem:
         return self._like(replace(self, approach=prescribed, load=None, exact_approach=approach))
 
     def _like(self, other: NormalProblem) -> NormalProblem:
-        """Another problem of the same asperities, with what depends on these alone."""
+        """Another problem of the same asperities, with the data that depend only on these."""
         for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
         return other
@@ -156,7 +156,7 @@ class NormalProblem:
         return self.exact.offsets + self.depth
 
     def product(self, loads: Pair) -> Ball:
-        """(n,) A P to some thirty digits."""
+        """(n,) A P to about thirty digits."""
         return self.influence.sums(loads) * self.exact.scale
 
     def plain_product(self, loads: Pair) -> Ball:
@@ -268,7 +268,7 @@ class NormalProblem:
         )
 
     def widened(self, which: Indices) -> NormalProblem:
-        """The problem of these asperities of the scene, among which are all candidates."""
+        """The problem of these asperities of the scene, which include all candidates."""
         scene, units = self.scene, self.units
         coefficients = hertz.local_coefficient(
             scene.material.contact_modulus, scene.relative_radii[which]
@@ -285,7 +285,7 @@ class NormalProblem:
         )
 
     def fitted_to(self, loads: Array) -> NormalProblem:
-        """The same problem, with shells as large as neighbours of these loads allow."""
+        """The same problem, with the largest shells that neighbours with these loads allow."""
         with np.errstate(divide="ignore"):
             radii = (np.pi / 2.0) * self.influence.scale / self.stiffness(loads)
         shells = fitted_shells(self.influence, radii, FITTED)
@@ -325,7 +325,7 @@ class NormalProblem:
         return h
 
     def smooth_indentation(self) -> Array:
-        """A start: the heights, riding on the surface that a smooth sphere would make."""
+        """Initial indentations: the offsets less the surface displacement under a smooth sphere."""
         scene, load = self.scene, self.load
         if load is None:
             load = alone = float(self.bounds(self.approach_bound).sum())
@@ -347,7 +347,7 @@ class NormalProblem:
         return float(self.convexity_at(self.stiffness(loads)))
 
     def convexity_at(self, stiffness: Array) -> Any:
-        """`convexity_number` up to loads of which the stiffness is known; (m, 1) of rows."""
+        """`convexity_number` up to the loads with this stiffness; (m, 1) for rows."""
         return largest(self.shells / stiffness) * (1 + SAFETY)
 
     def twofold_offsets(self) -> Pair:
@@ -393,18 +393,18 @@ def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple
 
 
 def _exact_coefficients(tips: Array, *constants: Any) -> Ball:
-    """k of tip radii (n,)."""
+    """The local coefficients k of tip radii (n,)."""
     curvature, cubed, _ = _constants(*constants)
     return ((1.0 / Ball.exact(tips) + curvature) * cubed).cbrt()
 
 
 @lru_cache
 def _even_coefficient(tip: float, *constants: Any) -> Ball:
-    """(1,) the same where all tips are equal, as often they are from scene to scene."""
+    """(1,) the local coefficient of one tip radius, cached because scenes often share it."""
     return _exact_coefficients(np.array([tip]), *constants)
 
 
 def _middle(values: Array) -> float:
-    """The median of about a thousand of these, spread evenly: any number of their size will do."""
+    """The median of about a thousand evenly spaced values, which need not be accurate."""
     some = np.sort(values[:: max(1, len(values) // 1000)])
     return float(some[len(some) // 2])

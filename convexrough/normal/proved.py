@@ -1,10 +1,10 @@
 """The proof that a solution exists near trial loads, and bounds on its distance.
 
 The steps: choose a box of loads on which the energy is convex (`boxes`); apply the theorem of
-`convex.theorem` on it; apply the theorem again on the smaller box that the result proves to hold
-the solution; bound the approach and the indentations; and bound the loads again through the
-indentations. Symbols are those of docs/theory/certificate.md: loads P, approach D0, compliance
-operator A, local Hessian H; a star marks the solution.
+`convex.theorem` on it; apply the theorem again on a smaller box, which the first result
+proves to hold the solution; bound the approach and the indentations; and bound the loads again
+through the indentations. Symbols are those of docs/theory/certificate.md: loads P, approach D0,
+compliance operator A, local Hessian H; a star marks the solution.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ def proved(
 ) -> Proved | Obstacle:
     """The solution in the first box that is proved to hold it, or the obstacle to a proof.
 
-    boxes : boxes of all candidates to try first; default `boxes.tried`. If none of them is proved
-        to hold the solution, boxes with only the touching candidates are tried, others fixed open
+    boxes : boxes of all candidates, which come first; default `boxes.tried`. If none is proved to
+        hold the solution, boxes follow in which only the touching candidates are not fixed open
     """
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
@@ -152,7 +152,7 @@ def errors_in(problem: Problem, box: Box, state: Trial) -> Array:
 
 
 def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Known:
-    """The solution, by the theorem on the small box given by bounds on the errors of loads."""
+    """The solution by the theorem on a smaller box: the trial loads plus bounds on their errors."""
     missing = _Missing.of(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + missing.residual)
     near = np.minimum(box.loads, (state.loads.high + at_first) * (1 + SAFETY))
@@ -172,7 +172,7 @@ def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Kn
 
 
 class Known(NamedTuple):
-    """Fields of `Proved`."""
+    """The computed fields of `Proved`."""
 
     distance: Any
     stiffness: Array
@@ -182,12 +182,12 @@ class Known(NamedTuple):
 
 
 class _Missing(NamedTuple):
-    """The part of the total load that the trial loads P lack: (1 + t) P have it, with |t| <= part.
+    """The part of the total load that the trial loads P lack: (1 + t) P have this total.
 
-    The factor 1 + t adds (2/3) t k P^(2/3) + t A P to the sides of the contact law. All of that but
-    a constant enters the residuals, because the approach is free.
+    The factor 1 + t adds (2/3) t k P^(2/3) + t A P to D0 + d in the contact law. The
+    approach takes up a constant part, and the rest enters the residuals.
 
-    loads, coupled : (n,) bounds on |t| P and |t| A P;  residual : (n,) on what enters the residuals
+    loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals
     """
 
     loads: Array
@@ -213,7 +213,7 @@ class _Missing(NamedTuple):
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
-    """Loads, with poorly known ones also computed as (n / k)^(3/2) of their indentations n."""
+    """The loads; poorly known loads are replaced by (n / k)^(3/2), n the indentation, if better."""
     which = np.nonzero(loads.radius > POOR * loads.mid.high)
     if len(which[0]) == 0:
         return loads
@@ -231,11 +231,11 @@ def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
 
 
 def _approach_error(problem: Problem, state: Trial, errors: Array, moved: Any) -> Any:
-    """|D0 - D0*|, as D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch."""
+    """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch."""
     if problem.load is None:
         return state.approach.radius
     least = state.loads.high - errors
-    # k P^(2/3) is concave: from least to P it rises by at most its slope at the former
+    # k P^(2/3) is concave: its slope at the least load bounds its slope up to P
     slope = problem.stiffness(np.where(least > 0, least, 1.0))
     each = np.where(least > 0, state.gap.size + slope * errors + moved, np.inf)
     closest = each.min(axis=-1, initial=np.inf, keepdims=each.ndim > 1)

@@ -27,13 +27,13 @@ from convexrough.numbers.kernels import residual
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair, two_sum
 from convexrough.sphere import hertz
 
-#: Corrections at most: each squares the error, or takes what conjugate gradients leave of it.
+#: Largest number of corrections: each squares the error, or reduces it by conjugate gradients.
 CORRECTIONS = 12
 
-#: Corrections leave this part of the rounding of the residual: less would not sharpen the proof.
+#: Fraction of the residual's rounding that corrections may leave: less would not sharpen the proof.
 ENOUGH = 0.1
 
-#: Up to so many candidates coupled by a matrix, refinement costs no more than the press.
+#: Number of candidates up to which refinement with a matrix costs no more than the solution.
 FEW = 700
 
 #: Loads whose sum is wrong by less than this are not scaled: only the largest changes. Heuristic.
@@ -65,7 +65,7 @@ class Trial:
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
-        """(n,) where a load is not 0."""
+        """(n,) true where a load is not 0."""
         return np.asarray(self.loads.high > 0)
 
     @cached_property
@@ -74,7 +74,7 @@ class Trial:
         return excess(self.gap, self.inside)
 
     def frozen(self) -> Trial:
-        """The same with read-only arrays, because proofs rest on it."""
+        """The same trial with read-only arrays, because proofs rest on it."""
         for ball in (self.product, self.gap):
             for part in (*ball.mid, ball.radius):
                 part.flags.writeable = False
@@ -91,7 +91,7 @@ class Trial:
         return problem.exact.offsets + self.approach - self.product
 
     def improved(self, other: Trial, where: NDArray[np.bool_]) -> Trial:
-        """The other one, in the rows where that is better."""
+        """The trial with the rows `where` replaced by those of the other."""
         if where.all():
             return other
         select = partial(np.where, where[:, None])
@@ -100,12 +100,12 @@ class Trial:
 
     @property
     def numbers(self) -> tuple[Pair | Ball | Array, ...]:
-        """All but the problem."""
+        """All fields but the problem."""
         return self.loads, self.product, self.local, self.gap, self.approach, self.missing
 
 
 def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
-    """The contact law evaluated at loads of which A P, and what they miss a total by, is known."""
+    """The contact law at loads with known A P and known difference from the prescribed total."""
     data, exact = problem.exact, Ball.exact(loads)
     local = hertz.indentation(loads.high, problem.coefficients)
     if problem.load is None:
@@ -121,7 +121,7 @@ def trial(problem: Problem, loads: Pair, missing: Ball, product: Ball) -> Trial:
 
 
 def refines(problem: NormalProblem) -> bool:
-    """Whether thirty digits cost no more than a press does."""
+    """True if thirty digits cost no more than the solution itself."""
     return not problem.influence.stored or len(problem) <= FEW
 
 
@@ -148,7 +148,7 @@ def refined(problem: Problem, best: Trial) -> Trial:
 
 
 def refined_loads(problem: Problem, loads: Array) -> Trial:
-    """`refined` from loads (n,) of any solver, not negative."""
+    """`refined` from loads (n,) >= 0 of any solver."""
     pair, missing = completed(problem, Pair.exact(loads))
     return refined(problem, trial(problem, pair, missing, problem.product(pair)))
 
@@ -188,9 +188,9 @@ def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bo
 
 
 def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
-    """Loads in proportion to these that add up to the prescribed total, and what they still miss.
+    """The loads scaled to the prescribed total, and the small part of the total that they lack.
 
-    The largest makes up for what the others leave, to its rounding.
+    The largest load is adjusted so that only its rounding is lacking.
     """
     if problem.load is None:
         return loads, Ball.exact(np.zeros_like(summed(loads.high)))
@@ -212,17 +212,17 @@ def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
 
 
 def sums(values: Pair) -> Pair:
-    """Along the last axis: numbers, or (m, 1) of rows."""
+    """Sums along the last axis: a number, or (m, 1) for rows."""
     total = values.total()
     return total if np.ndim(values.high) == 1 else Pair(*(part[:, None] for part in total))
 
 
 def defect_of(state: Trial) -> Any:
-    """The 2-norm of how far the contact law is from holding: a number, or (m,) of rows."""
+    """The 2-norm of the residual of the contact law: a number, or (m,) for rows."""
     defect = np.where(state.inside, state.gap.value, np.minimum(state.gap.value, 0.0))
     return np.linalg.norm(defect, axis=-1)
 
 
 def rounding_of(state: Trial) -> Any:
-    """The 2-norm of what the residual loses: a number, or (m,) of rows."""
+    """The 2-norm of the rounding errors of the residual: a number, or (m,) for rows."""
     return np.linalg.norm(state.gap.radius, axis=-1)

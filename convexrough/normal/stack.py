@@ -67,12 +67,12 @@ class Stack:
 
     @cached_property
     def row_norm(self) -> Array:
-        """(m, 1) as of `NormalProblem`."""
+        """(m, 1) as in `NormalProblem`."""
         return self._each("row_norm")
 
     @cached_property
     def largest_entry(self) -> Array:
-        """(m, 1) as of `NormalProblem`."""
+        """(m, 1) as in `NormalProblem`."""
         return self._each("largest_entry")
 
     def _each(self, name: str) -> Array:
@@ -106,7 +106,7 @@ class Stack:
         return found
 
     def product(self, loads: Pair) -> Ball:
-        """(m, n) A P to some thirty digits."""
+        """(m, n) A P to about thirty digits."""
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
@@ -114,7 +114,7 @@ class Stack:
         return self.product(others)
 
     def convexity_at(self, stiffness: Array) -> Array:
-        """(m, 1) as of `NormalProblem`."""
+        """(m, 1) as in `NormalProblem`."""
         return np.asarray(largest(self.shells / stiffness) * (1 + SAFETY))
 
     def stiffness(self, loads: Array) -> Array:
@@ -127,7 +127,7 @@ class Stack:
         slopes : (m, n) c = dP/dn;  todo : (m,) rows that need a step; the others get 0
         enough : not used, because a factor leaves nothing but rounding
         """
-        from scipy.linalg.lapack import dposv  # 0.2 s to import: only when solving
+        from scipy.linalg.lapack import dposv  # takes 0.2 s to import
 
         root = np.sqrt(slopes)
         count = max(1, int((root > 0).sum(axis=1).max()))

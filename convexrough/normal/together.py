@@ -1,4 +1,4 @@
-"""Normal problems in rows, solved and proved together: the levels of one scene, or many scenes.
+"""Many normal problems, one in each row of an array, solved and proved in one computation.
 
 Newton's method, the refinement in pairs of float64 numbers and the theorem treat all rows at once.
 A row that the cheapest proof does not settle is solved on its own by the caller.

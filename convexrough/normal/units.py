@@ -27,7 +27,7 @@ class Units:
 
     @classmethod
     def of(cls, approach: float, coefficient: float) -> Units:
-        """For an approach [length] and a local coefficient k; InputError if there are none."""
+        """Units for an approach [length] and a local coefficient k; InputError if out of range."""
         if not 0 < approach < math.inf:
             raise InputError("scene", found=f"indentations of {approach:g}", expected=SIZED)
         length = 2.0 ** round(math.log2(approach))

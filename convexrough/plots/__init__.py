@@ -1,10 +1,10 @@
 """Figures of every stage, fit to print.
 
-`..._figures` return figures by the stem of the file each belongs in. Where units are named, axes
+`..._figures` return a dictionary from stems of file names to figures. Where units are named, axes
 are in SI with prefixes. No global state of matplotlib is touched: `save` a figure, or show it in a
 notebook. Discs of dense scenes are pixels inside a vector file: save that with a `dpi` too.
 
-`plot` draws the main picture of any result into axes of your own; `contact.plot()` is the same.
+`plot` draws the main picture of a result into given axes; `contact.plot()` is the same.
 """
 
 from convexrough.plots.axes import plot, thumbnail

@@ -1,4 +1,4 @@
-"""The one map of asperities that every figure uses: discs of true size, or a mosaic of many."""
+"""The map of asperities that all figures use: discs in true size, or one image if many touch."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH, bar,
 #: From these numbers on, discs are pixels inside a vector file, and a mosaic replaces them.
 DENSE, CROWDED = 200, 3000
 
-#: Of a mosaic, across.
+#: Width of a mosaic in pixels.
 PIXELS = 400
 
-#: What each asperity does: the more it moves the darker, also in grey.
+#: Colour and label of each status: more slip is darker, also in grey.
 STICK, SLIP, SLIDING, UNKNOWN = "#b9d0e5", "#e0842a", "#701c05", "white"
 LOOKS = {
     "stuck": (STICK, "sticks"),
@@ -36,7 +36,7 @@ LOOKS = {
 
 
 class Layer(NamedTuple):
-    """Discs of one kind, above those of the layers before.
+    """Discs of one status; later layers cover earlier ones.
 
     radii  : (n,) [length], 0 where no disc is drawn;  shades : (n, 4), or one colour for all
     rim    : colour of the outlines; None draws no outlines
@@ -49,7 +49,7 @@ class Layer(NamedTuple):
 
 
 class Window(NamedTuple):
-    """A square part of the plane, in the measure of a map."""
+    """A square part of the plane, in the length unit of the axes."""
 
     x: float
     y: float
@@ -61,7 +61,7 @@ class Window(NamedTuple):
         return self.x - self.half, self.x + self.half, self.y - self.half, self.y + self.half
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
-        """(n,) which points lie inside."""
+        """(n,) true where a point lies inside."""
         away: Array = np.abs(points - (self.x, self.y)).max(axis=1)
         return away < self.half
 
@@ -76,14 +76,14 @@ def draw_map(
     window: Window | None = None,
     dots: str = FAINT,
 ) -> Window:
-    """Draw layers of discs about the points, faint dots where there is none; name the axes.
+    """The window of a map that is drawn here: discs at points, faint dots at points without one.
 
     points : (n, 2) [length]
     smooth : semi-axes of the smooth contact [length], drawn as a dashed outline about the origin
-    window : what to show; default: the least square that holds all discs, or else all points
+    window : part of the plane to show; default `map_window`
 
-    Of many discs a mosaic: each place in the colour of the nearest asperity, the mean one of its
-    layers, white where that is open.
+    From `CROWDED` discs on, a mosaic replaces them: each pixel has the mean colour of the nearest
+    asperity's layers, white if this asperity has no disc.
     """
     whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
     shown, window = whole > 0, window or map_window(points, whole, length, smooth)
@@ -115,7 +115,7 @@ def draw_values(
 ) -> None:
     """Draw the discs of a contact in the colours of their values, and a named colour bar.
 
-    signed : from dark, below 0, to light, above it
+    signed : the colours run from dark for negative values to light for positive ones
     """
     most = float(np.abs(values).max()) or 1.0
     spread = Normalize(-most if signed else 0.0, most)
@@ -152,7 +152,7 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
 def draw_outline(
     axes: Axes, semi_axes: Sequence[float], style: Any = DASHED, colour: str = SMOOTH
 ) -> None:
-    """Draw a circle or ellipse about the origin; None draws nothing."""
+    """Draw a circle or ellipse about the origin, or nothing without semi-axes."""
     if semi_axes:
         width, height = (2.0 * axis for axis in semi_axes)
         axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=style, lw=0.9, ec=colour))
@@ -192,7 +192,7 @@ def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
 
 
 def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
-    """(n,) one radius for all chosen points, so small that discs stay apart; 0 for the others."""
+    """(n,) one radius for the chosen points, about 0.42 of their spacing; 0 for the others."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     size = float(np.ptp(points, axis=0).max()) or 1.0
@@ -210,7 +210,7 @@ def _handle(colour: str, text: str) -> Line2D:
 def map_window(
     points: Array, radii: Array, length: Measure, smooth: Sequence[float] = ()
 ) -> Window:
-    """The least square round all discs and the smooth outline; without discs, round all points."""
+    """The square round all discs (without discs, all points) and the smooth outline, plus 6 %."""
     points, radii = length.of(points), length.of(radii)
     outline = [length.of(axis) for axis in smooth]
     there = radii > 0 if (radii > 0).any() else np.ones(len(points), dtype=bool)
@@ -241,16 +241,16 @@ def _blended(layers: Sequence[Layer], whole: Array) -> Array:
 def _draw_mosaic(
     axes: Axes, points: Array, shades: Array, shown: NDArray[np.bool_], window: Window
 ) -> None:
-    """Each pixel in the colour of the nearest asperity; of several in it, in their mean colour.
+    """Draw each pixel in the colour of the nearest asperity, or the mean of several inside it.
 
-    So no pattern of the pixels beats with that of the asperities.
+    The mean avoids moire patterns between pixels and asperities.
     """
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     left, right, bottom, top = window.sides
     steps = 2.0 * window.half * (np.arange(PIXELS) + 0.5) / PIXELS
     places = np.stack(np.meshgrid(left + steps, bottom + steps), axis=-1)
-    cell = 2.0 * window.half / np.sqrt(np.count_nonzero(shown))  # none so near: outside them all
+    cell = 2.0 * window.half / np.sqrt(np.count_nonzero(shown))  # no asperity so near: outside
     _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
     visible = np.where(shown[:, None], shades, (1.0, 1.0, 1.0, 0.0))
     image = np.vstack((visible, np.zeros(4)))[nearest]

@@ -63,12 +63,12 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
 
     result : a Contact: map of its pressure; ShearState, VectorShearState: map of stick and slip;
         Cycle: its loop, or the plane of loads where P varies; Fretting: map of slip amplitudes;
-        LoadPath: Q against X where the load is held, else the plane of loads; MemoryCurve: that
-        plane; Gradient: map of derivatives; Verdict: map of asperities that are not as claimed;
-        Comparison, PathComparison: what each solver or method took; PhaseLosses: loss against
+        LoadPath: Q against X at constant load, else the plane of loads; MemoryCurve: the plane of
+        loads; Gradient: map of derivatives; Verdict: map of wrongly claimed asperities;
+        Comparison, PathComparison: times of the solvers or methods; PhaseLosses: loss against
         phase; Shakedown: map of the factors; Surface, Summits: map; Provability: contacts by
         pruning
-    axes   : of matplotlib, to draw into; default: those of a new figure, which a notebook shows
+    axes   : matplotlib axes; default: those of a new figure, which notebooks show
 
     Raises InputError for anything else.
     """
@@ -87,7 +87,7 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
 
 
 def thumbnail(result: object) -> str:
-    """A small picture of a result as an image of HTML: of a cycle or a path a map of its status."""
+    """A small picture of a result as an HTML image; for a cycle or path, the map of its status."""
     figure = Figure(figsize=(SINGLE, 3.0), layout="constrained")
     axes = figure.subplots()
     if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):
@@ -153,7 +153,7 @@ def _draw_summits(summits: Summits, axes: Axes) -> None:
     draw_map(axes, summits.positions, [layer], measure(1.0, summits.origin.unit)._replace(size=1.0))
 
 
-#: What draws each kind of result on axes.
+#: The function that draws each kind of result.
 PICTURES: dict[type, Callable[..., Any]] = {
     Contact: lambda it, axes: draw_pressure(axes, Scale(it)),
     ShearState: _draw_state,

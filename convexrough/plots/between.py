@@ -1,6 +1,6 @@
-"""Points between those of a path, where they are few enough: loops are curved.
+"""`between`: a path with additional points, for figures of curved loops.
 
-This solves normal problems. Figures ask for it only where these points were not computed before.
+It solves normal problems. Figures call it only if these points were not computed before.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import numpy as np
 
 from convexrough.friction.path import LoadPath, history, load_path
 
-#: Points at most; asperities times points; steps between two points.
+#: Largest number of points, of asperities times points, and of steps between two points.
 MOST_POINTS, AFFORDABLE, MOST_BETWEEN = 500, 16_000, 40
 
-#: Segments of a path at varying load between whose ends points are sought; each takes a solution.
+#: Number of segments at varying load up to which points are added; each needs a solution.
 MOST_SEGMENTS = 24
 
 
@@ -25,7 +25,7 @@ def between(path: LoadPath) -> LoadPath:
     if not path.load_constant:
         each = min(each, 8) if m <= MOST_SEGMENTS else 1
     each = min(each, MOST_BETWEEN)
-    follows_on = path.load_constant or path.start == 0.0  # not another's contact
+    follows_on = path.load_constant or path.start == 0.0  # not a contact pressed elsewhere
     if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
         return path
     corners = np.column_stack((path.loads, path.forces))

@@ -1,4 +1,4 @@
-"""Steady cycles: hysteresis loops, the energy they cost, and fretting."""
+"""Figures of steady cycles: hysteresis loops, energy losses, and fretting."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
 
 MOST_LOOPS, MOST_ASPERITIES = 4, 6
-POINTS = 400  # of a loop
-#: Styles of the chosen asperities, outwards: told apart by more than the colour.
+POINTS = 400  # number of points of a loop
+#: Line styles of the chosen asperities from the centre outwards, distinct also without colours.
 DASHES: list[Any] = ["-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2, 2, 2)), "-"]
 
 
@@ -48,13 +48,13 @@ def cycle_figures(
 ) -> Figures:
     """The figures of steady cycles of one contact.
 
-    loops      : of each cycle, where they are known; else they are computed
-    asperities : whose loops to show; default: one at each distance from the centre, at most 6
+    loops      : the loop of each cycle; None to compute them
+    asperities : asperities with loops; default: one at each distance from the centre, at most 6
 
     "hysteresis" : the loops of the cycles, with the smooth sphere's; of more than 4 cycles, those
-        of about the whole, 3/4, 1/2 and 1/4 of the widest range. And of chosen asperities in the
-        cycle of the widest range
-    "loss" : where there are cycles of several ranges, energy against amplitude
+        of about the whole, 3/4, 1/2 and 1/4 of the widest range. Also loops of chosen asperities
+        in the cycle of the widest range
+    "loss" : energy against amplitude, for cycles of several ranges
     """
     if not cycles:
         return Figures()
@@ -81,7 +81,7 @@ def cycle_figures(
 
 
 def _spread(amplitudes: Sequence[float]) -> list[int]:
-    """All of few loops; of many those nearest to 1/4, 1/2, 3/4 and all of the widest.
+    """Indices of the loops to draw: all, or of many those near 1/4, 1/2, 3/4 and 1 of the widest.
 
     amplitudes : in rising order
     """
@@ -101,10 +101,10 @@ def loops_figure(
     loops: Sequence[Loop] | None = None,
     count: int = 0,
 ) -> Figure:
-    """Loops of the contact, the same less an elastic part, and of asperities in the last cycle.
+    """The figure of loops: of the contact, less an elastic part, and of single asperities.
 
     names, meaning : entries and title of the legend of the asperities
-    loops : of the cycles, with those of the asperities;  count : of cycles from which these are
+    loops : loops of the cycles, with those of the asperities;  count : number of all cycles
     """
     loops = steady_loops(cycles, POINTS, asperities) if loops is None else loops
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
@@ -191,7 +191,7 @@ def _draw_asperity_loops(
 
 
 def ring_colour(order: int, count: int) -> Any:
-    """From dark at the axis to lighter outwards."""
+    """The colour of a ring of asperities, lighter outwards."""
     return matplotlib.colormaps["viridis"](0.82 * order / max(1, count - 1))
 
 
@@ -204,7 +204,7 @@ def _range(cycle: Cycle, scale: Scale) -> str:
 
 
 def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
-    """Energy against amplitude; `cycles` by amplitude."""
+    """The figure of energy against amplitude; `cycles` are in order of amplitude."""
     figure = Figure(figsize=(DOUBLE, 3.0), layout="constrained")
     loss, ratio = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     some = [each for each in cycles if each.maximum > each.minimum]

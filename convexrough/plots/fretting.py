@@ -17,7 +17,7 @@ def fretting_figures(worn: Fretting) -> Figures:
     """The figure of fretting in a steady cycle.
 
     "fretting" : maps of the slip amplitude at the rim of each disc, the energy lost per cycle, the
-        mean shear traction and the largest, both at the largest force
+        mean and the largest shear traction, both at the largest force
     """
     if not worn.contact.loads.any():
         return no_contact("fretting")

@@ -15,7 +15,7 @@ def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
     """The map of the derivatives by heights.
 
     "gradient" : contact discs, in the colour of D0 / J times dJ / dz; open asperities as dots
-    of : what the number is called, as a formula
+    of : symbol of the differentiated number, as a formula
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.3), layout="constrained")
     scale = Scale(gradient.contact)
@@ -24,7 +24,7 @@ def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
 
 
 def draw_gradient(axes: Axes, gradient: Gradient, scale: Scale, of: str = "J") -> None:
-    """Derivatives: dark where a taller asperity lowers the number, light where it raises it."""
+    """Draw derivatives by heights: dark where a taller asperity lowers the number, else light."""
     parts, per = gradient.heights * gradient.contact.approach, ""
     if gradient.value:
         parts, per = parts / gradient.value, f"\\,/\\,{of}"

@@ -1,4 +1,4 @@
-"""The plane of load P and T = Q / f: paths, memory, closed paths and what these cost."""
+"""Figures in the plane of load P and T = Q / f: paths, memory curves, closed paths, losses."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ from convexrough.scene.rings import evenly_chosen
 
 MOST_CURVES = 4
 
-#: Memory curves differ by the pattern of their lines, too, to be told apart in grey.
+#: Line patterns that tell memory curves apart also in grey.
 PATTERNS = ("-", (0, (5, 1.5)), (0, (3, 1.2, 1, 1.2)), (0, (1, 1)), "-")
 
-#: Sizes of ellipses whose losses are drawn: the largest.
+#: Number of sizes of ellipses, the largest ones, whose losses are drawn.
 MOST_FACTORS = 5
 
 
 def steady_figures(found: Cycle) -> Figures:
     """The figure of a closed path.
 
-    "steady" : the path in the load plane, with the two lines that keep the point (L*, T*) for ever;
-        and what each asperity does in every later cycle
+    "steady" : the path in the load plane, with the two lines that fix the point (L*, T*), and the
+        status of each asperity in every later cycle
     """
     figure = Figure(figsize=(DOUBLE, 3.5), layout="constrained")
     plane, place = figure.subplots(1, 2)
@@ -62,7 +62,7 @@ def steady_figures(found: Cycle) -> Figures:
 def phase_figures(found: PhaseLosses) -> Figures:
     """The figure of losses at several phases and sizes.
 
-    "phase_losses" : loss per cycle against the phase, a line for each size; and the smooth sphere's
+    "phase_losses" : loss per cycle against the phase for each size, and for the smooth sphere
     """
     figure = Figure(figsize=(SINGLE, 3.4), layout="constrained")
     draw_losses(figure.subplots(), found)
@@ -70,7 +70,7 @@ def phase_figures(found: PhaseLosses) -> Figures:
 
 
 def draw_losses(axes: Axes, found: PhaseLosses) -> None:
-    """Loss over factor^3, as losses of small cycles are of third order: lines come together."""
+    """Draw loss / factor^3: losses of small cycles are of third order, so their lines coincide."""
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     cubes = np.abs(found.factors) ** 3
     most = float((found.losses / cubes).max()) or 1.0
@@ -93,7 +93,7 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
 
 
 def draw_path(axes: Axes, path: LoadPath) -> None:
-    """The path, and the memory curve at some of its points."""
+    """Draw the path, and the memory curve at some of its points."""
     f, unit = (
         path.scene.friction or 1.0,
         _plane(axes, float(path.loads.max()), path.scene.units.force),
@@ -109,7 +109,7 @@ def draw_path(axes: Axes, path: LoadPath) -> None:
 
 
 def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
-    """One state: its vertices, and its front."""
+    """Draw one memory curve: its vertices and its front."""
     unit = _plane(axes, float(curve.load))
     axes.plot(*_vertices(curve, unit), "o-", color=ROUGH, lw=1.4, ms=3.5)
     if curve.front is None:
@@ -123,7 +123,7 @@ def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
 
 
 def draw_closed(axes: Axes, found: Cycle) -> None:
-    """A closed path, and the two lines that keep the point (L*, T*) for ever."""
+    """Draw a closed path, and the two lines that fix the point (L*, T*)."""
     f, unit = (
         found.scene.friction or 1.0,
         _plane(axes, float(found.loads.max()), found.scene.units.force),
@@ -140,7 +140,7 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
 
 
 def _plane(axes: Axes, most: float, force_unit: str = "") -> Measure:
-    """Names of the axes, and |T| = P, gross sliding; the measure of both."""
+    """The measure of both axes, which are labelled here; |T| = P (gross sliding) is drawn."""
     unit = measure(most, force_unit, "P_m")
     for sign in (1.0, -1.0):
         axes.plot([0.0, unit.of(most)], [0.0, unit.of(sign * most)], color=SMOOTH, lw=0.7,

@@ -1,10 +1,10 @@
-"""What the axes of figures count in: SI units with prefixes, or numbers of the smooth contact.
+"""Units of the axes of figures: SI units with prefixes, or quantities of the smooth contact.
 
 Where the scene names its units, axes are in SI with the prefix that suits them. Where it does not,
-lengths are in a_H and pressures in p0, contact radius and peak pressure of the smooth sphere under
-the same load, shear forces in f P, displacements in X0 and energies in W0. Where the base has no
-smooth reference, lengths are in r_c, how far contact reaches from its centre, and pressures in the
-mean one over the circle of that radius.
+lengths are in a_H and pressures in p0 (contact radius and peak pressure of the smooth sphere under
+the same load), shear forces in f P, displacements in X0 and energies in W0. Where the base has no
+smooth reference, lengths are in the radius r_c of the circle that holds all contacts, and
+pressures in the mean pressure on this circle.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ PREFIXES = ("f", "p", "n", "µ", "m", "", "k", "M", "G", "T")
 
 
 class Measure(NamedTuple):
-    """What values are divided by on an axis [their own unit], and how its label says so.
+    """The unit of an axis: `size` divides the values, and the label names this divisor.
 
-    symbol : of what they are divided by, as a formula; "" where `said` is a unit
-    said   : the unit of the axis; or how large the symbol is
+    symbol : formula of the divisor; "" if `said` is a unit
+    said   : unit of the axis, or the value of the symbol
     """
 
     size: float = 1.0
@@ -57,7 +57,7 @@ class Measure(NamedTuple):
 
 
 def measure(size: float, unit: str, symbol: str = "") -> Measure:
-    """Of values about so large: in SI with a prefix, or in their own unit; without, in `size`s."""
+    """The measure of values of this size: SI with prefix, else `unit`, else relative to `size`."""
     if known := _metric(unit):
         name, exponent = known
         step = _step(abs(size) * 10.0**exponent)
@@ -68,7 +68,7 @@ def measure(size: float, unit: str, symbol: str = "") -> Measure:
 
 
 def quantity(value: float, unit: str) -> str:
-    """Three digits and the unit: in SI with a prefix, as 4.12 µm, or as 4.12 × 10^-3 in."""
+    """The value to three digits with its unit, such as 4.12 µm (SI) or 4.12 × 10^-3 in."""
     if (known := _metric(unit)) and value:
         name, exponent = known
         step = _step(abs(float(f"{value:.3g}")) * 10.0**exponent)
@@ -85,7 +85,7 @@ def literal(text: str) -> str:
 
 
 def _metric(unit: str) -> tuple[str, int] | None:
-    """The unit of SI that a unit is a power of ten of, and the power; None of others."""
+    """The SI unit of which a unit is 10^power, and the power; None for other units."""
     if (known := parsed(unit) if unit.strip() else None) is None:
         return None
     power = round(math.log10(known.size))
@@ -94,7 +94,7 @@ def _metric(unit: str) -> tuple[str, int] | None:
 
 
 def _step(size: float) -> int:
-    """The power of a thousand in which this is from 1 to 1000."""
+    """The power of a thousand that scales the size to 1 to 1000, at least -5 and at most 4."""
     if not size or not math.isfinite(size):
         return 0
     return int(np.clip(math.floor(math.log10(size * (1 + 1e-12)) / 3), -5, 4))
@@ -108,7 +108,7 @@ class Scale:
     """The measures of a contact's figures, and its smooth reference.
 
     sphere : the smooth sphere or ellipsoid under the same load, or None
-    axes   : its semi-axes [length];  centre : (2,) [length] where distances are counted from
+    axes   : its semi-axes [length];  centre : (2,) [length] origin of distances
     """
 
     def __init__(self, contact: Contact) -> None:
@@ -138,7 +138,7 @@ class Scale:
 
     @property
     def name(self) -> str:
-        """What the smooth reference is called."""
+        """The name of the smooth reference."""
         return f"smooth {'ellipsoid' if isinstance(self.sphere, SmoothEllipsoid) else 'sphere'}"
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Figures that show themselves in a notebook, and that are saved as journals want them."""
+"""Figures that notebooks display without pyplot, and `save` in formats of journals."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from matplotlib.figure import Figure as MatplotlibFigure
 
 from convexrough.errors import InputError
 
-#: What a figure can be saved as, and how fine pixels may be [per inch].
+#: Formats of files, and limits of the resolution [pixels per inch].
 FORMATS = ("png", "svg", "pdf")
 LEAST_DPI, MOST_DPI = 50, 600
 
-#: Text that stays text: in SVG as it is, in PDF as TrueType; no date, so that files compare.
+#: Keep text as text: as it is in SVG, as TrueType in PDF; fixed ids, so that files can be compared.
 REAL_TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg.hashsalt": "convexrough"}
 
 
 class Figure(MatplotlibFigure):
-    """A figure of matplotlib that shows itself in a notebook, without pyplot."""
+    """A matplotlib figure that notebooks display, without pyplot."""
 
     def _repr_png_(self) -> bytes:
         return as_png(self)
 
 
 class Figures(dict[str, MatplotlibFigure]):
-    """Figures by the stem of the file each belongs in; a notebook shows them all."""
+    """Figures by stems of file names; notebooks display all of them."""
 
     def _repr_html_(self) -> str:
         return "<br>".join(image_tag(stem, figure) for stem, figure in self.items())
@@ -47,9 +47,9 @@ def image_tag(name: str, figure: MatplotlibFigure, dpi: int = 100) -> str:
 
 
 def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200) -> None:
-    """Write a figure as PNG, SVG or PDF, whose text stays text; dpi is that of pixels in it.
+    """Write a figure as PNG, SVG or PDF, with text kept as text; `dpi` is for its pixels.
 
-    Raises InputError for another format, or pixels that are too coarse or too fine.
+    Raises InputError for another format, or a `dpi` out of range.
     """
     if form not in FORMATS:
         raise InputError("form", found=repr(form), expected=f"one of {', '.join(FORMATS)}")

@@ -1,4 +1,4 @@
-"""Histories and load paths: loops, the energy they cost, and maps of what sticks."""
+"""Figures of histories and load paths: loops, energy losses, and maps of stick and slip."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ MOST_MAPS = 8
 
 
 def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
-    """The figures of a load path; of a history, whose load is held, one.
+    """The figures of a load path, or the one of a history, which has constant load.
 
-    fine : the same with points between its own, as `between` finds; None to find them
+    fine : the path with the additional points of `between`; None to compute them
 
     "history" : Q against X, its steps numbered where they are few and in darkening colours; and
         the energy lost since the beginning against the step
@@ -98,7 +98,7 @@ def draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
 def _draw_darkening(
     axes: Axes, path: LoadPath, fine: LoadPath, x: Array, y: Array
 ) -> ScalarMappable:
-    """A curve from the origin, light first and dark last; nothing so light that it is lost."""
+    """Draw a curve that darkens from the origin to its end, and is visible everywhere."""
     steps = max(1, len(path.forces))
     colours = ScalarMappable(Normalize(0, steps), ListedColormap(shades_of(256, low=0.15)))
     points = np.column_stack((np.append(0.0, x), np.append(0.0, y)))

@@ -36,11 +36,11 @@ from convexrough.sphere import hertz
 
 
 def press_figures(contact: Contact) -> Figures:
-    """The figures of a pressed contact, by the stem of the file each belongs in.
+    """The figures of a pressed contact, by stems of file names.
 
     "pressure" : map of the contact discs, and the profile along y = 0 with that of the smooth
-        sphere (Dini & Hills 2009, Fig. 3); where that crosses few of the asperities, the peak
-        pressures of all against their distance from the centre
+        sphere (Dini & Hills 2009, Fig. 3); where this line crosses few asperities, the peak
+        pressures of all asperities against their distance from the centre
     "loads"    : load of each touching asperity by its distance from the centre
     """
     if not contact.loads.any():
@@ -70,10 +70,10 @@ def pressure_figure(scale: Scale) -> Figure:
 
 
 def draw_pressure(axes: Axes, scale: Scale) -> tuple[ScalarMappable, Window]:
-    """The map of the contact discs, with its bar; its colours and what it shows.
+    """The colours and the window of a map of contact pressures, which is drawn with its bar.
 
-    Each pressure p0 sqrt(1 - s^2) is a stack of discs in equal steps of pressure; where discs are
-    many they have the colour of their peaks.
+    Each pressure p0 sqrt(1 - s^2) is a stack of discs in equal steps of pressure. Where there are
+    many, each disc has the colour of its peak.
     """
     contact = scale.contact
     peaks = scale.pressure.of(fields.peak_pressures(contact))
@@ -124,7 +124,7 @@ def _draw_peaks(axes: Axes, scale: Scale) -> None:
 
 
 def _draw_smooth(axes: Axes, scale: Scale, semi_axes: Sequence[float], s: Array) -> None:
-    """The smooth contact's pressure at parts s of each semi-axis."""
+    """Draw the smooth contact's pressure at fractions s of each semi-axis."""
     for place, axis in enumerate(semi_axes):
         p = scale.pressure.of(hertz.pressure(s, 1.0, scale.peak))
         axes.plot(scale.length.of(axis * s), p, "--", lw=1.3, color=SMOOTH,
@@ -132,13 +132,13 @@ def _draw_smooth(axes: Axes, scale: Scale, semi_axes: Sequence[float], s: Array)
 
 
 def distances(scale: Scale) -> Array:
-    """(n,) of all contact points from the centre, in the measure of lengths."""
+    """(n,) distances of all contact points from the centre, in units of the length axis."""
     away: Array = np.hypot(*(scale.contact.scene.contact_points - scale.centre).T)
     return away / scale.length.size
 
 
 def _draw_points(axes: Axes, x: Array, y: Array, top: float, label: str) -> bool:
-    """A dot for each, or how many there are where and their median; whether these are many."""
+    """Draw a dot for each point; if there are many, their density and median, and return True."""
     if len(x) >= CROWDED:
         draw_density(axes, x, y, top, label)
         return True
@@ -179,10 +179,10 @@ def _loads_figure(scale: Scale) -> Figure:
 
 
 def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
-    """Percentage of the load that the smooth sphere's pressure lays on the cell of an asperity.
+    """Draw the percentage of the load that the smooth sphere exerts on the cell of an asperity.
 
     100 p(r) A / P, with p0 = 3 P / (2 pi a_H^2) and A the median cell of the touching asperities;
-    left out where fewer than seven of these have a whole cell, and where the base is no sphere.
+    nothing if fewer than seven of these have a whole cell, or the base is not a sphere.
     """
     if len(set(scale.axes)) != 1:
         return

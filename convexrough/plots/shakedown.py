@@ -31,12 +31,12 @@ FINE = 240
 
 
 def shakedown_figures(found: Shakedown) -> Figures:
-    """The figures of a limit of shakedown; forces are drawn without units.
+    """The figures of a shakedown limit, with dimensionless forces.
 
-    "shakedown" : up to which factor of the path each asperity stops to slide, and which is first
-    "shakedown_map" : how many slide for ever where load and shear swing by different factors; at
-        constant load, where the shear force swings about different means. Of kind "exact", where
-        every onset is known
+    "shakedown" : largest factor of the path at which each asperity stops sliding, and the first one
+    "shakedown_map" : number of asperities that slide in every cycle if load and shear amplitudes
+        have different factors; at constant load, if shear forces have different means. Only of
+        kind "exact", which gives every onset
     """
     figure = Figure(figsize=(SINGLE + 0.7, 3.4), layout="constrained")
     draw_factors(figure.subplots(), found)

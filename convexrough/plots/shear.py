@@ -1,4 +1,4 @@
-"""Which asperities slide, and which stick in part: the map of a friction state."""
+"""The map of a friction state: asperities that slide, and those that stick in part."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ MOST_PANELS = 12
 
 
 def shear_figures(states: Sequence[ShearState]) -> Figures:
-    """The map of each friction state of one contact, at most 12 of them, evenly chosen.
+    """The maps of friction states of one contact, at most 12, evenly chosen.
 
     "stick_slip" : contact discs with their stick discs inside, sliding asperities, open ones; and
         the smooth sphere's contact and stick discs under the same forces
@@ -106,7 +106,7 @@ def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
 
 
 def _doubtful(state: State) -> Any:
-    """(n,) which asperities to mark; where nothing is proved, those with a load."""
+    """(n,) true for asperities to mark; those with a load if nothing is proved."""
     unsure = state.status == "undecided"
     return unsure & (state.contact.loads > 0) if state.certificate.scope == "none" else unsure
 

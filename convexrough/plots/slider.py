@@ -1,7 +1,7 @@
-"""The slider page: states of first loading, found before and shown here, inside one HTML file.
+"""The slider page: one HTML file that shows states of first loading, computed beforehand.
 
-The page steps through these states and shows their numbers as they are. Loops are made of them by
-Masing's rule (docs/theory/paths.md); nothing else is computed there, and nothing here.
+The page steps through these states and shows their numbers unchanged. It only computes loops, by
+Masing's rule (docs/theory/paths.md).
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 from convexrough.tabular.columns import bound
 
-#: Forces of the slider for up to so many touching asperities; fewer for still more.
+#: Number of forces of the slider, by the largest number of touching asperities.
 FORCES = {2_500: 101, 20_000: 51}
 FEWEST_FORCES = 21
 
-#: Discs, and dots for open asperities, that are drawn at most, and asperities that can be followed:
-#: a page stays below 2 MB.
+#: Largest numbers of discs (and of dots for open asperities), and of asperities with their own
+#: curves: a page stays below 2 MB.
 MOST_DRAWN, MOST_FOLLOWED = 5_000, 200
 
 
 @dataclass(frozen=True)
 class Slides:
-    """What the page steps through: first loading to each fraction of f P, and the cycle there."""
+    """The states of the page: first loading to fractions of f P, and steady cycles."""
 
     contact: Contact
     fractions: Array
@@ -65,9 +65,9 @@ def slider_html(slides: Slides, proved: Sequence[str]) -> str:
 
 
 def slider_data(slides: Slides, proved: Sequence[str]) -> dict[str, Any]:
-    """What the page shows: lengths of the map in a_H, forces in f P, displacements in X0.
+    """The data of the page: lengths of the map in a_H, forces in f P, displacements in X0.
 
-    Numbers have the five digits that are shown. `stick` has a row per force and a column per disc:
+    Numbers have five digits. `stick` has a row per force and a column per disc:
     the stick radius in thousandths of the contact radius, 0 where sliding, -1 where undecided.
     """
     contact, fractions, steady, loading = (
@@ -113,14 +113,14 @@ def _forces(touching: int) -> int:
 
 
 def _some(which: Indices, most: int) -> Indices:
-    """All, or so many of them: drawn by lot, so that no pattern shows, and the same every time."""
+    """At most this many indices, chosen at random without a pattern, by a fixed seed."""
     if len(which) <= most:
         return which
     return np.sort(np.random.default_rng(0).choice(which, most, replace=False))
 
 
 def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> dict[str, Any]:
-    """Of the whole contact, and of the smooth sphere under the same load, at each force."""
+    """Data of the whole contact and of the smooth sphere under the same load, at each force."""
     moved = np.array([each.displacement_amplitude for each in steady])
     stuck = np.cbrt(1.0 - fractions)
     return {
@@ -158,7 +158,7 @@ def _shares(contact: Contact, loading: LoadPath, which: Indices) -> Array:
 
 
 def _followed(contact: Contact, loading: LoadPath, which: Indices, X0: float) -> dict[str, Any]:
-    """Curves and proofs of the asperities that can be followed."""
+    """Curves and proofs of the asperities with their own curves."""
     x, y = contact.scene.asperities.positions[which].T
     certificate = contact.certificate
     return {
@@ -194,7 +194,7 @@ def _letters(limit: float, a_H: float, X0: float, *units: str) -> list[list[str]
 
 
 def _left_out(touching: int, shown: int, followed: int, forces: int) -> list[str]:
-    """What the page does not show of many asperities, in sentences; the counts are of all."""
+    """Sentences that say which of many asperities the page leaves out."""
     said = []
     if shown < touching:
         said.append(f"{shown:,} of {touching:,} touching asperities are drawn, by lot and larger.")

@@ -26,12 +26,12 @@ ROUGH, UNSURE = "#2b5c8a", "#c1440e"
 SMOOTH, FAINT = "0.15", "0.65"  # greys
 DASHED, DOTTED = (0, (4, 2.5)), (0, (1, 1.5))
 
-#: From so many points on they are not numbered, or not marked.
+#: Largest numbers of points that are numbered, and that are marked.
 MOST_NUMBERS, MOST_DOTS = 12, 60
 
 
 def label(axes: Axes, x: str, y: str) -> None:
-    """Names of the axes, in the size of print."""
+    """Label the axes in the size of print."""
     axes.set_xlabel(x, fontsize=LABEL)
     axes.set_ylabel(y, fontsize=LABEL)
     axes.tick_params(labelsize=TICK)
@@ -44,7 +44,7 @@ def title(axes: Axes, text: str) -> None:
 
 
 def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> Colorbar:
-    """The bar that says what the colours mean, to the right; its name above it or along it."""
+    """The colour bar, added to the right, with its name above it or along it."""
     found = axes.figure.colorbar(mapped, ax=axes, aspect=28, pad=0.02)
     found.ax.tick_params(labelsize=TICK)
     found.ax.yaxis.get_offset_text().set_fontsize(TICK)
@@ -60,7 +60,7 @@ def round_ticks(most: int = 6, *, whole: bool = False) -> MaxNLocator:
 
 
 def few_ticks(axis: Axis) -> None:
-    """At most 6 labelled powers of ten, or where there are too few, 2 and 5 times them too."""
+    """Label at most 6 powers of ten; on a short axis also 2 and 5 times these."""
     low, high = axis.get_view_interval()
     subs = (1.0, 2.0, 5.0) if high / low < 50 else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs, numticks=6))
@@ -108,14 +108,14 @@ def not_proved(scope: str, status: Any) -> str:
 
 
 def shades_of(count: int, low: float = 0.3) -> Array:
-    """(count, 4) colours of curves, the last the darkest; none so light that it is lost."""
+    """(count, 4) colours of curves, darker from first to last, all visible on white."""
     return np.asarray(matplotlib.colormaps[COLOURS](np.linspace(low, 1.0, count)))
 
 
 def mark_points(axes: Axes, x: Array, y: Array, first: int = 1) -> None:
-    """Dots, and their numbers beside them where they are few; those at one place share a label.
+    """Draw dots; if there are few, number them. Dots at one place share a label.
 
-    Each number takes the first of eight sides, upwards first, that keeps off other dots and labels.
+    Each number is on the first of eight sides, from the top, that is free of dots and labels.
     """
     if len(x) <= MOST_DOTS:
         axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
@@ -143,16 +143,16 @@ def mark_points(axes: Axes, x: Array, y: Array, first: int = 1) -> None:
 
 
 def _inches(axes: Axes) -> Array:
-    """About how wide and high axes are, once they are laid out."""
+    """(2,) approximate width and height [inches] of the axes after layout."""
     width, height = axes.get_figure().get_size_inches()  # type: ignore[union-attr]
     place = axes.get_position()
     return np.array([0.75 * place.width * width, 0.75 * place.height * height])
 
 
 def draw_density(axes: Axes, x: Array, y: Array, top: float, label: str) -> None:
-    """How many points lie where, the darker the more, and the median of y along x.
+    """Draw the density of points, darker for more, and the median of y along x.
 
-    top : of y
+    top : upper end of y
     """
     columns = int(np.clip(len(x) / 50, 20, 80))
     rows = int(np.clip(len(x) / 50, 20, 60))
@@ -171,14 +171,14 @@ def draw_density(axes: Axes, x: Array, y: Array, top: float, label: str) -> None
 
 
 def towards_rim() -> Array:
-    """(81,) from -1 to 1, close together at both ends: a semicircle drawn over them is smooth."""
+    """(81,) abscissae from -1 to 1, dense at both ends so that a semicircle looks smooth."""
     return np.sin(np.linspace(-np.pi / 2, np.pi / 2, 81))
 
 
 def abscissae(centres: Array, radii: Array, edge: float) -> Array:
-    """x from -edge to edge, close together at the rims of the discs on y = 0, steep in pressure.
+    """Abscissae from -edge to edge, dense at the rims of discs on y = 0, where pressure is steep.
 
-    centres : (n, 2) [length];  radii : (n,) [length], 0 where there is no disc
+    centres : (n, 2) [length];  radii : (n,) [length], 0 for no disc
     """
     x, y = centres.T
     crossed = np.abs(y) < radii

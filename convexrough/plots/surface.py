@@ -36,16 +36,16 @@ from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowd
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
 
-#: From so many summits on their dots are pixels inside a vector file.
+#: Number of summits above which their dots are pixels inside a vector file.
 MANY = 1000
 
-#: The colour of a summit, bright on every grey.
+#: Colour of summits, bright on every grey.
 SUMMIT = "#ffd24a"
 
-#: Parts of Sz that the axis of a pruning names.
+#: Labelled ticks of the pruning axis, as fractions of Sz.
 PRUNINGS = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5)
 
-#: Marks of what is proved: apart in shape, as colours are not in print.
+#: Marks of proved scopes: they differ in shape for print without colours.
 SCOPES = {"global": ("o", ROUGH), "local": ("s", ROUGH), "none": ("X", UNSURE),
           "failed": ("^", UNSURE)}  # fmt: skip
 
@@ -57,14 +57,14 @@ def surface_figures(
     curve: Provability | None = None,
     contact: Contact | None = None,
 ) -> Figures:
-    """The figures of a surface, by the stem of the file each belongs in.
+    """The figures of a surface, by stems of file names.
 
-    "map"         : heights, summits, and those that touch where they are pressed
-    "histograms"  : of the summits, and where the spectral moments expect them
-    "provability" : contacts, crowding and model error by pruning, where there is a curve
+    "map"         : heights, summits, and the contacts of a pressed surface
+    "histograms"  : histograms of summits, with the curves that spectral moments predict
+    "provability" : contacts, crowding and model error by pruning, if `curve` is given
 
     maxima  : all summits of this surface;  summits : those left by pruning
-    contact : of the summits that are left
+    contact : the contact of the summits left by pruning
     """
     figures = Figures({"map": _map(surface, summits, contact)})
     figures["histograms"] = _histograms(surface, maxima, summits)
@@ -74,7 +74,7 @@ def surface_figures(
 
 
 def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
-    """The map in greys, its axes with their unit."""
+    """The image of the heights in greys, drawn with labelled axes."""
     width, height = surface.size
     whole = (-width / 2, width / 2, -height / 2, height / 2)
     image = axes.imshow(surface.heights, origin="lower", extent=whole, cmap="gray",
@@ -86,14 +86,14 @@ def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
 
 
 def _label_places(axes: Axes, surface: Surface) -> None:
-    """Names of the axes of a map, with the unit that suits the part of it that is shown."""
+    """Label the axes of a map, in a unit that suits its visible part."""
     most = axes.get_xlim()[1]
     label(axes, _count(axes.xaxis, "$x$", surface.unit, most),
           _count(axes.yaxis, "$y$", surface.unit, most))  # fmt: skip
 
 
 def draw_summits(axes: Axes, positions: Array) -> None:
-    """A dot at each summit, smaller where there are many."""
+    """Draw a dot at each summit, smaller if there are many."""
     size = float(np.clip(60.0 / np.sqrt(len(positions) + 1), 0.4, 4.0))
     axes.plot(*positions.T, "o", ms=size, mew=0.0, color=SUMMIT, rasterized=len(positions) > MANY)
 
@@ -101,7 +101,7 @@ def draw_summits(axes: Axes, positions: Array) -> None:
 def draw_provability(axes: Axes, curve: Provability) -> None:
     """Draw how many summits touch against pruning; marks show what is proved."""
     axes.plot(_place(curve.prune), curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
-    # 0 has no place on an axis of logarithms.
+    # A logarithmic axis cannot show 0.
     _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")
     axes.set_yscale("log")
     _name_prunings(axes, curve)
@@ -109,7 +109,7 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
 
 
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
-    """Contacts, crowding and model error by pruning; shaded where they are not to be trusted.
+    """Contacts, crowding and model error by pruning, shaded where they are unreliable.
 
     chosen : the pruning that a dotted line marks
     """
@@ -141,7 +141,7 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
 
 
 def _place(prune: Number) -> Number:
-    """Where a pruning is along its axis: there is room for weak ones, and for 0."""
+    """The abscissa of a pruning: its square root, which spreads small values and shows 0."""
     return np.sqrt(prune)
 
 
@@ -163,7 +163,7 @@ def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str) -> 
 
 
 def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
-    """All of the map; or, where a contact is shown, as much as it needs."""
+    """The figure of the whole map, or of the part with the contacts if there are any."""
     figure = Figure(figsize=(SINGLE + 0.9, 4.1), layout="constrained")
     axes = figure.subplots()
     image = draw_surface(axes, surface)
@@ -188,9 +188,9 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
 
 
 def _draw_contacts(axes: Axes, contact: Contact) -> float:
-    """The contacts, that of the smooth sphere, and the most crowded two; half the width they need.
+    """Half the width of the contacts, drawn with the smooth contact and the most crowded pair.
 
-    Discs are of true size, as long as that can be seen.
+    Discs have their true size, or a smallest visible one.
     """
     points, radii = contact.scene.contact_points, contact.contact_radii
     touching, scale = contact.loads > 0, Scale(contact)
@@ -210,7 +210,7 @@ def _draw_contacts(axes: Axes, contact: Contact) -> float:
 
 
 def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
-    """Heights, tip radii and eccentricities, of all maxima and of those left."""
+    """The histograms of heights, tip radii and eccentricities, of all maxima and of those left."""
     figure = Figure(figsize=(DOUBLE, 2.7), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     moments, level = surface.moments, summits.origin.level
@@ -253,7 +253,7 @@ def _draw_both(axes: Axes, edges: Array, maxima: Array, summits: Array) -> None:
 
 
 def _bins(values: Array) -> Array:
-    """Edges for all of them, and about their one value where they are the same."""
+    """The edges of bins for all values; bins around the value if all are equal."""
     low, high = float(values.min()), float(values.max())
     size = max(abs(low), abs(high)) or 1.0
     room = high - low if high - low > 1e-9 * size else size
@@ -262,7 +262,7 @@ def _bins(values: Array) -> Array:
 
 
 def _count(axis: Axis, name: str, unit: str, size: float) -> str:
-    """The label of an axis of lengths about so large; its ticks are in SI with a prefix."""
+    """The label of an axis for lengths of this size; its ticks are in SI with a prefix."""
     if not unit:
         return name
     length = measure(size, unit)

@@ -1,4 +1,4 @@
-"""The figure of a verdict: the array, with those marked that are not what is claimed."""
+"""The figure of a verdict: the map of asperities, with marks on wrong claims."""
 
 from __future__ import annotations
 
@@ -18,23 +18,22 @@ from convexrough.plots.style import DOUBLE, SINGLE, TICK, UNSURE, legend_below, 
 from convexrough.scene.scene import Scene
 from convexrough.verdict import Verdict
 
-#: Suspects that are numbered, likeliest first.
+#: Number of suspects that are numbered, likeliest first.
 NUMBERED = 5
 
-#: Open; touching or sticking; sliding. They also differ in grey.
+#: Shade of each status, told apart also in grey.
 SHADES = {"open": "0.93", "contact": "0.72", "partial": "0.72", "sliding": "0.45"}
 NAMES = {"partial": "partial slip"}
 
-#: Marks of what is wrong: apart in shape, as colours are not in print.
+#: Marks of wrong claims: they differ in shape for print without colours.
 MARKS = ["o", "X"]
 
 
 def verdict_figures(verdict: Verdict, sheared: ShearVerdict | None = None) -> Figures:
     """The figure of a verdict.
 
-    "verdict" : map of the array, what is proved of each asperity, and those that are not as
-        claimed; with that of the shear forces beside it where there is one. Numbers are those of
-        the likeliest suspects
+    "verdict" : map of the proved statuses, marks on wrongly claimed asperities and indices of the
+        likeliest suspects; a second map for shear forces, if they are claimed
     """
     claims: list[Claim] = [each for each in (verdict, sheared) if each is not None]
     width = SINGLE if len(claims) == 1 else DOUBLE
@@ -45,7 +44,7 @@ def verdict_figures(verdict: Verdict, sheared: ShearVerdict | None = None) -> Fi
 
 
 def draw_claim(axes: Axes, claim: Claim, scene: Scene) -> None:
-    """The map of one claim."""
+    """Draw the map of one claim."""
     status, points = claim.status, scene.asperities.positions
     length = measure(float(np.ptp(points)), scene.units.length)
     size = even_radii(points, np.ones(len(points), dtype=bool))
@@ -77,7 +76,7 @@ def _mark(axes: Axes, points: Array, mark: str, what: str) -> Line2D:
 
 
 def _number(axes: Axes, points: Array, suspects: Indices, length: Measure) -> None:
-    """The indices of the likeliest suspects, beside them."""
+    """Write the index next to each suspect."""
     for i in suspects:
         place: Any = dict(xytext=(5, 5), textcoords="offset points", fontsize=TICK - 1)
         box = dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.8)

@@ -34,7 +34,7 @@ from convexrough.run.values import (
 from convexrough.solvers import SOLVERS
 from convexrough.tabular.units import UnitNames, force_of, known_unit, parsed
 
-#: [Pa] moduli of solids: from gels to diamond, with room.
+#: [Pa] limits of moduli, below those of gels and above that of diamond.
 SOFTEST, HARDEST = 1e3, 1e13
 
 Geometry = Annotated[Literal["summit", "closest"], expected('"summit" or "closest"')]
@@ -117,7 +117,7 @@ class Units(FileTable):
 
     @property
     def names(self) -> UnitNames:
-        """The force is that of the pressure on a square, where only these are named."""
+        """The units; without a unit of force, that of pressure times length squared."""
         pressure, length = (parsed(name) if name else None for name in (self.pressure, self.length))
         made = force_of(pressure, length) if pressure and length else ""
         return UnitNames(self.length.strip(), self.force.strip() or made)
@@ -127,17 +127,17 @@ class Units(FileTable):
             try:
                 known_unit(kind, getattr(self, kind), kind)
             except InputError as error:
-                expects = f"{error.expected}; without [units] no unit is looked at"
+                expects = f"{error.expected}; without [units] no unit is checked"
                 yield kind, f"found {error.found}, expected {expects}"
                 return
         pressure, length, force = map(parsed, (self.pressure, self.length, self.force))
         if pressure and not length:
             yield "length", "missing, needed with pressure"
         elif pressure and length and not (made := force_of(pressure, length)):
-            expects = "one that makes a force with a name"
+            expects = "a unit that gives a named unit of force"
             yield "pressure", f"found {self.pressure}, expected {expects}"
         elif pressure and length and force and force.size != (pressure * length**2).size:
-            makes = f"as {self.pressure} and {self.length} make"
+            makes = f"the force of {self.pressure} and {self.length}"
             yield "force", f"found {self.force}, expected {made}, {makes}"
 
 
@@ -160,7 +160,7 @@ REQUIRED: dict[str, type[FileTable]] = {
 
 
 class Study(FileTable):
-    """All tables of a scene file; those of stages are added to it."""
+    """All tables of a scene file; `_model` adds the tables of stages."""
 
     sphere: Sphere
     material: Annotated[
@@ -212,19 +212,19 @@ class Study(FileTable):
         if not SOFTEST <= (pascals := value * float(unit.size)) <= HARDEST:
             found = f"found {value:g} {unit.name}, which is {pascals:.3g} Pa"
             solid = f"expected {SOFTEST:g} to {HARDEST:g} Pa, as solids have"
-            said = f"[material] {name}: {found}, {solid}; without [units] no unit is looked at"
+            said = f"[material] {name}: {found}, {solid}; without [units] no unit is checked"
             yield "material", said
 
 
 def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:
-    """A list of tip radii, or a base that bends away, says how many asperities there are."""
+    """A mistake if `within` is missing and the file does not limit the number of asperities."""
     if not isinstance(lattice, dict) or lattice.get("pattern") == "file" or "within" in lattice:
         return
     radius = sphere.get("radius") if isinstance(sphere, dict) else None
     if math.inf in (radius if isinstance(radius, list) else [radius]):
         yield (
             "asperities",
-            ("[asperities] within: missing, needed with a flat base or a cylinder, without an end"),
+            ("[asperities] within: missing, needed with a flat base or a cylinder (infinite)"),
         )
     elif (
         isinstance(lattice.get("tip_radius"), list)
@@ -270,7 +270,7 @@ def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list
 
 
 def _said(model: type[Study], error: Any) -> str:
-    """One line; what is said of whole tables names them itself."""
+    """The message of a mistake, on one line; each message names its table."""
     table, *inner = error["loc"]
     if error["type"] == "missing" and not inner:
         keys = ", ".join(REQUIRED[str(table)].model_fields)

@@ -28,10 +28,10 @@ from convexrough.solvers.solution import Solution
 from convexrough.solvers.start import start_indentation
 from convexrough.sphere import hertz
 
-#: Largest number of candidates that are all included in the iteration. It affects speed only.
+#: Number of candidates up to which the iteration includes all. It affects speed only.
 ALL_ITERATED = 1000
 
-#: The residual, over |D0| + max |d_i|, that an answer must reach unless `tolerance` is larger.
+#: Largest residual of a solution, divided by |D0| + max |d_i|, unless `tolerance` is larger.
 ACCURATE = 1e-12
 
 #: Asperities are near the contact if their gap is at most this part of the largest prescribed
@@ -60,9 +60,9 @@ class Newton:
         problem: NormalProblem,
         start: Array | None = None,
     ) -> Solution:
-        """The loads of the candidates in the problem's units, from any start without negatives."""
+        """The loads of the candidates in the problem's units, from any start >= 0."""
         loads, approach, iterations = self._found(problem, start)
-        if self._refines(problem):  # the iteration ended early for this
+        if self._refines(problem):  # the iteration stops early: this step refines
             trial = refined_loads(problem, loads).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
@@ -80,12 +80,12 @@ class Newton:
         iterations = 0
         while True:
             begin = indentation[near]
-            del indentation  # half of the memory of a large scene is vectors
+            del indentation  # to save memory: vectors take half of it
             state, steps = self._iterate(problem, near, begin)
             iterations += steps
             if len(near) == len(problem):
                 return state.forces, state.approach, iterations
-            # The gaps of the asperities that were left out.
+            # The iteration left out some asperities: compute the gaps of all.
             loads, gap = _everywhere(problem, near, state)
             touched = gap < 0
             touched[near] = False
@@ -93,7 +93,7 @@ class Newton:
                 return loads, state.approach, iterations
             indentation = -gap
             indentation[near] = state.unknown
-            touched[near] = True  # none leaves, so that the loop ends
+            touched[near] = True  # `near` only grows, so the loop ends
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
     def _refines(self, problem: NormalProblem) -> bool:
@@ -112,7 +112,7 @@ class Newton:
         stopping = newton.Stopping(ACCURATE, self.tolerance, self.max_iterations)
         try:
             state = law.evaluate(indentation)
-            if self._refines(problem):  # what is left then is linear
+            if self._refines(problem):  # later changes are linear, and refinement makes them
                 stopping = replace(stopping, linear=negligible(indentation))
             return newton.solve(law, state, stopping)
         except SolverError as error:
@@ -134,7 +134,7 @@ def newton_step(problem: NormalProblem, loads: Array) -> Solution:
 
 
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
-    """Indentations to start from: those of the given loads, or `start_indentation`."""
+    """Initial indentations: of the given loads (-1 where 0), or `start_indentation`."""
     if loads is None:
         return start_indentation(problem)
     return np.where(loads > 0, hertz.indentation(loads, problem.coefficients), -1.0)

@@ -17,17 +17,17 @@ from convexrough.errors import ConvexroughError, FileError
 
 Columns = dict[str, list[Any]]
 
-#: Endings of files of arrays.
+#: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
 
-#: What a file that is not what it is named makes our own readers raise besides OSError: what says
-#: so, text with open quotes, and packed text that ends early. Others raise what `foreign` turns.
+#: Errors besides OSError that this package's readers raise for files in another format than their
+#: extension says, with unclosed quotes, or truncated. `foreign` converts errors of other packages.
 SPOILED = (ValueError, csv.Error, EOFError, zlib.error)
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Everything that keeps a file from being read, as a FileError."""
+    """Raise a FileError for every error that keeps a file from being read."""
     try:
         yield
     except ConvexroughError:
@@ -44,11 +44,11 @@ def reading(path: Path) -> Iterator[None]:
 
 @contextmanager
 def foreign() -> Iterator[None]:
-    """Any error that another package raises on a corrupted file, as a ValueError.
+    """Raise a ValueError for any error that another package raises on a corrupted file.
 
-    None of them says what it may raise: numpy, scipy, pyarrow and openpyxl have been seen to raise
-    SyntaxError, KeyError, TypeError, AttributeError, MemoryError, struct.error, TokenError and
-    BadZipFile on files cut short or with one byte changed. Nothing else may be done inside.
+    Their documentation does not list these errors: numpy, scipy, pyarrow and openpyxl have been
+    seen to raise SyntaxError, KeyError, TypeError, AttributeError, MemoryError, struct.error,
+    TokenError and BadZipFile on files cut short or with one byte changed. Only call readers inside.
     """
     try:
         yield
@@ -59,7 +59,7 @@ def foreign() -> Iterator[None]:
 
 
 def needed(path: Path, package: str) -> Any:
-    """A package that reads such files. Raises FileError where it is not installed."""
+    """A package that reads the file. Raises FileError if it is not installed."""
     try:
         return import_module(package)
     except ImportError as error:
@@ -68,7 +68,7 @@ def needed(path: Path, package: str) -> Any:
 
 
 def named_arrays(path: Path) -> dict[str, Any]:
-    """What a file holds by name; under "" where it has none."""
+    """The arrays of a file by name; "" is the name of an unnamed one."""
     if path.suffix.lower() == ".mat":
         return _matlab(path)
     if path.suffix.lower() == ".parquet":
@@ -82,9 +82,9 @@ def named_arrays(path: Path) -> dict[str, Any]:
 
 
 def read_arrays(path: Path, known: Sequence[str]) -> Columns:
-    """Columns by name; by number, from "1", where they have none.
+    """Columns of a file by name; without names by number, from "1".
 
-    known : names that may be wanted, in lower case; of others only those as long as these are kept
+    known : names to read, in lower case; other columns are kept only if of the same length
 
     Raises FileError where the package for such files is missing, OSError, and errors of corrupted
     files.
@@ -106,7 +106,7 @@ def read_arrays(path: Path, known: Sequence[str]) -> Columns:
 
 
 def _table(values: NDArray[Any]) -> Columns:
-    """Columns of a record array, of a matrix, or the one that a vector is."""
+    """Columns of a record array or a matrix, or a vector as one column."""
     if values.dtype.names:
         return {name: np.atleast_1d(values[name]).tolist() for name in values.dtype.names}
     if values.ndim > 2:
@@ -115,8 +115,8 @@ def _table(values: NDArray[Any]) -> Columns:
 
 
 def _matlab(path: Path) -> dict[str, Any]:
-    """The variables of a file, or the fields of the structure that is its only one."""
-    from scipy.io import loadmat  # 0.1 s to import: only when there is such a file
+    """The variables of a file, or the fields of its only variable if that is a structure."""
+    from scipy.io import loadmat  # takes 0.1 s to import
 
     with path.open("rb") as raw:
         if b"\x89HDF" in raw.read(1024):

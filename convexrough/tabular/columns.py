@@ -6,22 +6,22 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-#: A table: a heading, and rows of as many cells.
+#: A table: a heading, and rows with the same number of cells.
 PrintedTable = Sequence[Sequence[Any]]
 
 
 def labelled(lines: Iterable[tuple[str, str]], width: int = 18) -> list[str]:
-    """Lines of a name and a text, the texts below each other."""
+    """Lines with a name and a text; all texts begin in the same column."""
     return [f"{name:<{width}}{text}" for name, text in lines]
 
 
 def aligned(table: PrintedTable, *, left: int = 0, digits: int = 6) -> list[str]:
-    """Lines of a table, numbers to so many digits, the first `left` columns aligned to the left."""
+    """The lines of a table, with aligned columns: the first `left` to the left, others right."""
     return ["  ".join(row).rstrip() for row in _padded(table, left, digits)]
 
 
 def markdown(table: PrintedTable, *, left: int) -> list[str]:
-    """The same as a table in Markdown."""
+    """The lines of a table in Markdown; the first `left` columns are aligned to the left."""
     rows = _padded(table, left, digits=6)
     rule = ["-" * max(3, len(cell)) for cell in rows[0]]
     rule = [each if column < left else f"{each[:-1]}:" for column, each in enumerate(rule)]
@@ -29,7 +29,7 @@ def markdown(table: PrintedTable, *, left: int) -> list[str]:
 
 
 def bound(value: float) -> str:
-    """Two digits, never below the value."""
+    """The value rounded up to two digits, or "unknown"."""
     return f"{float(f'{1.05 * value:.2g}'):g}" if math.isfinite(value) else "unknown"
 
 

@@ -1,4 +1,4 @@
-"""Columns of numbers from files of every kind, in a scene's units, with every mistake's line."""
+"""`read_table`: columns of numbers from a file, in a scene's units; errors quote the line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
 from convexrough.tabular.text import bare, read_text_table, unit
 from convexrough.tabular.units import NAMELESS, Unit, UnitNames, known_unit
 
-#: What numbers of columns measure.
+#: The quantity that each column measures.
 KINDS = {
     **dict.fromkeys(("x", "y", "height", "tip_radius"), "length"),
     **dict.fromkeys(("load", "force"), "force"),
@@ -31,10 +31,10 @@ KINDS = {
 #: Columns of positive numbers.
 POSITIVE = ("tip_radius", "area")
 
-#: Names of columns that number the rows.
+#: Names of columns with row numbers.
 INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "asperity", "")
 
-#: What stands in place of a number that is not known, in small letters.
+#: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
 
 #: Mistakes of one file that are shown; the rest are counted.
@@ -43,10 +43,10 @@ MOST_MISTAKES = 10
 #: Characters of a line that are shown.
 MOST_SHOWN = 60
 
-#: A column that is not read must not be named almost like one that is wanted and is missing.
+#: Similarity of names above which an unread column may be a misspelt one that is missing.
 LOOKS_LIKE = 0.75
 
-#: Relative difference of two factors that are the same.
+#: Relative difference up to which two factors count as equal.
 SAME = 1e-9
 
 
@@ -54,10 +54,10 @@ SAME = 1e-9
 class Reading:
     """How columns are read.
 
-    columns : what they are called in the file;  scales : what their numbers are multiplied by
-    units   : the scene's;  convert : columns whose header names another unit, which is refused else
-    scalable : there is an option --scale, which messages may name
-    alike   : columns that measure the same have one unit, also where the scene names none
+    columns : their names in the file;  scales : factors of their numbers
+    units   : units of the scene;  convert : convert columns in other units, else refuse them
+    scalable : messages may propose the options --scale and --column
+    alike   : columns of one quantity must have one unit, even if the scene names none
     """
 
     columns: Mapping[str, str] = field(default_factory=dict, hash=False)
@@ -72,7 +72,7 @@ AS_IT_IS = Reading()
 
 
 def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> dict[str, str]:
-    """What columns are called, by what they are; either may be said first."""
+    """The name in the file of each known column; a pair may be given in either order."""
     named = {}
     for one, other in given.items():
         name, column = (one, other) if one in known or other not in known else (other, one)
@@ -84,14 +84,14 @@ def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> 
 
 
 class ReadTable(NamedTuple):
-    """Columns of a file by what they are read as, and how it was read.
+    """Columns of a file by their known names, and how the file was read.
 
-    columns : numbers, or text where it was asked for
-    rows    : what each row is called in messages;  lines : its text, "" where there is none
-    units   : of columns whose header names one;  style : how text was read, "" where it was none
-    called  : the header of each column that is read;  others : headers of those that are not
-    factors : what columns were multiplied by, where that is not 1
-    indices : columns of whole numbers with the name of an index
+    columns : numbers, or text for the columns read as text
+    rows    : name of each row in messages;  lines : text of each row, "" in files of arrays
+    units   : units that headers name;  style : how text was split, "" for files of arrays
+    called  : headers of the columns that were read;  others : headers of the other columns
+    factors : factors other than 1 by which columns were multiplied
+    indices : columns of whole numbers with a name in `INDEX`
     """
 
     columns: dict[str, NDArray[Any]]
@@ -110,7 +110,7 @@ class ReadTable(NamedTuple):
 
 
 class _Source(NamedTuple):
-    """Cells of a file, by column; no header: named by number, from 1."""
+    """Cells of a file by column. Without a header, column numbers from 1 are the names."""
 
     header: list[str] | None
     columns: list[Sequence[Any]]
@@ -134,14 +134,14 @@ def read_table(
     unnamed: Sequence[Sequence[str]] = (),
     how: Reading = AS_IT_IS,
 ) -> ReadTable:
-    """Columns of a file with a header; others in it are not looked at.
+    """Named columns of a file. The numbers of other columns are not checked.
 
-    required, optional, text : what is read, the last as text, and only where it is there
-    instead : what is read in place of a required one where the first of these is there
-    also  : other names of columns;  holes : columns in which cells of `HOLES` are nan
-    unnamed : what is meant where there is no header, and as many columns
+    required, optional, text : names of columns; those in `text` are optional and read as text
+    instead : columns that replace a required one if the file has the first of them
+    also  : other names of columns;  holes : columns in which `HOLES` are read as nan
+    unnamed : lists of names for files without a header; the one of matching length is used
 
-    Raises FileError where it cannot be read, and TableError with all that is wrong in it.
+    Raises FileError for unreadable files, and TableError with every mistake in the file.
     """
     wanted = (*required, *optional, *text, *(each for names in instead.values() for each in names))
     with reading(path):
@@ -206,7 +206,7 @@ def read_table(
 def _factors(
     names: Sequence[str], units: Mapping[str, str], how: Reading
 ) -> tuple[dict[str, float], list[str]]:
-    """What columns are multiplied by to be in the scene's units, and what is wrong with these."""
+    """Factors that convert columns to the scene's units, and mistakes in units and factors."""
     factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
     first: dict[str, tuple[str, Unit]] = {}
     for name in names:
@@ -219,7 +219,7 @@ def _factors(
             found = known_unit(place, said, kind)
         except InputError as error:
             if (scene is None and "a unit of" not in str(error.found)) or name in how.scales:
-                continue  # what is in brackets need not be a unit
+                continue  # text in brackets need not be a unit
             taken = f", or {ways[0].format('1')} to take the numbers as they are" if ways else ""
             mistakes.append(f"{error}{taken}")
             continue
@@ -250,7 +250,7 @@ def _factors(
 
 
 def _whole(source: _Source, place: int) -> NDArray[np.intp] | None:
-    """A column of whole numbers that are not negative, and nothing else."""
+    """The column if all its cells are whole numbers >= 0, else None."""
     values = [source.number(cell) for cell in source.columns[place]]
     if all(value is not None and value >= 0 and value == value // 1 < 2**53 for value in values):
         return np.array(values).astype(np.intp)
@@ -258,7 +258,7 @@ def _whole(source: _Source, place: int) -> NDArray[np.intp] | None:
 
 
 def _source(path: Path, known: Sequence[str]) -> _Source:
-    """Everything in a file, by its kind."""
+    """All cells of a file of text or arrays."""
     if path.suffix.lower() in ARRAYS:
         arrays = read_arrays(path, known)
         count = len(next(iter(arrays.values()), []))
@@ -306,7 +306,7 @@ def _places(
     how: Reading,
     unnamed: Sequence[Sequence[str]],
 ) -> tuple[dict[str, int], list[str]]:
-    """The column of each name that is there, and what is wrong with the names."""
+    """The index of each wanted column that the file has, and mistakes in the names."""
     columns = how.columns
     names = source.header
     if names is None:
@@ -341,8 +341,8 @@ def _places(
 
 
 def _lookalikes(source: _Source, places: Mapping[str, int], wanted: Sequence[str]) -> Iterator[str]:
-    """Columns that are not read, and look like one that is wanted and is not there."""
-    from difflib import SequenceMatcher  # only when a column is not there
+    """Mistakes: columns that are not read, with names similar to one that is missing."""
+    from difflib import SequenceMatcher  # only when a column is missing
 
     for i, name in enumerate(source.header or []):
         for each in (each for each in wanted if each not in places and i not in places.values()):
@@ -360,7 +360,7 @@ def _named(source: _Source) -> str:
 def _numbers(
     name: str, cells: Sequence[Any], source: _Source, mistakes: list[str], holes: bool
 ) -> Array:
-    """The cells of a column; what is wrong with them goes to the mistakes."""
+    """The numbers of a column; wrong cells are added to `mistakes`."""
     if (plain := source.numbers(cells)) is not None:
         sizes = np.abs(plain)
         fine = (sizes >= checks.SMALLEST) & (sizes <= checks.LARGEST) | (sizes == 0)
@@ -397,7 +397,7 @@ def _cut(text: str) -> str:
 
 
 def few(mistakes: list[str], most: int = MOST_MISTAKES) -> list[str]:
-    """The first mistakes, and how many there are besides."""
+    """The first mistakes, and the number of the others."""
     if (more := len(mistakes) - most) > 0:
         return [*mistakes[:most], f"and {more:,} more mistakes"]
     return mistakes

@@ -1,8 +1,8 @@
-"""Text of numbers as people have it: separators, decimal commas, comments, titles, encodings.
+"""Tables in text files, with any separator, decimal commas, comments, titles and encodings.
 
-Readers that do this exist. Those that are light (csv.Sniffer, numpy.loadtxt) know neither decimal
-commas nor D exponents; those that are not (pandas, polars) stop at the first mistake and do not
-show its line. So the standard library splits the lines, and what is here chooses how.
+Light readers (csv.Sniffer, numpy.loadtxt) support neither decimal commas nor D exponents; larger
+ones (pandas, polars) stop at the first mistake and do not show its line. So this module chooses
+the style, and the standard library splits the lines.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from convexrough.errors import FileError
 from convexrough.tabular.arrays import foreign, needed
 from convexrough.tabular.units import parsed
 
-#: Characters of a line; a longer one is no table.
+#: Largest number of characters of a line.
 LONGEST = 2**24
 
-#: Characters of a number, and of a column's name with its unit; longer ones are neither.
+#: Largest numbers of characters of a number, and of a column's name with its unit.
 LONGEST_NUMBER, LONGEST_NAME = 400, 400
 
-#: Endings of Excel's workbooks.
+#: Extensions of Excel workbooks.
 WORKBOOKS = (".xlsx", ".xlsm")
 
-#: Lines from which separator and decimal mark are chosen.
+#: Number of lines from which separator and decimal mark are chosen.
 SAMPLE = 200
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
 _SURROGATE = re.compile("[\udc80-\udcff]")
 _WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])]|\s/\s*(?P<per>\S+))")
 _UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
-#: A line between parts of a listing.
+#: A rule between parts of a listing.
 _RULE = re.compile(r"[-=*_]{3,}(\s+[-=*_]{3,})*")
 _BINARY = {
     b"PK\x03\x04": "an archive or an Excel workbook; name it .xlsx",
@@ -52,7 +52,7 @@ _BINARY = {
 
 
 class Style(NamedTuple):
-    """How the cells of a line are told apart, and how their decimals are."""
+    """The separator of cells and the decimal mark."""
 
     separator: str
     decimal: str
@@ -63,7 +63,7 @@ class Style(NamedTuple):
         return f"separated by {names.get(self.separator, repr(self.separator))}{comma}"
 
     def split(self, line: str) -> list[str]:
-        """The cells of a line. Raises csv.Error for quotes that do not end."""
+        """The cells of a line. Raises csv.Error for unclosed quotes."""
         if '"' not in line:  # three times as fast
             return _split(line, self.separator)
         if self.separator == " ":
@@ -72,7 +72,7 @@ class Style(NamedTuple):
         return [cell.strip() for cell in next(reader, [])]
 
     def number(self, cell: str) -> float | None:
-        """What a cell says, with E or Fortran's D exponent; None where that is no number."""
+        """The number in a cell, with E or Fortran's D exponent; None if it is not a number."""
         if len(cell) > LONGEST_NUMBER:
             return None
         text = cell.replace("\N{MINUS SIGN}", "-")
@@ -84,7 +84,7 @@ class Style(NamedTuple):
         return float(text) if text.lower().lstrip("+-") in ("nan", "inf", "infinity") else None
 
     def numbers(self, cells: Sequence[str]) -> Array | None:
-        """What cells say where all are plain numbers, at once; else None."""
+        """The numbers in cells, converted at once if all are plain numbers; else None."""
         joined = "\n".join(cells)
         if "_" in joined or (self.decimal == "," and "." in joined):
             return None
@@ -94,7 +94,7 @@ class Style(NamedTuple):
             return None
 
 
-#: In the order in which they are preferred where several would do.
+#: Styles in order of preference, for files that allow several.
 STYLES = [Style(*pair) for pair in (",.", ";.", ";,", "\t.", "\t,", " .", " ,")]
 
 
@@ -105,7 +105,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 class TextRow(NamedTuple):
-    """A line of a file: its number there, its text, and its cells; `wrong` if it has none."""
+    """A line of a file: its number, text and cells; `wrong` is the error if it cannot be split."""
 
     number: int
     text: str
@@ -114,7 +114,7 @@ class TextRow(NamedTuple):
 
 
 class TextTable(NamedTuple):
-    """The rows of a file below its header, which is None where it has none."""
+    """The header of a file, or None, and the rows below it."""
 
     header: list[str] | None
     rows: list[TextRow]
@@ -128,7 +128,7 @@ def bare(name: str) -> str:
 
 
 def unit(name: str) -> str:
-    """The unit that the name of a column has in brackets or after a slash, or ""."""
+    """The unit in the name of a column, in brackets or after a slash; else ""."""
     found = _with_unit(name)
     return (found["unit"] or found["per"] or "").strip() if found else ""
 
@@ -138,9 +138,9 @@ def _with_unit(name: str) -> re.Match[str] | None:
 
 
 def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
-    """The cells of a text file or workbook. Raises FileError where it is empty, or neither.
+    """The cells of a text file or workbook. FileError if it is empty or another file.
 
-    known : names of columns by which a header is known among titles, or in a comment above
+    known : names of columns that tell the header from titles and comments
     """
     lines: list[tuple[int, str]] = []
     comment, separator = "", "\t" if path.suffix.lower() in WORKBOOKS else ""
@@ -166,7 +166,7 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
 def _headed(
     rows: list[TextRow], comment: str, style: Style, known: Sequence[str]
 ) -> tuple[list[str] | None, list[TextRow]]:
-    """The names of columns, with the units of a line below them, and the rows below."""
+    """The names of columns, with units from the line below them, and the rows below."""
 
     def wanted(names: list[str]) -> int:
         return sum(bare(name).lower() in known for name in names)
@@ -195,9 +195,9 @@ def _headed(
 def _listed(
     header: list[str], line: TextRow, rows: list[TextRow], style: Style
 ) -> tuple[list[str], list[TextRow]]:
-    """A listing of a finite-element code: its header is `line`, which further pages repeat.
+    """The header and rows of a finite-element listing; `line`, its header, repeats on each page.
 
-    Where there are more names than numbers below, two spaces tell names apart. Titles, which are
+    If there are more names than numbers below, two spaces separate names. Titles, which are
     left out, stand directly below the first header or above another one; they begin with no number
     and have another number of cells.
     """
@@ -220,7 +220,7 @@ def _listed(
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, str]]:
-    """Lines with their numbers, unpacked. Bytes that are not UTF-8 are taken for Latin-1."""
+    """Numbered lines of a file, unzipped. Bytes that are not UTF-8 are read as Latin-1."""
     with path.open("rb") as packed:
         is_packed = packed.peek(2)[:2] == b"\x1f\x8b"
         raw: Any = BufferedReader(GzipFile(fileobj=packed)) if is_packed else packed
@@ -239,7 +239,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _workbook(path: Path, known: Sequence[str]) -> Iterator[tuple[int, str]]:
-    """Rows of the first sheet with a wanted column, or else of the first; cells between tabs."""
+    """Numbered rows, with tabs, of the first sheet with a known column, else of the first sheet."""
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
@@ -259,7 +259,7 @@ def _workbook(path: Path, known: Sequence[str]) -> Iterator[tuple[int, str]]:
 
 
 def _plain(cell: str) -> str:
-    """On one line, without quotes."""
+    """The text of a cell on one line, without quotes."""
     return " ".join(cell.replace('"', "").split())
 
 
@@ -278,7 +278,7 @@ def _encoding(path: Path, raw: BufferedReader[Any]) -> str:
 
 
 def sniff(lines: Sequence[str], styles: Sequence[Style]) -> Style:
-    """The style in which most lines have equally many cells, and most of these are numbers."""
+    """The style in which most lines have the same number of cells and most cells are numbers."""
 
     def score(style: Style) -> float:
         rows = [_row(0, line, style) for line in lines]
@@ -301,7 +301,7 @@ def _row(number: int, text: str, style: Style) -> TextRow:
 
 
 def _header(text: str, style: Style) -> list[str]:
-    """Names of columns; a unit after a space stays with its name."""
+    """Names of columns, each with its unit even after a space."""
     row = _row(0, _UNIT_APART.sub("", text) if style.separator == " " else text, style)
     return row.cells or [text]
 
@@ -311,7 +311,7 @@ def _numeric(cells: Sequence[str], style: Style) -> bool:
 
 
 def stripped(cells: list[str]) -> list[str]:
-    """Without the empty cells that separators at the end of a line make."""
+    """The cells without empty ones at the end, which come from trailing separators."""
     end = len(cells)
     while end and not cells[end - 1]:
         end -= 1
@@ -321,7 +321,7 @@ def stripped(cells: list[str]) -> list[str]:
 def _trimmed(
     header: list[str] | None, rows: list[TextRow], style: Style
 ) -> tuple[list[str] | None, list[TextRow]]:
-    """Without separators at the ends of lines, and with a name for the row names that R writes."""
+    """Header and rows without trailing empty cells. Row names of R get an empty name."""
     if header is None:
         width = max((len(stripped(row.cells)) for row in rows), default=0)
     else:

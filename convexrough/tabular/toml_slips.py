@@ -1,4 +1,4 @@
-"""What is probably meant where a scene file is no TOML: a decimal comma, a unit, missing quotes."""
+"""Corrections of common TOML mistakes: a decimal comma, a unit, missing quotes."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import tomllib
 from collections.abc import Callable
 from typing import NamedTuple
 
-#: Slips of one file that are explained.
+#: Largest number of mistakes of one file that are explained.
 MOST_SLIPS = 10
 
-#: Characters of a line that are shown.
+#: Largest number of characters of a line that are shown.
 MOST_SHOWN = 60
 
 _KEY = r"(?P<key>\s*[A-Za-z0-9_.-]+\s*)"
@@ -18,7 +18,7 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
 
 class _Slip(NamedTuple):
-    """A wrong line, what to write instead, and why."""
+    """A kind of wrong line, its correction, and the reason."""
 
     pattern: re.Pattern[str]
     meant: Callable[[re.Match[str]], str]
@@ -30,7 +30,7 @@ def _slip(pattern: str, meant: Callable[[re.Match[str]], str], why: str) -> _Sli
 
 
 def _number(text: str) -> str:
-    """As TOML has it: digits on both sides of the point."""
+    """The number in TOML, with digits on both sides of the point."""
     text = re.sub(r"(?<!\d)\.(?=\d)", "0.", text)
     return re.sub(r"(?<=\d)\.(?!\d)", ".0", text)
 
@@ -77,9 +77,9 @@ _SLIPS = [
 
 
 def explained(path: object, text: str, error: Exception) -> str:
-    """A sentence for each slip: place, line and correction; the last one may be without correction.
+    """A line for each mistake: place, text and correction, if it is known.
 
-    Each slip is corrected to find the next.
+    Each mistake is corrected to find the next one.
     """
     lines = text.split("\n")
     found: list[str] = []
@@ -106,7 +106,7 @@ def explained(path: object, text: str, error: Exception) -> str:
 
 
 def _corrected(line: str) -> tuple[str, str] | None:
-    """What is meant by a line, and why; None where that is not known."""
+    """The correction of a line and the reason; None if it is not known."""
     for pattern, meant, why in _SLIPS:
         if found := pattern.fullmatch(line):
             try:

@@ -1,4 +1,4 @@
-"""Names of units: what they measure, and how large they are. Exact, as fractions of SI."""
+"""Units by name: their dimension and their exact size in SI units."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from convexrough.errors import InputError
 
 
 class Unit(NamedTuple):
-    """size : in SI;  length, force : the powers of these that it has;  name : as it is shown"""
+    """A unit: its size in SI units, its powers of length and force, and the name to show."""
 
     size: Fraction
     length: int
@@ -20,7 +20,7 @@ class Unit(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """What it measures, "" where no column has that."""
+        """The quantity it measures, or "" if no column has it."""
         return KINDS.get((self.length, self.force), "")
 
     def __mul__(self, other: Unit) -> Unit:  # type: ignore[override]
@@ -30,7 +30,7 @@ class Unit(NamedTuple):
         return Unit(self.size**power, power * self.length, power * self.force)
 
     def into(self, other: Unit) -> float:
-        """What a number of this unit is multiplied by to be of the other; rounded once."""
+        """The factor from this unit to the other, rounded once."""
         return float(self.size / other.size)
 
 
@@ -39,7 +39,7 @@ KINDS = {(1, 0): "length", (2, 0): "area", (0, 1): "force", (-2, 1): "pressure"}
 _PREFIXES = {"G": 9, "M": 6, "k": 3, "": 0, "c": -2, "m": -3, "µ": -6, "n": -9, "p": -12}
 _ONE = Unit(Fraction(1), 0, 0)
 
-#: By name, as shown: those with prefixes, then the others.
+#: Units by name: those with prefixes, then the others.
 UNITS = {
     f"{prefix}{symbol}": Unit(Fraction(10) ** power, *powers, f"{prefix}{symbol}")
     for symbol, powers in (("m", (1, 0)), ("N", (0, 1)), ("Pa", (-2, 1)))
@@ -53,14 +53,14 @@ UNITS = {
     )
 }
 
-#: Other names of units; u for µ is understood.
+#: Other names of units; u is also read as µ.
 _ALSO = {"A": "Å", "Angstrom": "Å", "micron": "µm", "microns": "µm", "kp": "kgf"}
 _FACTOR = re.compile(r"(.*?)(?:\^|\*\*)?([+-]?\d)?")
 _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 
 
 def parsed(name: str) -> Unit | None:
-    """The unit of a name such as µm, N/mm² or kPa; None where it is none."""
+    """The unit with a name such as µm, N/mm² or kPa; None if unknown."""
     if len(name) > 40:
         return None
     upper, *under = name.strip().translate(_POWERS).split("/")
@@ -79,7 +79,7 @@ def parsed(name: str) -> Unit | None:
 
 
 def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:
-    """The unit of a kind by any of its names; None for none said. Raises InputError."""
+    """The unit of a kind by any of its names; None for an empty name. Raises InputError."""
     if not name.strip():
         return None
     expected, unit = f"a unit of {kind}", parsed(name)
@@ -93,7 +93,7 @@ def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> U
 
 
 def one_unit(what: str, given: str | None, found: str) -> Unit | None:
-    """The unit of length that the caller gives or the file names; never two."""
+    """The unit of length from the caller or the file. Raises InputError if they differ."""
     said, there = known_unit(what, given or ""), known_unit(what, found)
     if said and there and said.size != there.size:
         expected = f"{there.name}, as the file says, or none given"
@@ -109,7 +109,7 @@ class UnitNames(NamedTuple):
 
     @classmethod
     def of(cls, names: object) -> UnitNames:
-        """These names, checked. Raises InputError."""
+        """The given names after a check. Raises InputError."""
         if not isinstance(names, tuple) or len(names) != 2:
             raise InputError("units", found=repr(names), expected='two names, as ("mm", "N")')
         for kind, name in zip(cls._fields, names, strict=True):
@@ -145,7 +145,7 @@ NAMELESS = UnitNames()
 
 
 def force_of(pressure: Unit, length: Unit) -> str:
-    """The name of the force that a pressure on a square makes, as mN of GPa and µm; "" for none."""
+    """The unit of force that is pressure times length^2, as mN for GPa and µm; "" if unnamed."""
     made = pressure * length**2
     names = [name for name, unit in UNITS.items() if unit[:3] == made[:3]]
     return names[0] if names else ""

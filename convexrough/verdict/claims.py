@@ -25,14 +25,14 @@ from convexrough.verdict.verdict import NOISE, rounded_up
 #: five digits are enough, and every asperity still has one nearest row.
 POSITION_TOLERANCE = 1e-2
 
-#: Asperities at which a shift is tried, where rows are missing.
+#: Largest number of shifts that are tried if rows are missing.
 MOST_TRIED = 1000
 
-#: The median distance of nodes with a load from their asperities, over the distance of these, is
-#: smaller; of points anywhere it is about 0.4.
+#: Upper limit of the median distance of loaded nodes from their asperities, over the spacing. For
+#: random points this is about 0.4.
 BY_CHANCE = 0.25
 
-#: Names of columns that can only number asperities.
+#: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
 
 
@@ -42,8 +42,8 @@ class Manner(Reading):
 
     sign      : -1 where compression is negative;  floor : [force] loads up to this are noise
     tolerance : [length] largest error of a position; default: 1 % of the smallest spacing
-    missing_open : asperities without a row are open
-    nodes     : rows are nodes or pixels, which add up at their nearest asperity
+    missing_open : true if asperities without a row are open
+    nodes     : true if rows are nodes or pixels, summed at the nearest asperity
     """
 
     sign: int = 1
@@ -62,8 +62,8 @@ class Manner(Reading):
 class Claimed(NamedTuple):
     """Forces in the order of the scene's asperities.
 
-    status : (n,) what the file calls them, where it does
-    note   : how they were read, on a line;  explained : column by column
+    status : (n,) the statuses in the file, None without them
+    note   : how the file was read, on one line;  explained : how each column was read
     """
 
     values: Array
@@ -73,10 +73,10 @@ class Claimed(NamedTuple):
 
 
 def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
-    """Loads [force] from a file; negative ones only as far as noise up to the floor.
+    """Loads [force] from a file; noise up to the floor may be negative.
 
-    Rows with positions are matched by them, then by an index; others are in the scene's order. A
-    column pressure, with an area or on a regular grid, is summed at the nearest asperities.
+    Rows are matched by positions, else by an index, else by the scene's order. A column pressure,
+    with areas or on a regular grid, is integrated over the points nearest to each asperity.
 
     Raises TableError with every mistake, and FileError.
     """
@@ -84,7 +84,7 @@ def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
 
 
 def read_shear_forces(path: Path, scene: Scene, how: Manner) -> Claimed:
-    """The same for shear forces: a column force, and status where there is one."""
+    """Shear forces [force] from a file: its column force, and statuses if it has them."""
     return _read(path, scene, "force", how, np.inf)
 
 
@@ -129,7 +129,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
 
 
 def _negative(loads: Array, floor: float, mistake: Callable[[int, str], str]) -> Iterator[str]:
-    """Loads below what noise may be; `mistake` says where one is."""
+    """A message for each load below -floor; `mistake` adds its place."""
     if not len(bad := np.flatnonzero(loads < -floor)):
         return
     hint, largest, least = "", float(loads.max()), -float(loads[bad].min())
@@ -174,7 +174,7 @@ def _explained(table: ReadTable) -> Iterator[str]:
 
 
 def _unused_positions(others: Sequence[str]) -> Iterator[str]:
-    """Columns that look like positions, under names that are not theirs."""
+    """A message if unread columns have names similar to x and y."""
     found = {it[0].lower(): it for it in others if re.fullmatch(r"[xyXY][ _.(\[].*", it)}
     if len(found) == 2:
         x, y = found["x"], found["y"]
@@ -182,7 +182,7 @@ def _unused_positions(others: Sequence[str]) -> Iterator[str]:
 
 
 class _Placing:
-    """Which asperity each row of a table belongs to, how that was found, and what is wrong."""
+    """The asperity of each row of a table, how it was found, and mistakes."""
 
     def __init__(self, scene: Scene, table: ReadTable, manner: Manner) -> None:
         self.scene, self.table, self.manner = scene, table, manner
@@ -222,7 +222,7 @@ class _Placing:
         loaded = self.points[values != 0]
 
         def fits(points: Array) -> bool:
-            """Near asperities, more than one, nearer than by chance."""
+            """True if near to more than one asperity, and nearer than random points."""
             near, their = _nearest(self.scene.contact_points, points)
             parts = near / apart[their]
             return bool(parts.max() <= 1 and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
@@ -242,11 +242,11 @@ class _Placing:
         self.mistakes.append(self.table.mistake(int(row), f": found {found}, expected {expected}"))
 
     def _numbered(self, name: str, index: NDArray[np.intp]) -> Indices | None:
-        """The asperities that a column numbers from 0 or from 1; None where it does not."""
+        """The indices of asperities in a column that counts from 0 or 1; else None."""
         count, least, most = len(self.scene), int(index.min()), int(index.max())
         values, times = np.unique(index, return_counts=True)
         sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.manner.missing_open)
-        # Numbers of nodes in order are of no use, and do no harm; in another order they say it.
+        # Rising numbers may be of nodes and are ignored; in another order they are indices.
         sure |= bool(name) and times.max() == 1 and bool((np.diff(index) < 0).any())
         wrong = ""
         if times.max() > 1:
@@ -264,7 +264,7 @@ class _Placing:
         return None
 
     def _matched(self, points: Array) -> Indices:
-        """The asperity at each point; each must be there once."""
+        """The asperity at each point; no asperity may occur twice."""
         positions = self.scene.asperities.positions
         spacing = float(self.scene.asperities.tip_radii[0])
         if len(positions) > 1:
@@ -297,7 +297,7 @@ class _Placing:
         return owners
 
     def _moved(self, points: Array, fits: Callable[[Array], bool]) -> str:
-        """What was done to all points, where undoing it makes them fit."""
+        """The exchange, sign or unit of x and y whose correction makes all points fit; else ""."""
         x, y = (bare(self.table.called[name]) for name in ("x", "y"))
         exchange = f"--column x={y} --column y={x}"
         if fits(points[:, ::-1]):
@@ -313,7 +313,7 @@ class _Placing:
         return ""
 
     def _shifted(self, points: Array, allowed: float, fits: Callable[[Array], bool]) -> str:
-        """By how much all points are shifted, where undoing it makes them fit."""
+        """The shift whose correction makes all points fit; else ""."""
         positions = self.scene.asperities.positions
         tried: Sequence[Any] = positions[:MOST_TRIED] - points[0]
         if len(points) == len(positions):
@@ -336,7 +336,7 @@ def _too_far_out(power: int) -> str:
 
 
 def _nearest(positions: Array, points: Array) -> tuple[Array, Indices]:
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when rows have positions
+    from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     distances, owners = cKDTree(positions).query(points)
     return np.asarray(distances), np.asarray(owners)

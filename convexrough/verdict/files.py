@@ -1,4 +1,4 @@
-"""`verify` on files: read the claims, and compare them with the proof."""
+"""`verify_files`: read claims from files, and compare them with the proof."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from convexrough.verdict.claims import Claimed, Manner, read_loads, read_shear_f
 from convexrough.verdict.report import Verified
 from convexrough.verdict.verdict import verify_on
 
-#: What a file may call an asperity under shear. "undecided" claims nothing: then the force does.
+#: Statuses in a file of shear forces. With "undecided" the force implies the claim.
 STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
 
 
@@ -29,10 +29,10 @@ def verify_files(
     shear: Path | None = None,
     force: float | None = None,
 ) -> Verified:
-    """Judge the claims of files. Errors of reading and judging them name the file.
+    """The verdicts on the claims of files. Errors name the file.
 
-    within : parts of the largest load, or shear force
-    shear, force : a file of shear forces and what they carry [force]; both or neither
+    within : largest error, as a fraction of the largest load or shear force
+    shear, force : a file of shear forces and their total [force]; both or neither
     """
     if within is not None:
         checks.positive("--within", within)
@@ -51,7 +51,7 @@ def verify_files(
 
 
 def _claimed_to_slide(path: Path, forces: Claimed, contact: Contact) -> NDArray[np.bool_] | None:
-    """(n,) true where the file says sliding; None where it has no statuses."""
+    """(n,) true where the file claims sliding; None if it has no statuses."""
     if forces.status is None:
         return None
     said = np.char.lower(np.char.strip(forces.status))

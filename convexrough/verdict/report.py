@@ -1,4 +1,4 @@
-"""What `verify` and failed assertions say of a claim: for people, for programs, and in files."""
+"""Reports of `verify` and of failed assertions: text, JSON, tables and JUnit files."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import aligned, bound, labelled
 from convexrough.verdict.verdict import Verdict
 
-#: From this part on errors are said in per cent.
+#: Relative error from which errors are printed in per cent.
 PERCENT = 1e-4
 
-#: Asperities that a list on the terminal names before it says how many more there are.
+#: Largest number of asperities in a list on the terminal; it counts the others.
 MOST_LISTED = 10
 
 
 class Verified(NamedTuple):
-    """The verdicts on the claims of files; `notes` say how these were read.
+    """The verdicts on the claims of files; `notes` say how the files were read.
 
-    sheared : on shear forces, None without these
+    sheared : verdict on shear forces, or None
     """
 
     verdict: Verdict
@@ -49,7 +49,7 @@ class Verified(NamedTuple):
 
 
 def verdict_summary(found: Verified) -> dict[str, Any]:
-    """What `--json` prints of the claims, in the scene's units."""
+    """The data of the claims that `--json` prints, in the scene's units."""
     summary: dict[str, Any] = {"verdict": _claim_summary(found.verdict)}
     if found.sheared is not None:
         summary["shear_verdict"] = _claim_summary(found.sheared)
@@ -64,7 +64,7 @@ def _claim_summary(claim: Claim) -> dict[str, Any]:
 
 
 def asperity_columns(found: Verified) -> dict[str, NDArray[Any]]:
-    """One row per asperity: what is claimed of it and what is proved."""
+    """Columns with one row per asperity: its claimed and proved values."""
     x, y = found.verdict.scene.asperities.positions.T
     columns = {"index": np.arange(len(x)), "x": x, "y": y, **_columns(found.verdict)}
     if found.sheared is not None:
@@ -117,7 +117,7 @@ def _size(claim: Claim) -> str:
 
 
 def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
-    """Aligned lines of one claim; `others` says where those are that a table leaves out."""
+    """Aligned lines of one claim; `others` says where to find the rows that a table leaves out."""
 
     def table(which: Indices) -> list[str]:
         lines = _table(claim, scene, which[:MOST_LISTED])
@@ -142,7 +142,7 @@ def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
 
 
 def reason(claim: Claim) -> str:
-    """One line: what keeps a claim from holding; "" where it does."""
+    """One line: the reasons why a claim does not hold; "" if it holds."""
     counts = {"wrongly claimed": len(claim.wrongly_claimed), "undecided": len(claim.undecided)}
     counts[f"{claim.one}s off"] = len(claim.off)
     parts = [f"{count:,} {what}" for what, count in counts.items() if count]
@@ -154,7 +154,7 @@ def reason(claim: Claim) -> str:
 
 
 def junit(found: Verified | ConvexroughError) -> bytes:
-    """The findings as a suite of JUnit's, a case for each question; or the error in their place."""
+    """A JUnit test suite with a case for each check; or with the error in place of the cases."""
     suite = ElementTree.Element("testsuite", name="convexrough verify")
     if isinstance(found, Verified):
         kind, cases = "failure", list(_cases(found))
@@ -195,7 +195,7 @@ def _named(scene: Scene, which: Indices) -> str:
 
 
 def _table(claim: Claim, scene: Scene, which: Indices) -> list[str]:
-    """A row for each of these asperities; none of none."""
+    """The lines of a table of asperities; empty if there are none."""
     if len(which) == 0:
         return []
     length, force = scene.units

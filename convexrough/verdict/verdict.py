@@ -30,13 +30,13 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
 from convexrough.scene.scene import Scene
 
-#: A load so small beside the largest is taken for noise, in hints only.
+#: Fraction of the largest load up to which hints call a load noise.
 NOISE = 1e-6
 
-#: Distances, over the size of the array, that count as 0; the error that a correction may leave.
+#: `_moved`: distances relative to the array that count as 0; fraction of the error that may remain.
 SAME_PLACE, CORRECTED = 1e-9, 1e-3
 
-#: How a force is called that is 10 to this power too large.
+#: Prefix of the unit in which loads too large by this power of ten were given.
 PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
 
@@ -45,10 +45,10 @@ class Verdict(Claim, Table, Plottable):
     """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
 
     loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"
-    within      : largest error allowed, as a fraction of the largest load; None: as accurate as
-        needed to prove every status from the loads alone
+    within      : largest error allowed, as a fraction of the largest load; None: the errors must
+        only be small enough to prove every status from the loads alone
     total_prescribed : [force] None under a prescribed approach
-    certificate : of the loads as given, those up to the floor counted as 0
+    certificate : certificate of the given loads, with 0 for loads up to the floor
     solution    : the solution that Newton's method finds from them, with its own certificate; None
         where it is not needed or not found
 
@@ -103,7 +103,7 @@ class Verdict(Claim, Table, Plottable):
         return frozen(self.certificate.load_errors + ignored)
 
     def nearby(self) -> tuple[Array, Array] | None:
-        """The solution's loads and bounds."""
+        """The solution's loads and error bounds; None without a solution."""
         found = self.solution
         return None if found is None else (found.loads, found.certificate.load_errors)
 
@@ -127,8 +127,8 @@ class Verdict(Claim, Table, Plottable):
             yield f"the loads are right with {moved}"
 
     def _moved(self, true: Array) -> str:
-        """What exchange of asperities, that leaves the array as it is, makes the loads right."""
-        from scipy.spatial import cKDTree  # 0.1 s to import: only when loads are wrong
+        """A symmetry of the array (exchanged axes or signs) that corrects the loads; "" if none."""
+        from scipy.spatial import cKDTree  # takes 0.1 s to import
 
         points = self.scene.asperities.positions
         tree, size = cKDTree(points), float(np.abs(points).max())
@@ -155,7 +155,7 @@ def rounded_up(value: float) -> str:
 
 
 def power_of_ten(ratio: float) -> int:
-    """The power of ten that a ratio is to 1 %; 0 where it is none."""
+    """The power of ten that the ratio equals to 1 %; 0 if none."""
     if not (ratio > 0 and math.isfinite(ratio)):
         return 0
     exact = math.log10(ratio)
@@ -207,9 +207,9 @@ def verify_on(
     given = checks.array("loads", loads, length=len(problem.scene))
     if (given < -floor).any():
         first = int(np.argmax(given < -floor))
-        expected = "a load that is not negative; a floor lets noise up to its size count as 0"
+        expected = "a load that is not negative; a floor lets noise below it count as 0"
         if given.max() <= floor:
-            expected = "compression to be positive; no load is: do they have the other sign?"
+            expected = "compression to be positive; no load is positive: is the sign reversed?"
         raise InputError(f"loads[{first}]", found=given[first], expected=expected)
     claimed = np.where(given > floor, given, 0.0)
     total = None if problem.load is None else problem.load * problem.units.force
@@ -217,7 +217,7 @@ def verify_on(
     verdict = Verdict(problem.scene, given, floor, within, total, certificate)
     if verdict.holds:
         return verdict
-    for start in (claimed, None):  # from inaccurate loads it may not converge
+    for start in (claimed, None):  # Newton's method may diverge from inaccurate loads
         try:
             return replace(verdict, solution=solve(problem, start=start))
         except SolverError:

@@ -506,7 +506,7 @@ def test_units_that_differ_where_the_scene_names_none(tmp_path: Path, case: Case
         (
             "youngs_modulus = 210",
             'length = "um"\nforce = "N"\npressure = "GPa"',
-            "found N, expected mN, as GPa and um make",
+            "found N, expected mN, the force of GPa and um",
         ),
         (STEEL, 'length = "MM"\nforce = "N"', 'expected a unit of length; did you mean "mm"?'),
         (STEEL, 'length = "N"', "length: found N, a unit of force, expected a unit of length"),
