@@ -256,7 +256,7 @@ def test_verify_is_not_fooled(name: str) -> None:
         added[nearest] = 1e-30 * loads.max()
         tries.append(added)
     if case.load is not None and len(np.flatnonzero(loads)) == 1:
-        with pytest.raises(cr.InputError, match="expected a load on some asperity"):
+        with pytest.raises(cr.InputError, match="expected a positive load on an asperity"):
             cr.verify(case.scene, tries.pop(0), **case.control)
     for wrong in tries:
         verdict = cr.verify(case.scene, wrong, **case.control)
