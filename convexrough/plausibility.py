@@ -37,6 +37,7 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : largest mean pressure; the material's hardness or None
         [force / length^2]
+    contact_modulus : [force / length^2]
     beyond_hardness : number of asperities whose mean pressure exceeds the hardness
     mismatch     : Dundurs' beta of two bodies, which the model neglects
     """
@@ -56,6 +57,7 @@ def limits_of(contact: Contact) -> dict[str, Any]:
         "mean_pressure": float(contact.mean_pressures.max()),
         "hardness": hardness,
         "mismatch": scene.material.mismatch,
+        "contact_modulus": scene.material.contact_modulus,
         "beyond_hardness": int((contact.mean_pressures > (hardness or np.inf)).sum()),
     }
 
@@ -66,7 +68,14 @@ def warnings_of(contact: Contact) -> Iterator[str]:
         yield "not certified: nothing is proved about these loads"
     elif undecided := int((contact.status == "undecided").sum()):
         yield f"not certified: undecided asperities: {undecided}"
-    yield from doubts(limits_of(contact))
+    yield from cautions(limits_of(contact), contact.scene.units)
+
+
+def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
+    """Warnings about the limits of the model, which the certificate does not cover."""
+    yield from unlikely_modulus(normal["contact_modulus"], units)
+    named = units.force and units.length
+    yield from doubts(normal, f"{units.force}/{units.length}²" if named else "")
 
 
 def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
