@@ -87,8 +87,8 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
         )
     if normal["extent"] > STEEP:
         yield (
-            f"contact extends to {normal['extent']:.3g} of the base's radius from the axis: the "
-            f"paraboloid of the model differs from a sphere by 1 % at {STEEP:g}"
+            f"contact extends to {normal['extent']:.3g} of the base's radius from the axis: from "
+            f"{STEEP:g} on, the paraboloid of the model differs from a sphere by more than 1 %"
         )
     if normal["contact"] >= ARRAY and (normal["array_extent"] or 1.0) < CUT_OFF:
         yield (
@@ -98,8 +98,8 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
         )
     if normal["steepness"] > STEEP:
         yield (
-            f"contact radius is {normal['steepness']:.3g} of the tip radius: the paraboloid of the "
-            f"model differs from a sphere by 1 % at {STEEP:g}"
+            f"contact radius is {normal['steepness']:.3g} of the tip radius: from {STEEP:g} on, "
+            "the paraboloid of the model differs from a sphere by more than 1 %"
         )
     if normal["crowding"] > 1:
         yield (

@@ -234,7 +234,7 @@ def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any) -> None:
     asked = ("summits", "scan.npz", "--radius", "1e4", "--approach", "-100", "--no-figures")
     outcome = command(*asked)
     assert "warning: at a pruning of 0.05 nothing touches, so the model is not" in outcome.err
-    assert "to be trusted     nothing, as nothing touches" in outcome.out
+    assert "advised pruning   none, because nothing touches" in outcome.out
 
 
 def test_the_whole_map_beside_its_asperities(command: Any, surface: cr.surface.Surface) -> None:

@@ -116,7 +116,7 @@ class Pathed(Steps):
         "loss": "loss",
         "stuck": "stuck",
         "partial": "partial",
-        "sliding": "slide",
+        "sliding": "sliding",
     }
 
     def summary(self) -> Summary:
@@ -182,11 +182,11 @@ class Settled(Single):
     """The result of [steady]: the steady cycle, and losses at other phases if requested."""
 
     printed: ClassVar[Mapping[str, str]] = {
-        "level": "stuck level",
+        "level": "stuck below load",
         "loss": "loss",
         "loss_error": "error",
         "partial": "partial",
-        "sliding": "slide",
+        "sliding": "sliding",
         "intermittent": "intermittent",
     }
 
