@@ -15,18 +15,12 @@ C~_k <= w_k y_k. So (1), times z_k and summed, says by the rows of y + A z = 1 t
 So no rate of the support ever reaches 0.
 
 (1) compares potentials. A charge 1 at i is swept onto its neighbours; the potential of these, each
-spread over a shell of radius R_j = scale C~_j and there as on its shell, may nowhere be less.
-With d_j = z_j - z_i as complex numbers, that at z_i + r e^(i phi), r > d = max |d_j|, is more than
-1 / r by at least r^-3 times
-
-    r Re(e^(-i phi) sum w_j d_j) + (sum w_j |d_j|^2 - 3 |sum w_j d_j^2|) / 4
-      - (5 |sum w_j d_j^3| + 3 |sum w_j |d_j|^2 d_j|) / (8 r) - sum w_j |d_j|^4 / (r (r - d)),
-
-by Legendre's polynomials, those of degree 4 and more bounded by 1. So only near ones are looked at.
+spread over a shell of radius R_j = scale C~_j and there as on its shell, may nowhere be less than
+the part 1 / t_i of that of the charge.
 
 Weights without first and second moments, sum w_j d_j = sum w_j d_j^2 = 0, and with the least energy
 do where neighbours are all around. At an edge a barrier method finds weights that meet (1) with the
-least total at near neighbours and at some far away; then (1) is looked at where it is not known.
+least total at near neighbours and at some far away.
 For one outside of the contact one neighbour alone does, if that is nearer to all others.
 """
 
@@ -35,7 +29,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,12 +52,8 @@ STEPS, LEAST = 40, 1e-8
 #: Searches for weights that are not negative: each drops those that are.
 SEARCHES = 8
 
-#: What the total of weights is less than 1, so that rates are positive, and not just 0.
-SHORT = 1e-10
-
-#: Directions in which the extent of the support is known, and numbers held at once; from how many
-#: times the distance of its charges a potential is looked at by its terms first.
-DIRECTIONS, NUMBERS, NEARBY = 256, 2**20, 2.0
+#: Directions in which the extent of the support is known, and numbers held at once.
+DIRECTIONS, NUMBERS = 256, 2**20
 
 
 def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Array:
@@ -79,11 +69,11 @@ def swept_rates(influence: Influence, c: Array, spare: Array, most: int) -> Arra
     rates = np.full(len(c), -np.inf)
     if len(support) < 2:
         return rates
-    swept = _Swept(influence, support, influence.scale * c, np.where(c > 0, 0.0, spare))
+    swept, least = _Swept(influence, support, influence.scale * c), np.where(c > 0, 0.0, -spare)
     rates[others] = swept.outside(others)
 
     def unsettled(which: Indices) -> NDArray[np.bool_]:
-        return ~((rates[which] > 0) | (rates[which] > -swept.spare[which]))
+        return ~(rates[which] > least[which])
 
     for group in (support, others):
         left = group[unsettled(group)]
@@ -109,15 +99,11 @@ def _in_parts(make: Callable[..., Array], cost: int, *rows: Indices) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Swept:
-    """A coupling whose charges are swept onto the shells of a support, of radii (n,).
-
-    spare : (n,) what t_i may be more than 1
-    """
+    """A coupling whose charges are swept onto the shells of a support, of radii (n,)."""
 
     influence: Influence
     support: Indices
     shells: Array
-    spare: Array
 
     @cached_property
     def places(self) -> NDArray[np.complex128]:
@@ -132,9 +118,9 @@ class _Swept:
 
     @cached_property
     def lost(self) -> float:
-        """What (1) and the potential far away, over 1 / r, lose by SHORT and by rounding."""
+        """What (1) loses by rounding, relatively."""
         moved = ROUNDOFF * self.extent / float(self.influence.separations().min())
-        return 2 * SHORT + 8 * (self.influence.entry_error + moved) + 64 * ROUNDOFF
+        return 8 * (self.influence.entry_error + moved) + 128 * ROUNDOFF
 
     @cached_property
     def _tree(self) -> Any:
@@ -165,9 +151,9 @@ class _Swept:
         near, here = self.neighbours(which, NEIGHBOURS), self.places[which][:, None]
         away, middle = self.places[near] - here, (self.places[near] + here) / 2
         nearer = self._least_along(away) - (away.conj() * middle).real
-        clear = self.shells[near] < (1 - self.lost) * np.abs(away)
-        found = (clear & (nearer > self.lost * self.extent**2)).any(axis=1)
-        return np.where(found, SHORT / 2, -np.inf)
+        clear = self.shells[near] < (1 - 2 * self.lost) * np.abs(away)
+        found = (clear & (nearer > 2 * self.lost * self.extent**2)).any(axis=1)
+        return np.where(found, self.lost / 2, -np.inf)
 
     def lightest(self, which: Indices) -> tuple[Indices, Array]:
         """(m, s) neighbours, and weights with the least energy, without first and second moments.
@@ -260,54 +246,35 @@ class _Swept:
 
     def rates(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
         """(m,) 1 - t of (1), and k where it is least; -inf without weights."""
-        total = weights.sum(axis=1, keepdims=True)
-        known = total[:, 0] > 0
-        weights = np.divide(weights, total, out=np.zeros_like(weights), where=known[:, None])
-        away = (self.places[near] - self.places[which][:, None]) * (weights > 0)
-        potential = _Potential.of(weights, away)
-        reach, worst = self._reach(which, potential)
-        reach, place = np.where(known, reach, 0.0), near[:, 0].copy()
+        from scipy.sparse import csr_array
 
-        def look(row: Indices, seen: Indices) -> None:
-            row, seen = row[seen != which[row]], seen[seen != which[row]]
-            swept = self.potentials(near[row], seen[:, None])
-            ratio = self.potentials(which[row], seen) / np.einsum("ij,ij->i", weights[row], swept)
-            np.maximum.at(worst, row, ratio)
-            most = ratio == worst[row]
-            place[row[most]] = seen[most]
+        total, rates, worst = weights.sum(axis=1), np.full(len(which), -np.inf), near[:, 0].copy()
+        known = np.flatnonzero(total)
+        rows, mine = np.arange(len(known)), which[known]
+        charged, columns = np.unique(near[known], return_inverse=True)
+        each = (weights[known] / total[known, None]).ravel()
+        starts = np.arange(len(known) + 1) * near.shape[1]
+        charges = csr_array((each, columns.ravel(), starts), shape=(len(known), len(charged)))
+        most, nowhere = np.zeros(len(known)), np.full(len(self.places), np.inf)
+        parts = 1 + (len(charged) + len(known)) * len(self.support) // NUMBERS
+        for seen in np.array_split(self.support, parts):
+            swept = charges @ (1.0 / self._apart(charged, seen, self.shells))
+            swept *= self._apart(mine, seen, nowhere)
+            least = swept.argmin(axis=1)
+            t = 1.0 / swept[rows, least]
+            worst[known] = np.where(t > most, seen[least], worst[known])
+            most = np.maximum(most, t)
+        rates[known] = 1.0 - (1.0 + self.lost) * most
+        return rates, worst
 
-        for row in np.flatnonzero(reach >= self.extent).tolist():
-            reach[row] = min(NEARBY * potential.most[row], self.extent)
-            others = self.places[self.support] - self.places[which[row]]
-            room = potential.room(row, others) - self.lost * self.extent**2
-            unclear = self.support[(np.abs(others) > reach[row]) & ~(room > 0)]
-            look(np.full(len(unclear), row), unclear)
-        centres = self._plane(self.places[which])
-        counts = self._tree.query_ball_point(centres, reach, return_length=True)
-        blocks = np.cumsum(counts) * near.shape[1] // NUMBERS
-        for block in np.unique(blocks):
-            rows = np.flatnonzero(blocks == block)
-            within = self._tree.query_ball_point(centres[rows], reach[rows])
-            seen = self.support[np.concatenate(within).astype(np.intp)]
-            look(np.repeat(rows, counts[rows]), seen)
-        t = (1.0 - SHORT) * (1.0 + self.lost - 2 * SHORT) * worst
-        return np.where(known, 1.0 - t, -np.inf), place
+    def _apart(self, some: Indices, seen: Indices, themselves: Array) -> Array:
+        """(m, k) distances, to themselves as given."""
+        from scipy.spatial.distance import cdist
 
-    def _reach(self, which: Indices, potential: _Potential) -> tuple[Array, Array]:
-        """(m,) a distance, or more than all are, and t beyond it over the total of the weights.
-
-        That is 1, or else, as a charge moved by d has at r at least the potential 1 / (r + d),
-        1 + d / r, where so much may be spared.
-        """
-        p = potential
-        room = self._least_along(p.first) - (p.first.conj() * self.places[which]).real
-        room += p.plain - self.lost * self.extent**2
-        spare = self.spare[which] / 2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            expanded = p.most + (p.odd + np.sqrt(p.odd**2 + 4 * room * p.rest)) / (2 * room)
-            spared = p.most / spare
-        expanded = np.where(room > 0, np.minimum(1.01 * expanded, self.extent), self.extent)
-        return np.minimum(expanded, spared), np.where(spared < expanded, 1.0 + spare, 1.0)
+        apart: Array = cdist(self._plane(self.places[some]), self._plane(self.places[seen]))
+        both, i, j = np.intersect1d(some, seen, return_indices=True)
+        apart[i, j] = themselves[both]
+        return apart
 
     def _least_along(self, directions: NDArray[np.complex128]) -> Array:
         """(...) lower bounds on Re(conj(p) z) over the support, from two directions near p."""
@@ -318,35 +285,3 @@ class _Swept:
         k = np.minimum(angle.astype(int), DIRECTIONS - 1)
         before, after = np.sin(step * np.stack((k + 1 - angle, angle - k)).clip(0.0)) / np.sin(step)
         return np.asarray(np.abs(directions) * (before * least[k] + after * least[k + 1]))
-
-
-class _Potential(NamedTuple):
-    """Potentials of swept charges far away, less 1 / r: the terms of the head of this module.
-
-    first : (m,) sum w_j d_j;  plain : those of degree 2;  odd, rest : of degree 3, and of all more
-    most  : the largest |d_j|
-    """
-
-    first: NDArray[np.complex128]
-    plain: Array
-    odd: Array
-    rest: Array
-    most: Array
-
-    @classmethod
-    def of(cls, weights: Array, away: NDArray[np.complex128]) -> _Potential:
-        """Of weights (m, s) at d_j."""
-        apart = np.abs(away)
-        first, second, third, mixed = (
-            (weights * moment).sum(axis=1) for moment in (away, away**2, away**3, apart**2 * away)
-        )
-        plain = ((weights * apart**2).sum(axis=1) - 3 * np.abs(second)) / 4
-        odd = (5 * np.abs(third) + 3 * np.abs(mixed)) / 8
-        return cls(first, plain, odd, (weights * apart**4).sum(axis=1), apart.max(axis=1))
-
-    @np.errstate(divide="ignore", invalid="ignore")
-    def room(self, row: int, others: NDArray[np.complex128]) -> Array:
-        """(k,) lower bounds on r^3 times the potential of one at places farther than `most`."""
-        r = np.abs(others)
-        rest = self.odd[row] / r + self.rest[row] / (r * (r - self.most[row]))
-        return np.asarray((self.first[row].conj() * others).real + self.plain[row] - rest)
