@@ -13,6 +13,7 @@ from convexrough.contact import Contact
 from convexrough.errors import SolverError
 from convexrough.progress import LOGGER
 from convexrough.record import rows_of
+from convexrough.scene.base import along
 from convexrough.surface.boundary_elements import Whole, press_whole
 from convexrough.surface.provability import (
     LEVELS,
@@ -270,6 +271,14 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
             f"at a pruning of {chosen:g} nothing touches, so the model is not assessed: use a "
             "larger approach, or a load"
         )
+    if contact is not None:
+        yield from contact.warnings
+        width, diameter = max(surface.size), 2 * min(along(contact.scene.sphere_radius))
+        if width > diameter:
+            yield (
+                f"the map is {width:.4g} {surface.unit} wide, and the base {diameter:.4g} "
+                f"{surface.unit}: check the units of the map (--unit, --pixel) and of the radius"
+            )
     if contact is None:
         yield f"at a pruning of {chosen:g} no solution was found"
     elif contact.loads.any():

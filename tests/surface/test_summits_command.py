@@ -276,6 +276,17 @@ def test_figures_in_the_formats_asked_for(command: Any) -> None:
     assert width < 300  # 4.4 inches
 
 
+def test_a_map_in_micrometres_called_millimetres(command: Any, surface: cr.surface.Surface) -> None:
+    """Its slopes are right; only the base shows the mistake."""
+    np.save("map.npy", surface.heights)
+    Path("mm.toml").write_text(SCENE.format(radius=10.0, modulus=1e5, load=1.0, unit="mm"))
+    for unit, wrong in (("mm", True), ("µm", False)):
+        options = ("--pixel", "1", "--unit", unit, "--no-figures", "--force")
+        said = command("summits", "map.npy", "--scene", "mm.toml", *options).err
+        assert ("the map is 256 mm wide, and the base 20 mm: check the units" in said) == wrong
+        assert ("asperities in contact: 1, fewer than 5" in said) == wrong
+
+
 @pytest.mark.usefixtures("surface")
 def test_mistakes_of_the_scene_are_named(command: Any) -> None:
     scene = Path("scene.toml")
