@@ -14,7 +14,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.friction.shear import ShearCertificate, ShearState, against, shear
-from convexrough.normal.claims import Claim
+from convexrough.normal.claims import WITHIN, Claim
 from convexrough.record import Record
 
 #: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i.
@@ -28,8 +28,7 @@ class ShearVerdict(Claim, Record):
     forces  : (n,) [force] the claimed shear forces
     total_prescribed : [force] their prescribed sum Q
     claimed : (n,) true where the asperity is claimed to slide
-    within  : largest error allowed, as a fraction of the largest force; None: as accurate as needed
-        to prove every status from the forces alone
+    within  : largest error allowed, as a fraction of the largest force
     certificate : certificate of the claimed forces
     solution : the friction state, with its own certificate
     """
@@ -47,7 +46,7 @@ class ShearVerdict(Claim, Record):
     forces: Array
     total_prescribed: float | None
     claimed: NDArray[np.bool_]
-    within: float | None
+    within: float
     certificate: ShearCertificate
     solution: ShearState
 
@@ -81,7 +80,7 @@ def verify_shear(
     forces: ArrayLike,
     *,
     force: float,
-    within: float | None = None,
+    within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
     """Comparison of shear forces of first loading from any source with the solution.
@@ -94,7 +93,7 @@ def verify_shear(
 
     Raises InputError as `certify_shear`.
     """
-    within = None if within is None else checks.positive("within", within)
+    within = checks.positive("within", within)
     given = checks.array("forces", forces, length=len(contact.scene))
     state = shear(contact, force=checks.finite("force", force))
     if sliding is None:
