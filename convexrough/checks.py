@@ -17,6 +17,9 @@ SMALLEST, LARGEST = 1e-60, 1e60
 #: What error messages expect instead of a number outside this range.
 SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
+#: What error messages expect of a phase; pi may be rounded up.
+PHASE = "a phase in radians, from -pi to pi; 90 degrees are 1.5708"
+
 
 def finite(what: str, value: float | None) -> float:
     return _checked(what, value, "a finite number", lambda number: True)
@@ -28,6 +31,14 @@ def positive(what: str, value: float | None) -> float:
 
 def non_negative(what: str, value: float | None) -> float:
     return _checked(what, value, "a number that is not negative", lambda number: number >= 0)
+
+
+def phase(what: str, value: float | None) -> float:
+    return _checked(what, value, PHASE, is_phase)
+
+
+def is_phase(number: float) -> bool:
+    return abs(number) < 3.15
 
 
 def is_sized(number: float) -> bool:

@@ -89,6 +89,10 @@ class Comparison(Table, Plottable):
         """True if some result has a proved status for all asperities."""
         return any(contact.certificate.holds for contact in self.contacts)
 
+    def disagreeing(self, within: float) -> dict[str, float]:
+        """Each `disagreement` above `within`, by the name of the solver."""
+        return {it.solver: it.disagreement for it in self.entries if it.disagreement > within}
+
     def _rows(self) -> Iterator[tuple[str, str]]:
         for entry in self.entries:
             if (found := entry.contact) is None:

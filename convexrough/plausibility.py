@@ -8,10 +8,17 @@ from typing import Any
 import numpy as np
 
 from convexrough.contact import Contact
+from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 from convexrough.tabular.units import UnitNames
 
 #: Contacts of fewer asperities than this get a warning.
 FEW = 5
+
+#: Fewer asperities in contact than this are taken to be all that were meant, not part of an array.
+ARRAY = 20
+
+#: `array_extent` below which an array is cut off: smooth pressure there is 0.7 of the peak.
+CUT_OFF = 0.7
 
 #: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
 RUBBER, DIAMOND = 1e6, 1.2e12
@@ -25,9 +32,12 @@ def limits_of(contact: Contact) -> dict[str, Any]:
 
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
     extent       : largest distance of a point of contact from the axis, over the base's radius
+    array_extent : largest |x| or |y| of a summit, over the half width of the smooth base's contact
+        under the same load along this axis, the smaller of both; None without such a contact
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : largest mean pressure; the material's hardness or None
         [force / length^2]
+    contact_modulus : [force / length^2]
     beyond_hardness : number of asperities whose mean pressure exceeds the hardness
     mismatch     : Dundurs' beta of two bodies, which the model neglects
     """
@@ -42,10 +52,12 @@ def limits_of(contact: Contact) -> dict[str, Any]:
         "crowding": contact.crowding,
         "covered": contact.covered,
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
+        "array_extent": _array_extent(contact),
         "steepness": float((radii / scene.asperities.tip_radii).max()),
         "mean_pressure": float(contact.mean_pressures.max()),
         "hardness": hardness,
         "mismatch": scene.material.mismatch,
+        "contact_modulus": scene.material.contact_modulus,
         "beyond_hardness": int((contact.mean_pressures > (hardness or np.inf)).sum()),
     }
 
@@ -56,7 +68,14 @@ def warnings_of(contact: Contact) -> Iterator[str]:
         yield "not certified: nothing is proved about these loads"
     elif undecided := int((contact.status == "undecided").sum()):
         yield f"not certified: undecided asperities: {undecided}"
-    yield from doubts(limits_of(contact))
+    yield from cautions(limits_of(contact), contact.scene.units)
+
+
+def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
+    """Warnings about the limits of the model, which the certificate does not cover."""
+    yield from unlikely_modulus(normal["contact_modulus"], units)
+    named = units.force and units.length
+    yield from doubts(normal, f"{units.force}/{units.length}²" if named else "")
 
 
 def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
@@ -68,13 +87,19 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
         )
     if normal["extent"] > STEEP:
         yield (
-            f"contact extends to {normal['extent']:.3g} of the base's radius from the axis: the "
-            f"paraboloid of the model differs from a sphere by 1 % at {STEEP:g}"
+            f"contact extends to {normal['extent']:.3g} of the base's radius from the axis: from "
+            f"{STEEP:g} on, the paraboloid of the model differs from a sphere by more than 1 %"
+        )
+    if normal["contact"] >= ARRAY and (normal["array_extent"] or 1.0) < CUT_OFF:
+        yield (
+            f"contact reaches the rim of the array, which ends at {normal['array_extent']:.3g} of "
+            "the contact radius of the smooth base: the loads depend on where it ends; check the "
+            "unit of the base's radius, or use a larger array"
         )
     if normal["steepness"] > STEEP:
         yield (
-            f"contact radius is {normal['steepness']:.3g} of the tip radius: the paraboloid of the "
-            f"model differs from a sphere by 1 % at {STEEP:g}"
+            f"contact radius is {normal['steepness']:.3g} of the tip radius: from {STEEP:g} on, "
+            "the paraboloid of the model differs from a sphere by more than 1 %"
         )
     if normal["crowding"] > 1:
         yield (
@@ -93,6 +118,16 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
             f"{normal['hardness']:.4g}{unit} on {normal['beyond_hardness']} of "
             f"{normal['contact']} asperities: they would yield"
         )
+
+
+def _array_extent(contact: Contact) -> float | None:
+    """The smaller of max |x| / a and max |y| / b; a row of asperities has only one of them."""
+    smooth = smooth_reference(contact.scene, contact.load) if contact.load > 0 else None
+    if smooth is None:
+        return None
+    axes = smooth.semi_axes if isinstance(smooth, SmoothEllipsoid) else smooth.contact_radius
+    reached = np.abs(contact.scene.asperities.positions).max(axis=0)
+    return float((reached / axes)[reached > 0].min(initial=np.inf))
 
 
 def unlikely_modulus(modulus: float, units: UnitNames) -> Iterator[str]:

@@ -183,8 +183,9 @@ def _proved(
     good = np.flatnonzero(found.good)
     if len(good):
         high = found.rows if total is None else found.rows._replace(load=total[:, 0])
-        chosen = rows.only(good), found.box.at(good), high.at(good)
-        yield PressedRows(places[good], first, *chosen, squares[good])
+        some = rows.only(good)
+        box = found.box.at(good, some)
+        yield PressedRows(places[good], first, some, box, high.at(good), squares[good])
 
 
 def _repeated(values: Array, shape: tuple[int, int]) -> Array:

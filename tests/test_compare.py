@@ -370,6 +370,14 @@ class Mine:
     def solve(self, problem, start=None):
         return Newton().solve(problem)
 
+@dataclass(frozen=True)
+class Zero:
+    name: str = "zero"
+    def solve(self, problem, start=None):
+        from dataclasses import replace
+        found = Newton().solve(problem)
+        return replace(found, loads=0 * found.loads, refine=False, trial=None)
+
 class NoSolver: ...
 class Needs:
     def __init__(self, what): ...
@@ -384,6 +392,11 @@ def test_a_solver_of_ones_own_by_its_name(
     (tmp_path / "scene.toml").write_text(scene_text())
     ran = command("compare", "scene.toml", "--solver", "desk_solvers.Mine", "--json")
     assert [each["solver"] for each in json.loads(ran.out)["compare"]] == ["newton", "mine"]
+    wrong = command("compare", "scene.toml", "--solver", "desk_solvers.Zero")
+    assert wrong.status == 3
+    assert "zero disagrees: its loads differ from those of newton by 1 of the largest" in wrong.err
+    wide = command("compare", "scene.toml", "--solver", "desk_solvers.Zero", "--within", "2")
+    assert (wide.status, wide.err) == (0, "")
     for name, said in (
         ("desk_solvers.Yours", "no attribute 'Yours'"),
         ("no_module.Mine", "No module named 'no_module'"),

@@ -83,7 +83,7 @@ def test_shear_forces() -> None:
     message = failure(assert_shear_certified, pressed, rough, force=force, within=1e-6)
     assert first_named(message, "force error") == 2
     message = failure(assert_shear_certified, pressed, state.forces, force=force * (1 + 1e-5))
-    assert message.startswith("total of the forces off\n")
+    assert message.startswith("the total force is not the prescribed one\n")
 
 
 def test_nothing_to_prove() -> None:

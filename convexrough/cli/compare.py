@@ -21,16 +21,27 @@ from convexrough.errors import FileError, blamed_on
 @click.command()
 @click.argument("scene", type=PATH)
 @solver_option
+@click.option(
+    "--within",
+    metavar="PART",
+    type=click.FloatRange(0, min_open=True),
+    default=1e-3,
+    show_default=True,
+    help="Largest difference allowed, over the largest load.",
+)
 @click.option("--log", metavar="FILE", type=PATH, help="Write each iteration to a CSV file.")
 @json_option
-def compare(scene: Path, solvers: tuple[str, ...], log: Path | None, as_json: bool) -> int:
+def compare(
+    scene: Path, solvers: tuple[str, ...], within: float, log: Path | None, as_json: bool
+) -> int:
     """Compare all solvers on one scene: agreement, certificate, time.
 
     If SCS and QOCO are installed, they also solve the cone program. With --solver, only the named
     solvers are compared with Newton's method.
 
-    The exit status is also 3 if a solver refuses the scene, or if two certified results contradict
-    each other, which would be a mistake in the mathematics or the code.
+    The exit status is also 3 if a load differs from Newton's by more than --within, if a solver
+    refuses the scene, or if two certified results contradict each other, which would be a mistake
+    in the mathematics or the code.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named
@@ -53,13 +64,14 @@ def compare(scene: Path, solvers: tuple[str, ...], log: Path | None, as_json: bo
         )
     if log is not None:
         write_rows(log, report.steps(comparison))
-    summary = report.comparison_summary(comparison)
+    summary = report.comparison_summary(comparison, within)
     echo(summary, report.describe_comparison(summary, file.scene.units), as_json)
     for warning in report.comparison_warnings(summary):
         say_aside("warning", warning)
     outcomes = {entry.outcome for entry in comparison.entries}
     if "failed" in outcomes and not comparison.contradictions:
         return SOLVER_FAILED
-    if comparison.contradictions or "refused" in outcomes or not comparison.certified:
+    wrong = comparison.contradictions or summary["disagreeing"]
+    if wrong or "refused" in outcomes or not comparison.certified:
         return NOT_CERTIFIED
     return DONE

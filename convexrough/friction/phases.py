@@ -87,7 +87,7 @@ def phase_losses(
     """The losses of elliptic paths with several phases and factors of the amplitudes.
 
     load, load_amplitude, force, force_amplitude : [force] as in `elliptic_path`
-    phases, factors : (m,) [rad] and (k,); each factor multiplies both amplitudes
+    phases, factors : (m,) [rad] from -pi to pi, and (k,); each factor multiplies both amplitudes
     chords : number per ellipse; the relative error of the loss is about chords^-2
     influence : compliance operator, as in `load_path`
 
@@ -104,6 +104,8 @@ def phase_losses(
     for what, values in (("phases", turns), ("factors", sizes)):
         if len(values) == 0:
             raise InputError(what, found="none", expected="at least one")
+    for i, turn in enumerate(turns):
+        checks.phase(f"phases[{i}]", turn)
     alone = _smooth_alone(scene, load)
 
     def settled(on: Scene, size: float, phase: float) -> Cycle:

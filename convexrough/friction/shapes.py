@@ -25,7 +25,7 @@ def elliptic_path(
 
         P = load + load_amplitude cos t,    Q = force + force_amplitude sin(t + phase)
 
-    phase : [rad] 0 for a full ellipse, pi/2 for a straight line (P and Q in phase)
+    phase : [rad] from -pi to pi, 0 for a full ellipse, pi/2 for a straight line (P and Q in phase)
     friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
         points of the path, so that L* of `Cycle.level` is exact
     chords : approximate number of chords; the relative error of the loss is about chords^-2
@@ -43,7 +43,7 @@ def elliptic_path(
         checks.finite("force_amplitude", force_amplitude),
     )
     t = q / checks.positive("friction", friction)
-    phase = checks.finite("phase", phase)
+    phase = checks.phase("phase", phase)
     across, along = t * np.cos(phase), t * np.sin(phase)
     corners = [0.0, np.arctan2(across, p + along), np.arctan2(-across, p - along)]
     halves = np.sort(np.mod(corners, np.pi))

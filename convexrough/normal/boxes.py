@@ -58,9 +58,10 @@ class Box(NamedTuple):
     faces: Array  # upper bounds that the solution is yet to be proved below; or infinite
     fixed_open: NDArray[np.bool_]  # assumed open, which is yet to be proved
 
-    def at(self, rows: Indices) -> Box:
-        """The boxes of some rows."""
+    def at(self, rows: Indices, problem: Stack) -> Box:
+        """The boxes of some rows, which are those of `problem`."""
         return self._replace(
+            problem=problem,
             loads=self.loads[rows],
             stiffness=self.stiffness[rows],
             convexity_number=self.convexity_number[rows],

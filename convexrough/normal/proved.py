@@ -218,10 +218,8 @@ def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
     if len(which[0]) == 0:
         return loads
     k = problem.exact.coefficients
-    if k.radius.size > 1:
-        high, low, radius = (np.broadcast_to(it, loads.shape)[which] for it in (*k.mid, k.radius))
-        k = Ball(Pair(high, low), radius)
-    ratio = indentation[which] / k
+    high, low, radius = (np.broadcast_to(it, loads.shape)[which] for it in (*k.mid, k.radius))
+    ratio = indentation[which] / Ball(Pair(high, low), radius)
     by_law = ratio.positive_part() * ratio.sqrt()
     better = by_law.radius < loads.radius[which]
     parts = np.array((*loads.mid, loads.radius))

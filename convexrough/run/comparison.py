@@ -17,10 +17,14 @@ HEADING = ["solver", "disagreement", "load error", "duality gap", "certificate",
            "iterations", "seconds", "MB"]  # fmt: skip
 
 
-def comparison_summary(comparison: Comparison) -> Summary:
-    """The summary of a comparison, in the scene's units."""
-    rows = [_entry(entry) for entry in comparison.entries]
-    return headed(compare=rows, contradictions=list(comparison.contradictions))
+def comparison_summary(comparison: Comparison, within: float) -> Summary:
+    """The summary of a comparison, in the scene's units; `within` as in `Comparison`."""
+    return headed(
+        compare=[_entry(entry) for entry in comparison.entries],
+        contradictions=list(comparison.contradictions),
+        within=within,
+        disagreeing=comparison.disagreeing(within),
+    )
 
 
 def _entry(entry: Entry) -> Summary:
@@ -83,9 +87,14 @@ def _cells(row: Summary) -> list[str]:
 
 
 def comparison_warnings(summary: Summary) -> Iterator[str]:
-    """Warnings: contradictions, solvers without a solution, and a missing certificate."""
+    """Warnings: contradictions, wrong and missing solutions, and a missing certificate."""
     yield from (f"contradiction: {each}" for each in summary["contradictions"])
-    rows = summary["compare"]
+    rows, within = summary["compare"], summary["within"]
+    for solver, apart in summary["disagreeing"].items():
+        yield (
+            f"{solver} disagrees: its loads differ from those of {rows[0]['solver']} by "
+            f"{apart:.2g} of the largest load; at most {within:g} is allowed (--within)"
+        )
     yield from (f"{it['solver']}: {it['outcome']}" for it in rows if it["outcome"] != "answered")
     answered = [row for row in rows if row["outcome"] == "answered"]
     if not any(row["scope"] != "none" and not row["undecided"] for row in answered):

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from convexrough.atomic import to_json as to_json
+from convexrough.plausibility import cautions
 from convexrough.run.stage import Result, Summary
-from convexrough.run.stages.normal import Pressed, cautions
+from convexrough.run.stages.normal import Pressed
 from convexrough.version import __version__
 
 #: Version of the keys of summary.json and of the columns of tables.

@@ -23,7 +23,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from convexrough.checks import SIZED, is_sized, nearest
+from convexrough.checks import PHASE, SIZED, is_phase, is_sized, nearest
 
 #: Symbols that a user may have written as keys, and the keys to suggest for them.
 MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
@@ -63,6 +63,7 @@ NonNegative = Annotated[
 Ratio = Annotated[float, expected("a number from 0 to 0.5", lambda value: 0 <= value <= 0.5)]
 Share = Annotated[float, expected("a number from 0 to 1", lambda value: 0 <= value <= 1)]
 Fraction = Annotated[float, expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
+Phase = Annotated[float, expected(PHASE, is_phase)]
 Shares = Annotated[list[Share], expected("a list of numbers from 0 to 1", bool)]
 Fractions = Annotated[list[Fraction], expected("a list of numbers from -1 to 1", bool)]
 Whole = Annotated[int, expected("a whole number that is not negative", lambda value: value >= 0)]

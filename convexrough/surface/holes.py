@@ -1,4 +1,4 @@
-"""Holes of a map, filled by a harmonic function."""
+"""Holes of a map, filled by a harmonic function, and single pixels that look like errors."""
 
 from __future__ import annotations
 
@@ -6,10 +6,29 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 
 #: Steps (row, column) from a pixel to neighbours along a side, so each pair is found once.
 SIDES = ((0, 1), (1, 0))
+
+#: Distance of a spike from the median, over the standard deviation that the quartiles suggest.
+OUTLYING = 6.0
+
+
+def spikes(heights: Array) -> Indices:
+    """(m, 2) row and column of outlying pixels of which no two neighbours have such a height.
+
+    Neighbours differ from it by more than half of its distance from the median.
+    """
+    low, middle, high = np.quantile(heights, (0.25, 0.5, 0.75))
+    away = np.abs(heights - middle)
+    found = np.argwhere(away > OUTLYING * (high - low) / 1.349)
+    padded = np.pad(heights, 1, mode="reflect")
+    alike = np.zeros(len(found), dtype=int)
+    for step in np.ndindex(3, 3):
+        apart = np.abs(padded[tuple((found + step).T)] - heights[tuple(found.T)])
+        alike += apart < away[tuple(found.T)] / 2  # also the pixel itself
+    return found[alike <= 2]
 
 
 def filled(heights: Array) -> Array:

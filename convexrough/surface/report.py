@@ -13,6 +13,7 @@ from convexrough.contact import Contact
 from convexrough.errors import SolverError
 from convexrough.progress import LOGGER
 from convexrough.record import rows_of
+from convexrough.scene.base import along
 from convexrough.surface.boundary_elements import Whole, press_whole
 from convexrough.surface.provability import (
     LEVELS,
@@ -153,7 +154,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
     tips = summits.tip_radii
     left_out = [f"{origin.pruned:,} pruned"]
     left_out += [f"{origin.at_edge:,} at the edge"] if origin.at_edge else []
-    left_out += [f"{origin.without_top:,} without a top"] if origin.without_top else []
+    left_out += [f"{origin.without_top:,} without a fitted maximum"] if origin.without_top else []
     off = float(np.median(summits.deviations))
     lines = [
         ("surface", surface.source),
@@ -170,7 +171,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
                          f"{summits.eccentricities.max():.2f}  (elliptic tips would carry up to "
                          f"{100 * (summits.elliptic_loads.max() - 1):.2g} % more)"),
         ("rms misfit", f"median {off:.2g}{unit}, largest {summits.deviations.max():.2g}"
-                       "  (pixels of a tip from its sphere)"),
+                       "  (distance of pixels from the fitted sphere)"),
         ("bandwidth", f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
                       f"m2 {surface.moments.m2:.4g}, m4 {surface.moments.m4:.4g})"),
     ]  # fmt: skip
@@ -214,10 +215,10 @@ def _describe_curve(curve: Provability, unit: str) -> list[str]:
             ("yes" if row["trusted"] else "no") if row["contacts"] else "-",
         ])  # fmt: skip
     first = curve.trusted_from
-    said = "at no pruning" if np.isnan(first) else f"from a pruning of {100 * first:.3g} % on"
+    said = "no pruning is strong enough" if np.isnan(first) else f"at least {100 * first:.3g} %"
     if not curve.contacts.any():
-        said = "nothing, as nothing touches"
-    return [*aligned(table), "", *labelled([("to be trusted", said)])]
+        said = "none, because nothing touches"
+    return [*aligned(table), "", *labelled([("advised pruning", said)])]
 
 
 def _describe_crowded(contact: Contact) -> list[str]:
@@ -270,6 +271,14 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
             f"at a pruning of {chosen:g} nothing touches, so the model is not assessed: use a "
             "larger approach, or a load"
         )
+    if contact is not None:
+        yield from contact.warnings
+        width, diameter = max(surface.size), 2 * min(along(contact.scene.sphere_radius))
+        if width > diameter:
+            yield (
+                f"the map is {width:.4g} {surface.unit} wide, and the base {diameter:.4g} "
+                f"{surface.unit}: check the units of the map (--unit, --pixel) and of the radius"
+            )
     if contact is None:
         yield f"at a pruning of {chosen:g} no solution was found"
     elif contact.loads.any():

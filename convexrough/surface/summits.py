@@ -195,7 +195,7 @@ def find_summits(heights: Array, found: Hills, origin: Origin, prune: float, fit
     if not tips.whole.any():
         found_text = (
             f"none of {origin.maxima:,} maxima: {origin.pruned:,} pruned, {origin.at_edge:,} at "
-            f"the edge, {origin.without_top:,} without a top"
+            f"the edge, {origin.without_top:,} without a fitted maximum"
         )
         raise InputError("summits", found=found_text, expected="at least one")
     whole, (dx, dy) = tips.whole, origin.pixel

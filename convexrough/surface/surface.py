@@ -16,6 +16,7 @@ from convexrough.plottable import Plottable
 from convexrough.record import Record
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
 from convexrough.surface.hills import Hills, hills
+from convexrough.surface.holes import spikes
 from convexrough.surface.moments import Moments, moments_of
 from convexrough.surface.summits import Origin, Summits, find_summits
 from convexrough.tabular.units import known_unit
@@ -104,9 +105,10 @@ class Surface(Record, Plottable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """A warning if a plane or sphere explains most of the variance of the heights.
+        """Warnings of a plane or sphere that explains most of the variance, and of spikes.
 
-        It is fitted to at most 256 by 256 of the pixels.
+        The plane or sphere is fitted to at most 256 by 256 of the pixels. Spikes are single pixels
+        or pairs far from all others.
 
         >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
         >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3
@@ -128,7 +130,15 @@ class Surface(Record, Plottable):
                 found = f"{name}, explains {part} of the variance of the heights: "
                 found += f'detrend="{kind}", or --detrend {kind}, removes it'
             left = least
-        return (found,) if found else ()
+        return (*([found] if found else []), *self._spikes())
+
+    def _spikes(self) -> Iterator[str]:
+        if len(places := spikes(self.heights)):
+            row, column = places[0]
+            yield (
+                f"spikes or drop-outs: {len(places):,} pixels far from their neighbours, the first "
+                f"in row {row}, column {column}; make them nan and use fill=True, or --fill"
+            )
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield from super()._rows()

@@ -99,7 +99,7 @@ class Folder:
         ]
         for path in left:
             path.unlink(missing_ok=True)
-        said = f"found {sum(map(len, wanted)) - sum(map(len, todo)):,} scenes"
+        said = f"found {sum(map(len, wanted)) - sum(map(len, todo)):,} scenes of an earlier run"
         said += f", {damaged:,} damaged parts removed" if damaged else ""
         return todo, said + (f", {len(left):,} unfinished files removed" if left else "")
 

@@ -43,7 +43,7 @@ def describe(summary: Summary) -> list[str]:
     lines += [(f"  {status}", f"{it[status]:,}") for status in ("certified", "undecided", "failed")]
     if "computed" in it:
         rate = it["computed"] / it["seconds"]
-        said = f"{it['computed']:,} in {it['seconds']:,.0f} s, {rate:,.3g} a second"
+        said = f"{it['computed']:,} scenes in {it['seconds']:,.0f} s, {rate:,.3g} per second"
         lines.append(("computed", f"{said}; {it['found']}"))
     if left_out := it["not_measured"]:
         lines.append(("left out", f"{', '.join(map('[{}]'.format, left_out))}: nothing measured"))

@@ -161,7 +161,7 @@ def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
         failed += int(np.count_nonzero(columns["status"] == "failed"))
         rate = done / max(time.monotonic() - began, 1e-9)
         left = timedelta(seconds=round((count - done) / rate))
-        said = f"{done:,} of {count:,} scenes, {rate:,.3g} a second, {left} left"
+        said = f"{done:,} of {count:,} scenes, {rate:,.3g} per second, {left} left"
         LOGGER.info(said + (f", {failed:,} failed" if failed else ""))
 
 

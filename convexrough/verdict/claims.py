@@ -290,7 +290,7 @@ class _Placing:
         allowed = POSITION_TOLERANCE * spacing if given is None else given
         distances, owners = _nearest(positions, points)
         far = distances > allowed
-        self.how = f"matched by position, to {distances.max():.2g}"
+        self.how = f"matched by position (largest distance {distances.max():.2g})"
         doubtful = far.any() if len(points) == len(positions) else far.mean() > 0.5
         doubtful |= len(np.unique(owners)) < len(owners)
 

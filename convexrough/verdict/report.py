@@ -142,11 +142,11 @@ def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
 
 def reason(claim: Claim) -> str:
     """One line: the reasons why a claim does not hold; "" if it holds."""
-    counts = {"wrongly claimed": len(claim.wrongly_claimed), "undecided": len(claim.undecided)}
-    counts[f"{claim.one}s off"] = len(claim.off)
-    parts = [f"{count:,} {what}" for what, count in counts.items() if count]
+    counts = {"wrong statuses": len(claim.wrongly_claimed), "undecided": len(claim.undecided)}
+    counts[f"{claim.one}s not within the tolerance"] = len(claim.off)
+    parts = [f"{what} ({count:,})" for what, count in counts.items() if count]
     if not claim.total_holds:
-        parts.append(f"total of the {claim.one}s off")
+        parts.append(f"the total {claim.one} is not the prescribed one")
     return ", ".join(parts)
 
 

@@ -50,11 +50,11 @@ assert naive[1] < 0
 # so this is not a solution, although both equations hold. The taller asperity has lowered the
 # surface under the lower one so far that the stamp does not reach it.
 #
-# To set the negative load to zero does not help: the displacement of asperity 1 then differs from
+# Setting the negative load to zero does not help: the displacement of asperity 1 then differs from
 # the prescribed one.
 
 cut = np.maximum(naive, 0.0)
-print("asked of asperity 1:", D[0], "  after cutting:", (stiffness @ cut)[0])
+print("displacement of asperity 1: prescribed", D[0], "with these loads", (stiffness @ cut)[0])
 assert abs((stiffness @ cut)[0] - D[0]) > 0.1
 
 # %%
@@ -69,7 +69,7 @@ assert abs((stiffness @ cut)[0] - D[0]) > 0.1
 def solve_case(
     touching: tuple[int, ...], asked: Array, stiffness: Array = stiffness
 ) -> tuple[Array, Array]:
-    """Loads and gaps if exactly these asperities touch; signs are not looked at."""
+    """Loads and gaps if exactly these asperities touch, whatever their signs."""
     loads = np.zeros(2)
     among = list(touching)
     if among:
@@ -100,7 +100,7 @@ assert np.allclose(answer, [1.0, 0.0])
 # The picture
 # -----------
 #
-# The loads are the first-order conditions of a minimum. With the energy
+# The contact law is the first-order condition of a minimum. With the energy
 #
 # .. math:: \Phi(P) = \tfrac 1 2 P_1^2 + \tfrac 1 2 P_2^2 + A P_1 P_2 - D_1 P_1 - D_2 P_2
 #
@@ -112,7 +112,7 @@ assert np.allclose(answer, [1.0, 0.0])
 
 
 def energy(P: Array) -> Any:
-    """Of loads (2, ...)."""
+    """Energy of loads (2, ...)."""
     return P[0] ** 2 / 2 + P[1] ** 2 / 2 + A * P[0] * P[1] - D[0] * P[0] - D[1] * P[1]
 
 
@@ -140,7 +140,7 @@ for at, label in [((-0.3, -0.3), "none"), ((0.7, -0.1), "1 only"), ((-0.2, 0.7),
     right.text(*at, label, ha="center")
 right.text(0.75, 0.85, "both", ha="center", color="white")
 right.plot(*D, "ko", ms=8)
-right.set(xlabel="asked of 1: $D_1$ [length]", ylabel="asked of 2: $D_2$ [length]")
+right.set(xlabel="prescribed $D_1$ [length]", ylabel="prescribed $D_2$ [length]")
 right.set(title="which asperities touch", aspect="equal")
 plt.show()
 

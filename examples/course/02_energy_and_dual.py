@@ -1,5 +1,6 @@
 r"""
-2. The energy, its dual, and the word "optimal" ===============================================
+2. The energy, its dual, and the word "optimal"
+===============================================
 
 **Claim.** From any loads, right or wrong, one can compute their energy, which is at least the
 minimum, and a dual bound, which is at most the minimum. The difference, the *duality gap*, limits
@@ -46,7 +47,7 @@ D = 1.5e-5 - (points**2).sum(axis=1) / 2
 def solve(k: Array, M: Array, D: Array) -> tuple[str, Array]:
     """Status and loads, from Clarabel through CVXPY."""
     P = cp.Variable(7)
-    energy = 0.6 * k @ cp.power(P, 5 / 3) + cp.quad_form(P, cp.psd_wrap(M)) / 2 - D @ P
+    energy = 0.6 * k @ cp.power(P, 5 / 3) + cp.quad_form(P, M) / 2 - D @ P
     problem = cp.Problem(cp.Minimize(energy), [P >= 0])
     problem.solve(solver=cp.CLARABEL)
     return str(problem.status), np.array(P.value)
@@ -65,9 +66,9 @@ assert status == "optimal"
 assert abs((k * np.maximum(naive, 0) ** (2 / 3) + M @ naive)[0] / D[0] - 1) > 1
 
 # %%
-# The solver stops when its residuals are below :math:`10^{-8}`. The loads here are smaller than
-# that, so the starting values already count as a solution. The solver did what it promises, but
-# its tolerance does not fit the size of these numbers.
+# The solver stops when its residuals are below :math:`10^{-8}`. The exact loads are smaller than
+# that, so the solver accepts values that are far too large. It did what it promises, but its
+# tolerance does not fit the size of these numbers.
 #
 # The repair: a bound from the loads alone
 # ----------------------------------------
@@ -115,11 +116,11 @@ assert 0 <= gap < 1e-6 * abs(energy_of(loads))
 # The Hessian of the energy is at least :math:`M`. So loads whose energy exceeds the minimum by no
 # more than the gap differ from the exact loads by at most :math:`\sqrt{2\, \text{gap} / \mu}`,
 # where :math:`\mu` is the smallest eigenvalue of :math:`M`. Because of the root, eight digits of
-# the energy give only four digits of the loads. The picture goes from the naive loads to the
-# accurate ones.
+# the energy give only four digits of the loads. The picture shows trial loads on the way from the
+# naive loads to the accurate ones.
 
 mu = float(np.linalg.eigvalsh(M)[0])
-rest = np.logspace(0, -5, 60)  # how much of the naive loads is left
+rest = np.logspace(0, -5, 60)  # 1: the naive loads; 0: the accurate ones
 trials = [loads + part * (naive - loads) for part in rest]
 above, below = [energy_of(p) for p in trials], [dual_bound(p) for p in trials]
 unit = abs(energy_of(loads))
@@ -164,14 +165,14 @@ assert energy_of(reference) <= energy_of(loads) * (1 - 1e-12)
 # Exercise
 # --------
 #
-# Insert :math:`p = 0` into the dual bound. What does the bound say then? How far is it from the
-# minimum here?
+# Insert :math:`p = 0` into the dual bound. Of which contact is it the energy? How far is it from
+# the minimum here?
 #
 # *Answer.* :math:`\min \Phi \ge -\tfrac 2 5 \sum k^{-3/2} D_i^{5/2}`, the energy of seven tips
 # without stems that do not interact. Neighbours and stems make the contact more compliant, so they
 # reduce the loads. The absolute value of the bound is 1.67 times that of the minimum.
 
 alone = dual_bound(np.zeros(7))
-print("the bound from no loads, over the least energy:", alone / energy_of(reference))
+print("bound from zero loads over the minimum:", alone / energy_of(reference))
 assert alone < energy_of(reference) < 0
 assert abs(alone / energy_of(reference) - 1.67) < 0.005

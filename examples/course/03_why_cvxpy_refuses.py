@@ -2,9 +2,9 @@ r"""
 3. Why CVXPY refuses the energy
 ===============================
 
-**Claim.** A modelling language does not accept the energy of asperities that interact as convex,
-and indeed it is not convex everywhere. An argument with charged shells shows where it is convex:
-up to contact radii 57 % larger than those at which neighbouring discs touch.
+**Claim.** A modelling language does not accept the energy of interacting asperities as convex, and
+indeed the energy is not convex everywhere. An argument with charged shells shows where it is: up to
+contact radii 57 % larger than those at which neighbouring discs touch.
 
 The load :math:`P_j` of an asperity on an elastic half-space acts on asperity :math:`i` at the
 distance :math:`r_{ij}` as a point force, and displaces it by :math:`A_{ij} P_j` with
@@ -62,8 +62,8 @@ except cp.error.DCPError as refusal:
 assert refused
 
 # %%
-# The message names the quadratic form, and it is right. A matrix with zeros on its diagonal has
-# the trace 0, so if it has positive eigenvalues it also has negative ones.
+# The message names the quadratic form, and rightly so. A matrix with zeros on its diagonal has the
+# trace 0, so if it has positive eigenvalues it also has negative ones.
 
 eigenvalues = np.linalg.eigvalsh(A)
 print(f"eigenvalues of A: from {eigenvalues[0]:.3f} to {eigenvalues[-1]:.3f}")
@@ -156,7 +156,7 @@ print("accepted by the rules:", split.is_dcp())
 assert not split.is_dcp()
 
 # %%
-# Script :doc:`05_exact_cones` writes it in a form that the rules accept.
+# Script :doc:`05_exact_cones` writes this term in a form that the rules accept.
 #
 # An independent check
 # --------------------
@@ -189,10 +189,10 @@ assert np.allclose(mutual, 1.0, atol=1e-4)
 # Two equal asperities alone, at distance :math:`r`. Up to which contact radius is their energy
 # convex, and what does the lemma prove?
 #
-# *Answer.* The Hessian has :math:`1/(2 E^* a)` on its diagonal and :math:`1/(\pi E^* r)` off it,
-# so it is positive definite up to :math:`a = \tfrac \pi 2 r`. The lemma with :math:`s = r/2`
-# proves convexity up to half of that, because it allows for neighbours on all sides. Discs touch
-# at :math:`a = r/2`, below both limits.
+# *Answer.* The Hessian has :math:`1/(2 E^* a)` on its diagonal and :math:`1/(\pi E^* r)` off it, so
+# it is positive definite up to :math:`a = \tfrac \pi 2 r`. The lemma with :math:`s = r/2` proves
+# convexity up to half of this radius, because it allows for neighbours on all sides. Discs touch at
+# :math:`a = r/2`, below both limits.
 
 
 def definite(radius: float) -> bool:

@@ -54,12 +54,12 @@ assert refused
 # --------------------
 #
 # Place springs side by side on a line through the centre. Each has the width :math:`\Delta x` and
-# the stiffness :math:`E^* \Delta x`. The sphere is replaced by a profile :math:`x^2 / R`, *twice*
-# the distance between the line and the sphere. With this profile, the row carries the same load as
-# the half-space (method of dimensionality reduction). With forces :math:`f_j \ge 0`
+# the stiffness :math:`E^* \Delta x`. The sphere is replaced by the profile :math:`x^2 / R`, *twice*
+# that of the sphere. With this profile the row carries the same load as the half-space (method of
+# dimensionality reduction). With forces :math:`f_j \ge 0`
 #
 # .. math:: \text{minimise } \sum_j \frac{f_j^2}{2 E^* \Delta x} + \frac{x_j^2}{R} f_j - \delta f_j,
-#           \qquad f \ge 0,
+#           \qquad f \ge 0 .
 #
 # This is a quadratic program. A bristle that touches is shortened by :math:`\delta - x^2/R`; all
 # others have a gap. The sum over :math:`|x| \le a = \sqrt{R \delta}` is
@@ -101,8 +101,8 @@ assert abs(f.sum() / hertz - 1) < 1e-3
 # ------------------------
 #
 # The force on a bristle has a kink where contact ends. The error of the midpoint rule there
-# depends on the position of the edge within its strip. To average this out, take the root mean
-# square over many approaches. The order is then 2.
+# depends on where the edge of the contact lies within a strip. To average this out, take the root
+# mean square over many approaches. The order is then 2.
 
 counts = np.array([16, 32, 64, 128, 256])
 errors = []

@@ -8,7 +8,7 @@ minimum and the same loads.
 
 The shell lemma (:doc:`03_why_cvxpy_refuses`) leaves for each asperity the local energy
 :math:`h(P) = \tfrac 3 5 k P^{5/3} - \tfrac 1 2 \sigma P^2` with :math:`\sigma = 1 / (\pi E^* s)`.
-It is convex up to some load :math:`B`, but written as a difference of convex functions. Let
+It is convex up to some load :math:`B`, but it is written as a difference of convex functions. Let
 :math:`t` be the contact radius divided by that at :math:`P = B`. Then :math:`P = B t^3`, and with
 :math:`S = \sigma / (\tfrac 2 3 k B^{-1/3}) \le 1`
 
@@ -74,7 +74,7 @@ assert loose.value < true_least - 0.005
 
 
 def lifted(S: float, slope: float) -> tuple[float, float]:
-    """Least lifted energy less slope * y3, and y3 there."""
+    """Minimum of the lifted energy minus slope * y3, and y3 at the minimum."""
     y2, y3, y4, y5, z = (cp.Variable() for _ in range(5))
 
     def rotated(x: cp.Expression, y: cp.Expression, w: cp.Expression) -> cp.SOC:
@@ -127,20 +127,22 @@ plt.show()
 # An independent check: the identity
 # ----------------------------------
 #
-# Why has no lift less energy than the true powers? A cone :math:`x y \ge w^2` says
-# :math:`x s^2 - 2 w s + y \ge 0` for every :math:`s`. Multiply these four by weights that are not
-# negative, and the sum is the lifted energy less its tangent at :math:`t = s`:
+# Why does no lift have less energy than the true powers? A cone :math:`x y \ge w^2` implies
+# :math:`x s^2 - 2 w s + y \ge 0` for every :math:`s` (for the first cone take :math:`s^2`).
+# Multiply these four inequalities by weights that are not negative, and add them up. The sum is
+# the lifted energy minus the tangent of the energy at :math:`t = s`:
 #
 # .. math:: \big(\tfrac 3 5 - \tfrac S 3\big) y_5 + \tfrac S 3 z - \lambda y_3 + \mu
 #           = d\,[s^4 - 2 s^2 y_2 + y_4] + c\,[\cdot] + e\,[\cdot] + \tfrac S 3 [\cdot] \ge 0 .
 #
-# Both sides are of first degree in :math:`S` and in the :math:`y`, and of degree 6 in :math:`s`.
-# Polynomials of degree 6 that agree at seven points are the same. So a finite number of
-# evaluations in exact fractions is a proof.
+# Each bracket is the left side of one inequality; the code below defines :math:`\lambda`,
+# :math:`\mu` and the weights :math:`d, c, e`. Both sides are of first degree in :math:`S` and in
+# the :math:`y`, and of degree 6 in :math:`s`. Polynomials of degree 6 that agree at seven points
+# are the same. So a finite number of evaluations in exact fractions is a proof.
 
 
 def difference(s: Fraction, S: Fraction, y: tuple[Fraction, ...]) -> Fraction:
-    """Left side less right side."""
+    """Left side minus right side."""
     y2, y3, y4, y5, z = y
     lam = s**2 - Fraction(2, 3) * S * s**3
     mu = Fraction(2, 5) * s**5 - S / 3 * s**6

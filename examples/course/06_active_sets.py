@@ -100,9 +100,9 @@ assert period > 1
 # %%
 # Why? The loads on the other asperities lower one asperity so far that it only just touches. Alone
 # it would carry far more, and the loop starts from this larger load. From there Newton's method for
-# :math:`x^{2/3}`, which is concave, overshoots zero; the asperity is dropped, then it penetrates,
-# is added with the same large load, and so on for ever. The loop decides by signs at an
-# intermediate point, not at the solution.
+# :math:`x^{2/3}`, which is concave, overshoots zero. The asperity is dropped; then it penetrates
+# and is added with the same large load, and so on for ever. The loop decides by the signs at an
+# intermediate point, not by those at the solution.
 #
 # The repair: the normal map
 # --------------------------
@@ -184,7 +184,7 @@ assert bad.load_error > 0.01 * contact.loads.max()
 assert (abs(force * loads - contact.loads) <= bad.load_errors).all()
 
 # %%
-# The bound is close to the true error. The largest error, over the largest load, is
+# The bound is close to the true error. The largest error, as a fraction of the largest load, is
 
 off = abs(force * loads - contact.loads).max() / contact.loads.max()
 print(f"{off:.3f}")
@@ -210,11 +210,11 @@ assert ended < DRAWN == reached
 # the first step of Newton's method for :math:`x` lead to a negative load?
 #
 # *Answer.* The step goes to :math:`x - \tfrac 3 2 x^{1/3} (x^{2/3} - \delta) = \tfrac 1 2 x^{1/3}
-# (3 \delta - x^{2/3})`: below zero for all :math:`x > (3 \delta)^{3/2}`, 5.2 times the right load.
+# (3 \delta - x^{2/3})`: below zero for all :math:`x > (3 \delta)^{3/2}`, 5.2 times the exact load.
 # In terms of :math:`\delta` the same problem is linear, and one step is enough.
 
 start = np.linspace(1, 8, 70001)
 after = start - (start ** (2 / 3) - 1) / (2 / 3 * start ** (-1 / 3))
 first = float(start[np.argmax(after < 0)])
-print("negative from", first, "times the right load on")
+print("negative from", first, "times the exact load on")
 assert abs(first - 3**1.5) < 1e-3

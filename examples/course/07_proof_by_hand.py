@@ -2,8 +2,8 @@ r"""
 7. A proof one can check by hand
 ================================
 
-**Claim.** Fractions alone can prove that two given loads are correct to three digits, and that
-both asperities touch. No number in the proof is rounded, and no solver is trusted.
+**Claim.** Fractions alone can prove that two given loads have errors below 0.002, and that both
+asperities touch. No number in the proof is rounded, and no solver is trusted.
 
 Choose units in which an asperity of contact radius :math:`a` carries :math:`P = a^3` and is
 indented by :math:`a^2` (:math:`E^* = \tfrac 3 4`, :math:`R = 1`). A unit load on one of two
@@ -34,7 +34,7 @@ D: Pair = (Fraction(1), Fraction(3, 5))
 
 
 def residuals(a: Pair) -> Pair:
-    """What the loads cause, less what is asked. Exact for fractions."""
+    """Displacements by the loads minus the prescribed ones. Exact for fractions."""
     return a[0] ** 2 + A * a[1] ** 3 - D[0], a[1] ** 2 + A * a[0] ** 3 - D[1]
 
 
@@ -47,7 +47,7 @@ near = [
     for y in a2 + np.spacing(a2) * np.arange(-3, 4)
 ]
 solved = [(x, y) for x, y in near if x**2 + y**3 / 4 == 1.0]
-print("pairs of numbers that solve the first equation, says the computer:", len(solved))
+print("pairs that solve the first equation in float64 arithmetic:", len(solved))
 assert len(solved) > 1
 
 # %%
@@ -55,7 +55,7 @@ assert len(solved) > 1
 
 for x, y in solved[:3]:
     off = residuals((Fraction(float(x)), Fraction(float(y))))
-    print(f"a = ({x:.16f}, {y:.16f}): off by {float(off[0]):.1e}")
+    print(f"a = ({x:.16f}, {y:.16f}): residual {float(off[0]):.1e}")
     assert off[0] != 0
 
 # %%
@@ -81,7 +81,7 @@ assert all(abs(value) < Fraction(1, 500) for value in e)
 
 # %%
 # **3. A box.** No asperity carries more than it would alone: :math:`a_i^2 \le D_i`. The box
-# :math:`b` consists of fractions above the square roots:
+# :math:`b` consists of fractions above the square roots of the :math:`D_i`:
 
 b: Pair = (Fraction(1), Fraction(7, 9))
 assert all(b[i] ** 2 >= D[i] and b[i] >= a[i] for i in range(2))
@@ -119,6 +119,7 @@ assert theta == Fraction(3, 8)
 square = (e[0] ** 2 / h[0] + e[1] ** 2 / h[1]) / (1 - theta) ** 2
 bounds = [square / h[i] for i in range(2)]  # on d_1^2 and d_2^2
 print("errors squared at most:", *(f"{float(bound):.2e}" for bound in bounds))
+assert max(bounds) < Fraction(2, 1000) ** 2
 
 # %%
 # **8. Statuses.** An asperity touches if its load exceeds the bound on its error. To avoid roots,
@@ -194,8 +195,8 @@ assert float(error_1) <= certificate.load_errors[0] < 2 * float(bounds[0]) ** 0.
 #
 # *Answer.* Its trial load is 0 and its gap
 # :math:`g_3 = \tfrac 1 4 P_1 + \tfrac 1 5 P_2 - \tfrac 1 5` is positive, so :math:`e_3 = 0`. The
-# box has :math:`b_3 = \tfrac{9}{20}`, and in line 5 subtract from each :math:`h_i` the sum of its
-# row of :math:`A`. The error of the gap is at most the distance times
+# box has :math:`b_3 = \tfrac{9}{20}`. In line 5 replace :math:`A` by the sum of row :math:`i` of
+# the matrix. The error of the gap is at most the distance times
 # :math:`(\tfrac 1 {16 h_1} + \tfrac 1 {25 h_2})^{1/2}`.
 
 h3 = 2 / (3 * Fraction(9, 20))

@@ -54,7 +54,7 @@ def own_displacement(forces: Array) -> Array:
 
 
 def needed(forces: Array) -> Array:
-    """Displacement of the bodies at which each touching asperity would not slide."""
+    """Displacement of the bodies at which each touching asperity carries its force without slip."""
     return np.asarray(own_displacement(forces) + ratio * (A @ forces)[touching])
 
 
@@ -85,8 +85,8 @@ assert refused
 #
 # .. math:: Q_i = f (P_i - p_i), \qquad X = c_t f (D_0(P) - D_0(L)), \qquad s_i = c_t f g_i(L) .
 #
-# The reason: subtract the two contact laws of an asperity that touches at both loads. Its own
-# compression gives :math:`k P_i^{2/3} - k p_i^{2/3}`, which is Mindlin's displacement over
+# The reason: subtract the contact laws at the two loads of an asperity that touches at both. Its
+# own compression gives :math:`k P_i^{2/3} - k p_i^{2/3}`, which is Mindlin's displacement over
 # :math:`c_t f`; the coupling is :math:`A (P - p)`; the right side is the difference of approaches,
 # the same for all. An asperity that is open in the second pressing has :math:`p_i = 0`, so
 # :math:`Q_i = f P_i`. It slides, and its slip is :math:`c_t f` times its gap.

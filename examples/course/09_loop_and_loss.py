@@ -50,7 +50,7 @@ k = (9 / (16 * scene.relative_radii)) ** (1 / 3)
 
 
 def least_energy(contact: cr.Contact) -> float:
-    """V at its load."""
+    """V at the load of the contact."""
     P = contact.loads
     return float(0.6 * k @ P ** (5 / 3) + P @ A @ P / 2 - scene.offsets @ P)
 
@@ -127,8 +127,8 @@ plt.show()
 # An independent check
 # --------------------
 #
-# Gauss's rule gives the grey area from pressings alone, interval by interval between the loads at
-# which a ring begins to touch. A polygon inside the loop gives the area of the loop.
+# Gauss's rule gives the grey area from pressings alone; the intervals end at the loads at which a
+# ring begins to touch. A polygon inside the loop gives the area of the loop.
 
 onsets = np.unique((1 - cr.onset_of_sliding(pressed) / limit).round(12))
 ends = np.concatenate(([0.2], onsets[(onsets > 0.2) & (onsets < 1)], [1.0]))
@@ -142,7 +142,7 @@ for low, high in pairwise(ends):
 first = cr.press(scene, load=0.2 * pressed.load).approach
 sliver = pressed.load * (area - 0.8 * (first + pressed.approach) / 2)
 by_sliver = 8 * ratio * FRICTION**2 * sliver
-print(f"loss {half.loss:.9e}, sliver {by_sliver:.9e}, polygon {loop.area:.9e}")
+print(f"loss {half.loss:.9e}, area under the curve {by_sliver:.9e}, polygon {loop.area:.9e}")
 assert abs(by_sliver / half.loss - 1) < 1e-6
 assert 0 < half.loss - loop.area < 1e-3 * half.loss
 

@@ -132,6 +132,27 @@ def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPat
     assert cr.press_many(scenes, approach=5e-5).alone.tolist() == [0, 1, 2]
 
 
+@pytest.mark.parametrize("loads", [[0.01, 2.96], [0.01, 2.96, 0.02]])
+def test_cycles_of_rows_beside_one_that_is_not_proved(loads: list[float]) -> None:
+    contacts = cr.press_many([shaded()] * len(loads), load=loads)
+    assert contacts.alone.tolist() == [1]
+    cycles = contacts.cycles(0.2 * contacts.loads)
+    for k in range(len(loads)):
+        one = cycles[k]
+        assert cycles.order[k] == one.order
+        assert cycles.losses[k] == one.loss
+        assert_array_equal(cycles.status[k], one.status)
+
+
+def test_one_asperity_near_gross_sliding() -> None:
+    """One row of one asperity, whose load at the end is poorly known."""
+    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL, F, geometry="summit")
+    contacts = cr.press_many([scene], load=3e-7)
+    cycles = contacts.cycles((1 - 1e-12) * F * contacts.loads)
+    assert cycles.order.tolist() == ["proved"]
+    assert abs(cycles.losses[0] - cycles[0].loss) <= cycles.loss_errors[0] + cycles[0].loss_error
+
+
 def test_batches_may_be_cut_anywhere(monkeypatch: pytest.MonkeyPatch) -> None:
     scenes = rough(5)
     whole = cr.press_many(scenes, approach=5e-5)

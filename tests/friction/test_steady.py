@@ -181,6 +181,12 @@ def test_bad_input() -> None:
         cr.steady(scene, loads=[0.0, P[1]], forces=[1e-9, 0.0])
     with pytest.raises(cr.InputError, match="finite"):
         cr.steady(scene, loads=[np.inf], forces=[0.0])
+    with pytest.raises(cr.InputError, match=r"phase: found 90\.0, expected a phase in radians"):
+        cr.elliptic_path(load=1.0, force_amplitude=0.1, load_amplitude=0.0, friction=0.5, phase=90)
+    with pytest.raises(cr.InputError, match=r"phases\[1\]: found 90\.0, .*90 degrees are 1\.5708"):
+        cr.phase_losses(
+            scene, load=P[0], load_amplitude=0.0, force_amplitude=0.0, phases=[-3.1416, 90.0]
+        )
     with pytest.raises(cr.InputError, match="phases: found none"):
         cr.phase_losses(scene, load=P[0], load_amplitude=0.0, force_amplitude=0.0, phases=[])
     with pytest.raises(cr.InputError, match="chords"):

@@ -174,6 +174,16 @@ def test_a_wrong_table(tmp_path: Path, normal: str, more: str, expected: str) ->
     assert line.startswith(expected)
 
 
+def test_a_phase_in_degrees(tmp_path: Path) -> None:
+    more = "[friction]\ncoefficient = 1\n[steady]\nphases = [3.1416, 180.0]\n"
+    more += "ellipse = {load = 1.0, force_amplitude = 0.1, phase = 90}"
+    expected = "expected a phase in radians, from -pi to pi; 90 degrees are 1.5708"
+    assert sorted(mistakes(tmp_path, normal="approach = 1e-5", more=more)) == [
+        f"[steady] ellipse.phase: found 90, {expected}",
+        f"[steady] phases[1]: found 180.0, {expected}",
+    ]
+
+
 def test_the_former_name_of_the_largest_forces(tmp_path: Path) -> None:
     """A maximum is a force in Python and was a fraction in files: it is refused, not guessed."""
     more = "[friction]\ncoefficient = 1\n[cycle]\nmaximum = [0.1]"

@@ -105,6 +105,23 @@ def test_contact_beyond_the_sphere(command: Any, tmp_path: Path) -> None:
     assert "of the tip radius: the paraboloid of the model differs" in outcome.err
 
 
+def test_contact_at_the_rim_of_the_array(command: Any, tmp_path: Path) -> None:
+    """A radius in the wrong unit, of a sphere or along one axis; a flat base has no such limit."""
+    array = HEXAGONAL + "within = 0.0102"
+    said = "contact reaches the rim of the array, which ends at 0."
+    for radius, warns in (
+        ("1.0", False),
+        ("1e3", True),
+        ("[1.0, 2e3]", True),
+        ("[1.0, 2.0]", False),
+        ("inf", False),
+    ):
+        text = scene_text(array).replace("radius = 1.0", f"radius = {radius}", 1)
+        assert (said in warned(command, tmp_path, text).err) == warns, radius
+    few = text.replace("radius = inf", "radius = 1e3").replace("0.0102", "0.004")
+    assert said not in warned(command, tmp_path, few).err
+
+
 @pytest.mark.parametrize("spacing", [0.0025, 2.5e-4])
 def test_the_estimate_is_what_pressing_finds(spacing: float) -> None:
     asperities = cr.Asperities.hexagonal(spacing=spacing, tip_radius=8 * spacing, within=0.0102)

@@ -234,7 +234,7 @@ def test_where_nothing_touches_nothing_is_to_be_trusted(command: Any) -> None:
     asked = ("summits", "scan.npz", "--radius", "1e4", "--approach", "-100", "--no-figures")
     outcome = command(*asked)
     assert "warning: at a pruning of 0.05 nothing touches, so the model is not" in outcome.err
-    assert "to be trusted     nothing, as nothing touches" in outcome.out
+    assert "advised pruning   none, because nothing touches" in outcome.out
 
 
 def test_the_whole_map_beside_its_asperities(command: Any, surface: cr.surface.Surface) -> None:
@@ -274,6 +274,17 @@ def test_figures_in_the_formats_asked_for(command: Any) -> None:
     assert Path("summits-map.pdf").read_bytes().startswith(b"%PDF")
     width = int.from_bytes(Path("summits-map.png").read_bytes()[16:20], "big")
     assert width < 300  # 4.4 inches
+
+
+def test_a_map_in_micrometres_called_millimetres(command: Any, surface: cr.surface.Surface) -> None:
+    """Its slopes are right; only the base shows the mistake."""
+    np.save("map.npy", surface.heights)
+    Path("mm.toml").write_text(SCENE.format(radius=10.0, modulus=1e5, load=1.0, unit="mm"))
+    for unit, wrong in (("mm", True), ("µm", False)):
+        options = ("--pixel", "1", "--unit", unit, "--no-figures", "--force")
+        said = command("summits", "map.npy", "--scene", "mm.toml", *options).err
+        assert ("the map is 256 mm wide, and the base 20 mm: check the units" in said) == wrong
+        assert ("asperities in contact: 1, fewer than 5" in said) == wrong
 
 
 @pytest.mark.usefixtures("surface")

@@ -162,3 +162,17 @@ def test_holes_become_soap_films() -> None:
     assert np.nanmin(rough) <= mended.min()
     assert mended.max() <= np.nanmax(rough)
     assert_allclose(mended[~np.isnan(rough)], rough[~np.isnan(rough)], rtol=0)
+
+
+def test_spikes_and_drop_outs_are_named() -> None:
+    """Single pixels and pairs; no feature of the map, not even a groove one pixel wide."""
+    made = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=128).heights + 50.0
+    grooved = made.copy()
+    grooved[40] -= 30.0
+    grooved[60:70, 60:70] += 30.0
+    assert cr.surface.Surface(grooved, 1.0).warnings == ()
+    grooved[7, 9:11] = 0.0
+    grooved[90, 0] = 80.0
+    (said,) = cr.surface.Surface(grooved, 1.0).warnings
+    assert said.startswith("spikes or drop-outs: 3 pixels far from their neighbours, the first in")
+    assert "in row 7, column 9; make them nan and use fill=True, or --fill" in said

@@ -118,8 +118,8 @@ def test_a_line_of_numbers(tmp_path: Path) -> None:
 
 def test_units_are_kept_and_shown(tmp_path: Path) -> None:
     found = read_loads(written(tmp_path, GERMAN), small())
-    said = "separated by semicolons, decimal comma, load [N], matched by position, to 0"
-    assert found.note.endswith(said)
+    said = "separated by semicolons, decimal comma, load [N], matched by position"
+    assert found.note.endswith(f"{said} (largest distance 0)")
     assert "load [kN]" in read_loads(written(tmp_path, "load / kN\n1\n0\n0\n"), small()).note
 
 

@@ -91,7 +91,7 @@ class Cycled(Result):
     """The result of [cycle]: the steady cycles."""
 
     stage: Cycle
-    title = "steady cycles"
+    title = "steady cycles: amplitudes Qa of the force and Xa of the displacement, loss W"
     digits = 6
     printed: ClassVar[Mapping[str, str]] = {
         "maximum_fraction": "max/(fP)",
@@ -103,7 +103,7 @@ class Cycled(Result):
         "loss_factor": "W/(pi Qa Xa)",
         "loss_normalised": "W/W0",
         "smooth_normalised": "smooth W/W0",
-        "sliding": "slide",
+        "sliding": "sliding",
     }
 
     def rows(self) -> list[Summary]:

@@ -112,18 +112,10 @@ def doubts_of(normal: Summary) -> Iterator[str]:
         yield f"not certified: undecided asperities: {normal['undecided']}"
 
 
-def cautions(normal: Summary, units: UnitNames) -> Iterator[str]:
-    """Warnings about the limits of the model, which the certificate does not cover."""
-    yield from plausibility.unlikely_modulus(normal["contact_modulus"], units)
-    named = units.force and units.length
-    yield from plausibility.doubts(normal, f"{units.force}/{units.length}²" if named else "")
-
-
 def limits_of(contact: Contact) -> Summary:
     """Measures of the validity of the model: those of `plausibility.limits_of`, and
 
     geometry        : where asperities meet the base
-    contact_modulus : [force / length^2]
     closest_change  : largest relative change of a large load if the geometry were "closest"; None
         if it is, or if the change could not be computed
     """
@@ -136,7 +128,6 @@ def limits_of(contact: Contact) -> Summary:
     return {
         **plausibility.limits_of(contact),
         "geometry": scene.geometry,
-        "contact_modulus": scene.material.contact_modulus,
         "closest_change": change,
     }
 

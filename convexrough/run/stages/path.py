@@ -30,7 +30,15 @@ from convexrough.run.stage import (
     plain,
     titled,
 )
-from convexrough.run.values import FileTable, Finite, Mistake, NonNegative, Positive, expected
+from convexrough.run.values import (
+    FileTable,
+    Finite,
+    Mistake,
+    NonNegative,
+    Phase,
+    Positive,
+    expected,
+)
 from convexrough.tabular.columns import aligned
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
@@ -48,7 +56,7 @@ class Ellipse(FileTable):
     load_amplitude: Finite = 0.0
     force: Finite = 0.0
     force_amplitude: Finite
-    phase: Finite = 0.0
+    phase: Phase = 0.0
     chords: Annotated[int, expected("a whole number, at least 6", lambda value: value >= 6)] = 96
 
 
@@ -108,7 +116,7 @@ class Pathed(Steps):
         "loss": "loss",
         "stuck": "stuck",
         "partial": "partial",
-        "sliding": "slide",
+        "sliding": "sliding",
     }
 
     def summary(self) -> Summary:
@@ -147,7 +155,7 @@ class Steady(_Points):
     numbers = (*("level", "force_level", "loss", "loss_error", "loss_first", *COUNTS),)
     needs: ClassVar[Mapping[str, str]] = {"phases": "ellipse", "factors": "phases"}
 
-    phases: Annotated[list[Finite], expected("a list of finite numbers", bool)] | None = None
+    phases: Annotated[list[Phase], expected("a list of phases in radians", bool)] | None = None
     factors: Annotated[list[Positive], expected("a list of positive numbers", bool)] = Field([1.0])
 
     def compute(self, contact: Contact) -> Settled:
@@ -174,11 +182,11 @@ class Settled(Single):
     """The result of [steady]: the steady cycle, and losses at other phases if requested."""
 
     printed: ClassVar[Mapping[str, str]] = {
-        "level": "stuck level",
+        "level": "stuck below load",
         "loss": "loss",
         "loss_error": "error",
         "partial": "partial",
-        "sliding": "slide",
+        "sliding": "sliding",
         "intermittent": "intermittent",
     }
 

@@ -69,8 +69,8 @@ class Limit(Single):
     digits = 12
     printed: ClassVar[Mapping[str, str]] = {
         "factor": "factor",
-        "lower": "proved above",
-        "upper": "and below",
+        "lower": "lower bound",
+        "upper": "upper bound",
         "gross": "gross sliding",
     }
 

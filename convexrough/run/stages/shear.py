@@ -38,7 +38,7 @@ class Sheared(Result):
         "fraction": "Q/(fP)",
         "force": "force",
         "displacement": "displacement",
-        "sliding": "slide",
+        "sliding": "sliding",
         "partial": "partial",
         "undecided": "undecided",
     }
