@@ -55,6 +55,12 @@ class ShearVerdict(Claim, Record):
         """(n,) [force] the claimed shear forces."""
         return self.forces
 
+    @property
+    def largest(self) -> float:
+        """[force] the size of the largest given force; if all are 0, the largest limit f P_i."""
+        limit = checks.friction(self.contact.scene.friction) * float(self.contact.loads.max())
+        return super().largest or limit
+
     @cached_property
     def wrongly_sliding(self) -> Indices:
         """(m,) indices of asperities claimed to slide, but proved to stick in part or be open."""
