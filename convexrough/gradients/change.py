@@ -254,10 +254,10 @@ class _Bent:
         coupled = level.approach + level.problem.exact.offsets - level.indentation
         change, points = coupled * -self.modulus, self.here.points
         if points.value.any():
-            every, loads = np.arange(len(level.problem)), level.loads
-            change = change + (points * self.geometry.slopes(loads, every)).sum()
-            for k in (0, 1):
-                change = change - self.geometry.slopes(points[:, k] * loads, every)[:, k]
+            every, P = np.arange(len(level.problem)), level.loads
+            carried = [P, points[:, 0] * P, points[:, 1] * P]
+            by_points, by_x, by_y = self.geometry.slopes(carried, every)
+            change = change + (points * by_points).sum() - by_x[:, 0] - by_y[:, 1]
         return change
 
 

@@ -22,9 +22,9 @@ import numpy as np
 
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.gradients.pulled import ZERO, Pulled
+from convexrough.influence import Influence
 from convexrough.normal.problem import NormalProblem
-from convexrough.numbers.balls import Ball, of_rows, where
-from convexrough.numbers.pairs import Pair
+from convexrough.numbers.balls import Ball, joined, of_rows, where
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along, named
 from convexrough.scene.scene import Scene
@@ -118,25 +118,29 @@ class Geometry:
             self.share * moved + tips[:, None] * a.points + radius * b.points,
         )
 
-    def slopes(self, loads: Ball, which: Indices) -> Ball:
+    def slopes(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
         """(m, 2) [1 / length] -scale sum_j (c_i - c_j) P_j / r_ij^3 for the m asperities `which`.
 
-        loads : (m,) P. For more than PAIRWISE asperities the sums are computed in float64. With a
-        matrix their error is about m roundoffs of the sum of magnitudes; else no bound is known
+        loads : several (m,) P. For more than PAIRWISE asperities the sums are computed in float64.
+        With a matrix their error is about m roundoffs of the sum of magnitudes; else no bound is
+        known
         """
         if len(which) <= PAIRWISE:
             return self._pair_by_pair(loads, which)
         influence = self.problem.influence.restricted(which)
+        return [self._at_once(each, influence) for each in loads]
+
+    def _at_once(self, loads: Ball, influence: Influence) -> Ball:
         found = influence.slopes(loads.value)
         if influence.name != "dense":
             return Ball.around(found, np.inf)
-        off = (len(which) + 16) * ROUNDOFF + 4.0 * influence.entry_error
+        off = (len(loads) + 16) * ROUNDOFF + 4.0 * influence.entry_error
         size = influence.falloff(np.abs(loads.value) * off + loads.error, 2) * influence.scale
         return Ball.around(found, (size * (1 + SAFETY))[:, None])
 
-    def _pair_by_pair(self, loads: Ball, which: Indices) -> Ball:
-        points, scale = self.contact_points[which], self.problem.exact.scale
-        n, found = len(which), []
+    def _pair_by_pair(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
+        points, scale, n = self.contact_points[which], self.problem.exact.scale, len(which)
+        found: list[list[Ball]] = [[] for _ in loads]
         rows = max(1, BLOCK // max(1, n))
         for start in range(0, n, rows):
             some = np.arange(start, min(start + rows, n))
@@ -146,11 +150,12 @@ class Geometry:
             apart = np.ones(squares.shape, dtype=bool)
             apart[itself] = False
             squares = where(apart, squares, 1.0 + 0.0 * squares)
-            weights = where(apart, loads[None, :] / (squares * squares.sqrt()), 0.0 * squares)
-            found += [Ball.stacked([(x * weights).sum(), (y * weights).sum()])]
-        parts = ((f.mid.high, f.mid.low, f.radius) for f in found)
-        high, low, radius = (np.concatenate(each, axis=1).T for each in zip(*parts, strict=True))
-        return -scale * Ball(Pair(high, low), radius)
+            falloff = where(apart, -scale / (squares * squares.sqrt()), 0.0 * squares)
+            x, y = x * falloff, y * falloff
+            for kept, P in zip(found, loads, strict=True):
+                sums = (x * P[None, :]).sum(), (y * P[None, :]).sum()
+                kept.append(of_rows(lambda *each: np.stack(each, axis=-1), *sums))
+        return [joined(each) for each in found]
 
 
 @dataclass(frozen=True)
@@ -186,11 +191,11 @@ class Derivatives:
             carrying |= (each.left.size > 0) | (each.loads.size > 0)
         which = np.flatnonzero(carrying)
         total = Ball.exact(np.zeros((len(which), 2)))
-        for each in self.pulled:
-            left, loads = each.left[which], each.loads[which]
-            if left.size.any():
-                total = total + left[:, None] * geometry.slopes(loads, which)
-                total = total + loads[:, None] * geometry.slopes(left, which)
+        turned = [(each.left[which], each.loads[which]) for each in self.pulled]
+        turned = [pair for pair in turned if pair[0].size.any()]
+        slopes = iter(geometry.slopes([each for pair in turned for each in pair], which))
+        for left, loads in turned:
+            total = total + loads[:, None] * next(slopes) + left[:, None] * next(slopes)
         everywhere: Ball = of_rows(partial(among_zeros, places=which, count=n), total)
         return everywhere
 
