@@ -62,7 +62,7 @@ def claim_options(command: Command) -> Command:
                           "default 1 % of the smallest spacing."),
         click.option("--floor", metavar="X", type=float, default=0.0,
                      help="Treat loads up to X as zero, so that their asperities are open."),
-        click.option("--within", metavar="PART", type=float,
+        click.option("--within", metavar="PART", type=float, default=0.01, show_default=True,
                      help="Largest error allowed, as a fraction of the largest load."),
     ):  # fmt: skip
         command = option(command)
@@ -103,7 +103,7 @@ def verify(
     scene: Path,
     loads: Path,
     *,
-    within: float | None,
+    within: float,
     shear: Path | None,
     shear_force: float | None,
     explain: bool,

@@ -133,10 +133,10 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
     for axes in (upper, middle, lower):
         axes.axvspan(0.0, _place(until), color="0.92", lw=0.0, zorder=0)
         axes.axvline(_place(chosen), color=SMOOTH, lw=0.9, ls=":")
-    trusted = "nowhere" if np.isnan(first) else f"from {100 * first:.3g} %"
+    advised = "none is enough" if np.isnan(first) else f"at least {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
     size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
-    title(upper, f"to be trusted: {trusted}{size}")
+    title(upper, f"advised pruning: {advised}{size}")
     return figure
 
 
