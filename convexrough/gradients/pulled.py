@@ -54,7 +54,9 @@ class Part:
     def value(self) -> Ball:
         """The weighted sum."""
         level = self.level
-        total = self.energy * level.energy + self.approach * level.approach
+        total = self.approach * level.approach
+        if self.energy.size > 0.0:
+            total = total + self.energy * level.energy
         if self.loads is not None:
             total = total + self.loads.dot(level.loads)
         if self.indentations is not None:
