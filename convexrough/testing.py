@@ -18,7 +18,7 @@ from convexrough.errors import InputError
 from convexrough.friction.shear import ShearCertificate
 from convexrough.friction.verdict import verify_shear
 from convexrough.normal.certificate import Certificate, certify
-from convexrough.normal.claims import Claim
+from convexrough.normal.claims import WITHIN, Claim
 from convexrough.scene.scene import Scene
 from convexrough.verdict import Verdict, verify
 from convexrough.verdict.report import describe_claim, reason
@@ -33,15 +33,14 @@ def assert_certified(
     *,
     approach: float | None = None,
     load: float | None = None,
-    within: float | None = None,
+    within: float = WITHIN,
     floor: float = 0.0,
 ) -> Certificate:
     """Check that exactly the asperities with a load touch; return the certificate of the loads.
 
     loads  : (n,) [force] from any source, in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
-    within : also check that the error of every load is below this fraction of the largest load.
-        Without it the loads only need to be accurate enough to prove every status
+    within : largest error of a load, as a fraction of the largest load, and of the total
     floor  : [force] a load up to this claims that its asperity is open
 
     Raises AssertionError with the asperities concerned.
@@ -59,14 +58,14 @@ def assert_shear_certified(
     forces: ArrayLike,
     *,
     force: float,
-    within: float | None = None,
+    within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearCertificate:
     """Check that exactly the asperities claimed to slide do; return the certificate of the forces.
 
     forces  : (n,) [force] along the shear force, after loading from rest, from any source
     force   : [force] their prescribed sum
-    within  : also check that the error of every force is below this fraction of the largest
+    within  : largest error of a force, as a fraction of the largest force
     sliding : (n,) bool, which asperities are claimed to slide; default: those whose force is f P_i
         within a fraction 1e-4 (P_i: the load)
 

@@ -45,7 +45,7 @@ def map_options(command: Command) -> Command:
 def press_options(command: Command) -> Command:
     """Options for pressing the summits."""
     for option in (
-        click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, with --load."),
+        click.option("--modulus", metavar="E", type=float, help="Contact modulus E*, for --load."),
         click.option("--load", metavar="P", type=float, help="Prescribed load."),
         click.option(
             "--approach",
@@ -72,7 +72,7 @@ def press_options(command: Command) -> Command:
 @click.option("--fit", metavar="N", type=int, default=3, show_default=True,
               help="Width in pixels of the square to which a tip is fitted.")  # fmt: skip
 @click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Smallest prominence of a hill, over the height range Sz.")  # fmt: skip
+              help="Smallest prominence of a hill, as a fraction of the height Sz.")  # fmt: skip
 @click.option("--whole", is_flag=True,
               help="Also press the whole map by boundary elements.")  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, default=Path("summits.csv"), show_default=True,

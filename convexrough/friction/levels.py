@@ -23,7 +23,7 @@ from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
-from convexrough.normal.level import Level
+from convexrough.normal.level import Level, rows_of
 from convexrough.normal.together import Rows
 from convexrough.numbers.balls import TINY, Ball, of_rows
 from convexrough.numbers.pairs import PAIR_ROUNDOFF, Pair
@@ -118,15 +118,7 @@ class FrictionLevels:
 
     def rows(self, loads: Sequence[Fraction]) -> Rows:
         """The levels at these loads, as rows."""
-        levels = [self.at(load) for load in loads]
-        return Rows(
-            Ball.stacked([level.load for level in levels]),
-            Ball.stacked([level.approach for level in levels]),
-            Ball.stacked([level.loads for level in levels]),
-            Ball.stacked([level.indentation for level in levels]),
-            np.array([level.touching for level in levels]),
-            np.array([level.open for level in levels]),
-        )
+        return rows_of([self.at(load) for load in loads])
 
     def displaced(self, displacement: float) -> Fraction:
         """The load of the level with the approach D0(P) - X / (c_t f), for X >= 0 [length].

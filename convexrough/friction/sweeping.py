@@ -6,13 +6,8 @@ the support of C~, and let t_i be such that for all others k != i there
 
     A_ik <= t_i (w_k / C~_k + sum over j != k of w_j A_jk).                                     (1)
 
-If t_i < 1 on the support, y(C) > 0 there, and y_i(C) >= 1 - t_i for all i. For follow y(s C) from
-y(0) = 1 up to s = 1. As long as no rate of the support is negative, z = s C y is not, and w_k z_k /
-C~_k <= w_k y_k. So (1), times z_k and summed, says by the rows of y + A z = 1 that
-
-    (A z)_i <= t_i sum_j w_j (y_j + (A z)_j) = t_i,   that is   y_i = 1 - (A z)_i >= 1 - t_i.
-
-So no rate of the support ever reaches 0.
+By (2) of that module, with the weights t_i w_j and delta = C~, all rates y_i(C) are at least
+1 - t_i, if this is positive on the support.
 
 (1) compares potentials. A charge 1 at i is swept onto its neighbours; the potential of these, each
 spread over a shell of radius R_j = scale C~_j and there as on its shell, may nowhere be less than
@@ -20,8 +15,8 @@ the part 1 / t_i of that of the charge.
 
 Weights without first and second moments, sum w_j d_j = sum w_j d_j^2 = 0, and with the least energy
 do where neighbours are all around. At an edge a barrier method finds weights that meet (1) with the
-least total at near neighbours and at some far away.
-For one outside of the contact one neighbour alone does, if that is nearer to all others.
+least total at near neighbours and at some far away. For one outside of the contact one neighbour
+alone does, if that is nearer to all others.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.friction.shear import ShearCertificate, ShearState, against, shear
-from convexrough.normal.claims import Claim
+from convexrough.normal.claims import WITHIN, Claim
 from convexrough.record import Record
 
 #: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i.
@@ -28,8 +28,7 @@ class ShearVerdict(Claim, Record):
     forces  : (n,) [force] the claimed shear forces
     total_prescribed : [force] their prescribed sum Q
     claimed : (n,) true where the asperity is claimed to slide
-    within  : largest error allowed, as a fraction of the largest force; None: as accurate as needed
-        to prove every status from the forces alone
+    within  : largest error allowed, as a fraction of the largest force
     certificate : certificate of the claimed forces
     solution : the friction state, with its own certificate
     """
@@ -47,7 +46,7 @@ class ShearVerdict(Claim, Record):
     forces: Array
     total_prescribed: float | None
     claimed: NDArray[np.bool_]
-    within: float | None
+    within: float
     certificate: ShearCertificate
     solution: ShearState
 
@@ -55,6 +54,12 @@ class ShearVerdict(Claim, Record):
     def values(self) -> Array:
         """(n,) [force] the claimed shear forces."""
         return self.forces
+
+    @property
+    def largest(self) -> float:
+        """[force] the size of the largest given force; if all are 0, the largest limit f P_i."""
+        limit = checks.friction(self.contact.scene.friction) * float(self.contact.loads.max())
+        return super().largest or limit
 
     @cached_property
     def wrongly_sliding(self) -> Indices:
@@ -81,7 +86,7 @@ def verify_shear(
     forces: ArrayLike,
     *,
     force: float,
-    within: float | None = None,
+    within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
     """Comparison of shear forces of first loading from any source with the solution.
@@ -94,7 +99,7 @@ def verify_shear(
 
     Raises InputError as `certify_shear`.
     """
-    within = None if within is None else checks.positive("within", within)
+    within = checks.positive("within", within)
     given = checks.array("forces", forces, length=len(contact.scene))
     state = shear(contact, force=checks.finite("force", force))
     if sliding is None:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.roundoff import SAFETY
 
-#: Largest relative error of a total, where `within` is not given.
-TOTAL_WITHIN = 1e-6
+#: Largest error of forces and totals by default, as a fraction of the largest force or the total.
+WITHIN = 0.01
 
 #: Smallest error of a suspect, as a fraction of the largest error.
 SUSPICIOUS = 1e-3
@@ -26,8 +26,7 @@ class Claim(ABC):
     one, many : names of a force and of the forces;  proved : name of the claimed set
     kinds     : ways in which a status can be wrong: attributes with indices, and their descriptions
     claims    : the statuses that are claimed where `claimed` is True and where it is False
-    within : largest error allowed, as a fraction of the largest force; None: errors must only
-        be small enough to prove every status from the forces alone
+    within : largest error allowed, as a fraction of the largest force, and of the total
     total_prescribed : [force] None where it is not prescribed
     certificate : the certificate of the given forces
     solution    : a solution with its own statuses; None where it is not needed or not found
@@ -40,7 +39,7 @@ class Claim(ABC):
     claims: ClassVar[tuple[str, str]]
 
     claimed: Any
-    within: float | None
+    within: float
     total_prescribed: float | None
     certificate: Any
     solution: Any
@@ -114,15 +113,14 @@ class Claim(ABC):
 
     @cached_property
     def off(self) -> Indices:
-        """(m,) asperities with an error above `within`, largest first; empty without `within`."""
+        """(m,) asperities with an error above `within`, largest first."""
         order = np.argsort(-self.errors, kind="stable")
-        limit = np.inf if self.within is None else self.within * self.largest
-        return frozen(order[~(self.errors[order] <= limit)])
+        return frozen(order[~(self.errors[order] <= self.within * self.largest)])
 
     @property
     def near_enough(self) -> bool:
         """True if every force is proved to be near enough to the solution."""
-        return self.decided_alone if self.within is None else not len(self.off)
+        return not len(self.off)
 
     @property
     def total_given(self) -> float:
@@ -131,11 +129,11 @@ class Claim(ABC):
 
     @property
     def total_holds(self) -> bool:
-        """True if the total is as prescribed, to a relative error of `within` (default 1e-6)."""
+        """True if the total is as prescribed, to a relative error of `within`."""
         if self.total_prescribed is None:
             return True
         missing = abs(self.total_given - self.total_prescribed)
-        return missing <= (self.within or TOTAL_WITHIN) * abs(self.total_prescribed)
+        return missing <= self.within * abs(self.total_prescribed)
 
     @cached_property
     def suspects(self) -> Indices:

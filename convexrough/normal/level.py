@@ -30,7 +30,7 @@ from convexrough.normal.problem import REDUCTION, NormalProblem
 from convexrough.normal.proved import Obstacle, Proved, proved
 from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial, refined_loads
 from convexrough.normal.stack import Stack
-from convexrough.normal.together import NUMBERS, solved
+from convexrough.normal.together import NUMBERS, Rows, solved
 from convexrough.numbers.balls import Ball, where
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
@@ -363,6 +363,16 @@ def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | Non
         return Level(it.problem, loads[k], *known, it, it.trial)
 
     return [level(k) if found.good[k] else None for k in range(m)]
+
+
+def rows_of(levels: Sequence[Level]) -> Rows:
+    """Levels of one scene as rows."""
+    balls = [(it.load, it.approach, it.loads, it.indentation) for it in levels]
+    load, approach, loads, indentation = map(Ball.stacked, map(list, zip(*balls, strict=True)))
+    touching, open_ = (
+        np.array([getattr(it, name) for it in levels]) for name in ("touching", "open")
+    )
+    return Rows(load, approach, loads, indentation, touching, open_)
 
 
 @np.errstate(invalid="ignore")  # unproved levels

@@ -173,8 +173,9 @@ class Asperities(Record):
     ) -> Asperities:
         spacing = checks.positive("spacing", spacing)
         within = checks.non_negative("within", within)
-        checks.fits_in_memory("spacing", np.pi * pattern.density * (within / spacing) ** 2 + 1, 300)
-
+        ratio = within / spacing
+        count = np.pi * pattern.density * ratio**2 + 1
+        checks.fits_in_memory(f"within / spacing = {ratio:.3g}", count, 300)
         layout = Layout.of(pattern, spacing, (within / spacing) ** 2 * (1 + 1e-12))
         n = len(layout.points)
         radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")

@@ -121,8 +121,10 @@ def open_folder(path: Path) -> Folder:
 def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
     """The folder of this sweep, created if it does not exist.
 
-    Raises FileError if it contains another sweep or other files, or cannot be written.
+    Raises FileError if it contains another sweep or other files, or cannot be written, and
+    ExtraError, before that, if pyarrow is not installed.
     """
+    arrow()
     if overwrite and (path / MANIFEST).exists():
         for part in (path / PARTS).glob("*.parquet"):
             part.unlink(missing_ok=True)

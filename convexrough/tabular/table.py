@@ -353,7 +353,9 @@ def _lookalikes(source: _Source, places: Mapping[str, int], wanted: Sequence[str
 
 def _named(source: _Source) -> str:
     if source.header is None:
-        return f"no header and {len(source.columns)} columns"
+        columns, rows = len(source.columns), len(source.rows)
+        turned = f" of {rows}: transposed?" if columns > rows > 1 else ""
+        return f"no header and {columns} columns{turned}"
     return _cut(", ".join(source.header))
 
 

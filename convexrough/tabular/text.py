@@ -48,6 +48,9 @@ _BINARY = {
     b"\xd0\xcf\x11\xe0": "an old Excel workbook; save it as .xlsx",
     b"\x93NUMPY": "a NumPy array; name it .npy",
     b"PAR1": "a Parquet file; name it .parquet",
+    b"<html": "a page in HTML; save the table itself",
+    b"<!doctype html": "a page in HTML; save the table itself",
+    b"<?xml": "XML; save it as CSV or .xlsx",
 }
 
 
@@ -158,7 +161,10 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
         raise FileError(f"{path}: empty")
     styles = [Style(separator, mark) for mark in ".,"] if separator else STYLES
     style = sniff([text for _, text in lines[:SAMPLE]], styles)
-    rows = [_row(number, text, style) for number, text in lines]
+    read = (_row(number, text, style) for number, text in lines)
+    rows = [row for row in read if any(row.cells) or row.wrong]  # Excel writes empty rows as ;;
+    if not rows:
+        raise FileError(f"{path}: empty")
     header, rows = _headed(rows, comment, style, known)
     return TextTable(*_trimmed(header, rows, style), style)
 
@@ -199,7 +205,8 @@ def _listed(
 
     If there are more names than numbers below, two spaces separate names. Titles, which are
     left out, stand directly below the first header or above another one; they begin with no number
-    and have another number of cells.
+    and have another number of cells. Lines at the end that begin with a word, such as those of
+    totals, are left out too.
     """
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), 0)
     width = len(rows[first].cells) if rows else 0
@@ -216,6 +223,8 @@ def _listed(
         else:
             while kept and title(kept[-1]):
                 kept.pop()
+    while kept and kept[-1].cells and re.fullmatch(r"[A-Za-z*]+[:=]?", kept[-1].cells[0]):
+        kept.pop()
     return header, kept
 
 
@@ -244,7 +253,7 @@ def _workbook(path: Path, known: Sequence[str]) -> Iterator[tuple[int, str]]:
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
         pages = [
-            [["" if cell is None else _plain(str(cell)) for cell in row]
+            [["" if cell is None else _plain(cell) for cell in row]
              for row in page.iter_rows(values_only=True)]
             for page in book.worksheets
         ]  # fmt: skip
@@ -258,15 +267,16 @@ def _workbook(path: Path, known: Sequence[str]) -> Iterator[tuple[int, str]]:
         yield number, "\t".join(row)
 
 
-def _plain(cell: str) -> str:
-    """The text of a cell on one line, without quotes."""
-    return " ".join(cell.replace('"', "").split())
+def _plain(cell: Any) -> str:
+    """The text of a cell on one line, without quotes; numbers typed as text get decimal points."""
+    text = " ".join(str(cell).replace('"', "").split())
+    return text if Style("\t", ",").number(text) is None else text.replace(",", ".")
 
 
 def _encoding(path: Path, raw: BufferedReader[Any]) -> str:
     head = raw.peek(64)[:64]
     for magic, what in _BINARY.items():
-        if head.startswith(magic):
+        if head.startswith(magic) or head.lstrip().lower().startswith(magic):
             raise FileError(f"{path}: not text: {what}")
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"

@@ -107,7 +107,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         mistakes.append("columns: found neither x nor y, expected both, of nodes or pixels")
     if mistakes:
         raise TableError(str(path), mistakes)
-    values = columns[name] if name in columns else columns["pressure"] * _areas(path, columns)
+    areas = None if name in columns else _areas(path, columns)
+    values = columns[name] if areas is None else columns["pressure"] * areas
     if name == "load":
         values = how.sign * values
     place = _Placing(scene, table, how)
@@ -123,6 +124,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     status = columns.get("status")
     if status is not None:
         status = frozen(_spread(status, owners, "open", len(scene)))
+    if areas is not None and "area" not in columns:
+        place.how += f", each of area {areas:.5g}"
     units = [f"{each} [{unit}]" for each, unit in table.units.items()]
     note = ", ".join(filter(None, [table.style, *units, place.how]))
     return Claimed(frozen(forces), status, f"{path}: {note}", [*_explained(table), place.how])
@@ -150,16 +153,19 @@ def _spread(values: NDArray[Any], owners: Indices, rest: str, count: int) -> NDA
 
 
 def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
-    """The areas of nodes, or of the pixels of a regular grid."""
+    """The areas of nodes, or the one area of the points of a regular grid.
+
+    The points of a hexagonal grid are every second one of a rectangular grid.
+    """
     if "area" in columns:
         return columns["area"]
     try:
-        (_, dx), (_, dy) = (steps(path, name, columns[name]) for name in ("x", "y"))
+        (i, dx), (j, dy) = (steps(path, name, columns[name]) for name in ("x", "y"))
     except InputError as error:
         expected = f"a column 'area', or x and y on a regular grid: {error.what} {error.found}"
         mistake = f"columns: found pressure without areas, expected {expected}"
         raise TableError(str(path), [mistake]) from error
-    return dx * dy
+    return dx * dy * (1 if np.ptp((i + j) % 2) else 2)
 
 
 def _explained(table: ReadTable) -> Iterator[str]:
@@ -219,7 +225,7 @@ class _Placing:
         if len(self.scene) > 1:
             apart = nearest_distances(self.scene.asperities.positions)
         far = np.flatnonzero((values != 0) & (distances > apart[owners]))
-        loaded = self.points[values != 0]
+        loaded, pressed = self.points[values != 0], np.abs(values[values != 0])
 
         def fits(points: Array) -> bool:
             """True if near to more than one asperity, and nearer than random points."""
@@ -227,9 +233,14 @@ class _Placing:
             parts = near / apart[their]
             return bool(parts.max() <= 1 and np.median(parts) < BY_CHANCE and np.ptp(their) > 0)
 
-        if len(loaded) and not fits(loaded) and (moved := self._moved(loaded, fits)):
-            self.mistakes.append(f"positions: {moved}")
-            return owners
+        if len(loaded) and not fits(loaded):
+            middle = np.average(loaded, axis=0, weights=pressed)
+            moved = self._moved(loaded, fits) or (
+                f"all are shifted by about {_pair(middle)}, expected them from the axis of the "
+                "sphere" if fits(loaded - middle) else "")  # fmt: skip
+            if moved:
+                self.mistakes.append(f"positions: {moved}")
+                return owners
         for i in far:
             found = (
                 f"a load at {self.points[i].tolist()}, {distances[i]:g} from the nearest asperity"
@@ -246,11 +257,17 @@ class _Placing:
         count, least, most = len(self.scene), int(index.min()), int(index.max())
         values, times = np.unique(index, return_counts=True)
         sure = bare(name).lower() in SURELY_INDEX or (bool(name) and self.manner.missing_open)
-        # Rising numbers may be of nodes and are ignored; in another order they are indices.
-        sure |= bool(name) and times.max() == 1 and bool((np.diff(index) < 0).any())
+        # Rising numbers may be of nodes and are ignored; in another order, or if nearly all fit,
+        # they are indices.
+        if times.max() == 1:
+            sure |= bool(name) and bool((np.diff(index) < 0).any())
+        else:
+            sure |= bool(name) and 2 * len(values) > len(index) and most - min(least, 1) < count
         wrong = ""
         if times.max() > 1:
-            wrong = f"{values[times.argmax()]} twice, expected each asperity once"
+            twice = values[times.argmax()]
+            where = " and ".join(self.table.rows[i] for i in np.flatnonzero(index == twice)[:2])
+            wrong = f"{twice} in {where}, expected each asperity once"
         elif least > 0 and most < count:
             wrong = f"{least} to {most}: from 0 or from 1? Expected x and y, or a row of asperity 0"
             wrong = wrong.replace(f"{least} to", f"numbers from {least} to")
@@ -321,10 +338,13 @@ class _Placing:
         for shift in tried:
             if fits(points[:20] + shift) and fits(points + shift):
                 digit = 0.1 * allowed
-                there = ", ".join(f"{each:.4g}" for each in np.round(-shift / digit) * digit + 0.0)
                 expected = f"expected them from the axis of the sphere, to {allowed:.3g}"
-                return f"all are shifted by [{there}], {expected}"
+                return f"all are shifted by {_pair(np.round(-shift / digit) * digit)}, {expected}"
         return ""
+
+
+def _pair(point: Array) -> str:
+    return f"[{', '.join(f'{each + 0.0:.4g}' for each in point)}]"
 
 
 def _too_far_out(power: int) -> str:

@@ -11,6 +11,7 @@ from convexrough import checks
 from convexrough.contact import Contact, solve
 from convexrough.errors import TableError, blamed_on
 from convexrough.friction.verdict import claims_sliding, verify_shear
+from convexrough.normal.claims import WITHIN
 from convexrough.normal.problem import NormalProblem
 from convexrough.verdict.claims import Claimed, Manner, read_loads, read_shear_forces
 from convexrough.verdict.report import Verified
@@ -25,7 +26,7 @@ def verify_files(
     loads: Path,
     how: Manner,
     *,
-    within: float | None = None,
+    within: float = WITHIN,
     shear: Path | None = None,
     force: float | None = None,
 ) -> Verified:
@@ -34,8 +35,7 @@ def verify_files(
     within : largest error, as a fraction of the largest load or shear force
     shear, force : a file of shear forces and their total [force]; both or neither
     """
-    if within is not None:
-        checks.positive("--within", within)
+    checks.positive("--within", within)
     given = read_loads(loads, problem.scene, how)
     forces = read_shear_forces(shear, problem.scene, how) if shear is not None else None
     with blamed_on(loads):

@@ -104,8 +104,7 @@ def _proved(claim: Claim) -> str:
         return f"{claim.proved} wrong"
     if len(claim.undecided):
         return f"{claim.proved} not proved"
-    asked = "" if claim.within is not None else " (no tolerance given)"
-    near = f"{claim.many} known to {_size(claim)}{asked}"
+    near = f"{claim.many} correct to {_size(claim)}"
     if not claim.near_enough:
         near += ", not near enough"
     return f"{claim.proved} proved; {near}{'' if claim.total_holds else '; total load differs'}"
@@ -146,8 +145,6 @@ def reason(claim: Claim) -> str:
     counts = {"wrong statuses": len(claim.wrongly_claimed), "undecided": len(claim.undecided)}
     counts[f"{claim.one}s not within the tolerance"] = len(claim.off)
     parts = [f"{what} ({count:,})" for what, count in counts.items() if count]
-    if not claim.near_enough and claim.within is None:
-        parts.append(f"{claim.one}s too inaccurate to prove all statuses")
     if not claim.total_holds:
         parts.append(f"the total {claim.one} is not the prescribed one")
     return ", ".join(parts)
@@ -212,10 +209,6 @@ def _table(claim: Claim, scene: Scene, which: Indices) -> list[str]:
 
 
 def _off(claim: Claim) -> str:
-    if claim.within is None:
-        if claim.near_enough:
-            return f"at most {_size(claim)} {claim.one}"
-        return f"up to {_size(claim)} {claim.one}: too large to prove every status"
     beyond = f"; beyond that: {len(claim.off):,}" if len(claim.off) else ""
     return f"at most {_size(claim)} {claim.one} ({claim.within:g} allowed{beyond})"
 

@@ -24,7 +24,7 @@ from convexrough.contact import Contact, solve
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.coupling import Kind
 from convexrough.normal.certificate import Certificate, certify_on
-from convexrough.normal.claims import Claim
+from convexrough.normal.claims import WITHIN, Claim
 from convexrough.normal.problem import NormalProblem
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
@@ -45,8 +45,7 @@ class Verdict(Claim, Table, Plottable):
     """Comparison of claimed loads with the proof. Indices refer to the scene's asperities.
 
     loads       : (n,) [force] as given;  floor : [force] a load up to this claims "open"
-    within      : largest error allowed, as a fraction of the largest load; None: the errors must
-        only be small enough to prove every status from the loads alone
+    within      : largest error allowed, as a fraction of the largest load
     total_prescribed : [force] None under a prescribed approach
     certificate : certificate of the given loads, with 0 for loads up to the floor
     solution    : the solution that Newton's method finds from them, with its own certificate; None
@@ -71,7 +70,7 @@ class Verdict(Claim, Table, Plottable):
     scene: Scene
     loads: Array
     floor: float
-    within: float | None
+    within: float
     total_prescribed: float | None
     certificate: Certificate
     solution: Contact | None = None
@@ -168,7 +167,7 @@ def verify(
     *,
     approach: float | None = None,
     load: float | None = None,
-    within: float | None = None,
+    within: float = WITHIN,
     floor: float = 0.0,
     influence: Kind | None = None,
 ) -> Verdict:
@@ -176,7 +175,8 @@ def verify(
 
     loads : (n,) [force] in the order of the scene's asperities
     approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error allowed, as a fraction of the largest load
+    within : largest error allowed, as a fraction of the largest load, and of the total; 1 checks
+        hardly more than the contact set
     floor  : [force] a load up to this size, also a negative one, counts as 0 and claims that its
         asperity is open
     influence : compliance operator; None for the cheapest that is exact
@@ -198,12 +198,12 @@ def verify_on(
     problem: NormalProblem,
     loads: ArrayLike,
     *,
-    within: float | None = None,
+    within: float = WITHIN,
     floor: float = 0.0,
 ) -> Verdict:
     """The verdict of `verify`, for a problem that is already assembled."""
     floor = checks.non_negative("floor", floor)
-    within = None if within is None else checks.positive("within", within)
+    within = checks.positive("within", within)
     given = checks.array("loads", loads, length=len(problem.scene))
     if (given < -floor).any():
         first = int(np.argmax(given < -floor))

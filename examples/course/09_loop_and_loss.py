@@ -81,7 +81,7 @@ assert abs(naive_loss(1e-6) / tiny.loss - 1) > 10
 # Add up the losses of the asperities, none of which is negative: Mindlin's loss for an asperity in
 # partial slip, and :math:`4 f P_i s_i` for one that slides by :math:`s_i`. ``cycle`` does this.
 # Its field ``balance_defect`` is the relative difference from the formula above, evaluated to
-# thirty digits; because of cancellation it is about :math:`10^{-28} (f P / Q)^3`.
+# thirty digits; because of cancellation it can reach :math:`10^{-28} (f P / Q)^3`.
 
 print(f"loss over W0 at 1e-6: {tiny.loss_normalised:.10e}, defect {tiny.balance_defect:.0e}")
 assert tiny.balance_defect < 1e-28 * 1e6**3

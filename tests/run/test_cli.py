@@ -303,7 +303,10 @@ LATTICE = 'pattern = "hexagonal"\nspacing = {}\ntip_radius = {}'
         ),
         (scene_text(more="[sheer]\nx = 1"), '[sheer]: unknown table, did you mean "shear"?'),
         (scene_text()[:-30], "a.toml: "),
-        (scene_text(LATTICE.format(1e-9, 1)), "spacing: found 7.26e+14 asperities"),
+        (
+            scene_text(LATTICE.format(1e-9, 1)),
+            "within / spacing = 1.41e+07: found 7.26e+14",
+        ),
         (
             scene_text(
                 LATTICE.format(0.0025, 1), "approach = 0.1", more='[solver]\ninfluence = "dense"'

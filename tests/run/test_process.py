@@ -14,7 +14,7 @@ from scene_files import HEXAGONAL, scene_text
 # A job in the background inherits a signal that is ignored; this one must not.
 START = (
     "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    "print('started', flush=True); from convexrough.__main__ import main; sys.exit(main())"
+    "from convexrough.__main__ import main; print('started', flush=True); sys.exit(main())"
 )
 
 

@@ -138,7 +138,7 @@ BAD = [
     ),
     (
         lambda: cr.Asperities.hexagonal(spacing=1e-9, tip_radius=1, within=1),
-        r"spacing: found 3.63e\+18 asperities .* memory",
+        r"within / spacing = 1e\+09: found 3.63e\+18 asperities .* memory",
     ),
     (
         lambda: cr.Scene(-1.0, cr.Asperities([[0, 0]], 1), MATERIAL, geometry="summit"),

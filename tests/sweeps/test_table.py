@@ -2,6 +2,7 @@
 
 import json
 import logging
+import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
@@ -13,6 +14,7 @@ from scenes import MATERIAL
 from sweep_files import SMALL, numbers, same, sweeping, tables, toml
 
 import convexrough as cr
+from convexrough.errors import ExtraError
 
 
 @pytest.fixture(scope="module")
@@ -243,6 +245,15 @@ def test_the_parts_are_plain_parquet(here: Executor, tmp_path: Path) -> None:
     cr.sweep(SMALL, executor=here, out=tmp_path / "a")
     rows = dataset.dataset(tmp_path / "a/parts").to_table(columns=["scene", "load"])
     assert sorted(rows["scene"].to_pylist()) == list(range(16))
+
+
+def test_without_pyarrow_no_folder_is_left(
+    here: Executor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ExtraError, match="needs pyarrow: pip install pyarrow"):
+        cr.sweep(tables(), executor=here, out=tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_command(command: Any, tmp_path: Path) -> None:

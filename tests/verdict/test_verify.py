@@ -54,7 +54,9 @@ def test_what_is_right(command: Any, contact: cr.Contact) -> None:
                 "total load",
             )
         ]
-        assert re.search(r" contact set proved; loads known to \S+e-1\d of the largest$", lines[3])
+        assert re.search(
+            r" contact set proved; loads correct to \S+e-1\d of the largest$", lines[3]
+        )
         assert [line[18:] for line in lines[4:6]] == ["none"] * 2
         assert re.match(r"at most \S+e-1\d of the largest load \(1e-10 allowed\)", lines[6][18:])
         assert lines[7].endswith("(as prescribed)" if scene == "b.toml" else "(none prescribed)")
@@ -148,7 +150,7 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     asked = ("verify", "a.toml", claim(contact), "--shear-force", repr(force), "--shear")
     outcome = command(*asked, shear_file(contact, state.forces))
     assert (outcome.status, outcome.err) == (0, "")
-    assert "shear forces      statuses proved; shear forces known to " in outcome.out
+    assert "shear forces      statuses proved; shear forces correct to " in outcome.out
     spoiled = state.forces.copy()
     spoiled[4] = 0.5 * contact.loads[4]
     outcome = command(*asked, shear_file(contact, spoiled), "--json")
