@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
@@ -61,8 +60,3 @@ def among_zeros(
     where: tuple[Any, ...] = (slice(None),) * (axis % values.ndim)
     full[*where, places] = values
     return full
-
-
-def row_sums(values: Array) -> Array:
-    """The sums (m,) of the rows of an array (m, n), each rounded once."""
-    return np.array([math.fsum(row) for row in values])

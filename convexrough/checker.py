@@ -430,8 +430,8 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
 def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
     """A fall of D0 from this state during which no indentation rises as the load falls (11).
 
-    With C = diag(2 a) and H = (I + A C)^-1 let m_i = sum_k!=i max(-H_ik, 0) - H_ii. It is proved if
-    m_i < 0 for all that may touch, and if the gap of every other exceeds m_i times the fall.
+    It is proved if the rates missed are below 0 for all that may touch, and if the gap of every
+    other exceeds the fall times the rate that it misses.
     """
     near = [i for i, x in enumerate(state.depths) if x.high > 0]
     reach = [min(root(scene.radii[i] * state.depths[i].high, up=True), box.radii[i]) for i in near]
@@ -458,7 +458,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
 def missed_by_inverse(
     rows: dict[int, list[int]], near: list[int], rounding: int, tell: Tell
 ) -> dict[int, Fraction]:
-    """sum_k!=i max(-H_ik, 0) - H_ii times ONE, rounded up, from an approximation X of H."""
+    """Minus the lower bounds (11) on rates times ONE, with weights by an approximate inverse X."""
     n, place = len(near), {i: k for k, i in enumerate(near)}
     X = [[*rows[i][:k], ONE, *rows[i][k + 1 :]] for k, i in enumerate(near)]
     for k in range(n):  # Gauss-Jordan elimination in place
@@ -474,24 +474,20 @@ def missed_by_inverse(
                 pairs = zip(X[i], top, strict=True)
                 X[i] = [x - (factor * t >> ONE_BITS) for x, t in pairs]
         X[k] = top
-    columns = list(zip(*X, strict=True))
-    sizes = [sum(map(abs, row)) for row in X]
-    products = {i: [sum(map(mul, row, column)) for column in columns] for i, row in rows.items()}
-    left = max(
-        sum(abs(ONE * (ONE * (j == k) - X[k][j]) - x) for j, x in enumerate(products[i]))
-        for k, i in enumerate(near)
-    )
-    lost = rounding * sum(sizes)
-    rest = Fraction(left + lost, ONE * ONE)  # the largest row sum of I - (I + A C) X
-    if 2 * rest > 1:
-        return dict.fromkeys(rows, Fraction(1))
-    widest = ONE + max(map(sum, rows.values())) + rounding * n
-    off = 2 * rest * max(sizes) * widest / ONE + Fraction(lost, ONE) + n
-    found = {}
-    for i, product in products.items():
-        row = [-x // ONE for x in product] if i not in place else X[place[i]]
-        own = ONE if i not in place else X[place[i]][place[i]]
-        found[i] = off - own + sum(max(-x, 0) for x in row)
+    inverse = list(zip(*X, strict=True))
+    columns, found = list(zip(*(rows[i] for i in near), strict=True)), {}
+    for i, row in rows.items():
+        if i in place:
+            k = place[i]
+            weights = [-ONE * x // max(X[k][k], 1) for x in X[k]]
+            weights[k] = 0
+        else:
+            weights = [sum(map(mul, row, column)) // ONE for column in inverse]
+        swept = [ONE * w + sum(map(mul, weights, x)) for w, x in zip(weights, columns, strict=True)]
+        short = sum(max(ONE * x - y, 0) for x, y in zip(row, swept, strict=True))
+        lost = n * rounding * (ONE + sum(map(abs, weights)))
+        total = sum(max(w, 0) for w in weights)
+        found[i] = Fraction(short + lost, ONE) + total - ONE
     return found
 
 

@@ -118,11 +118,7 @@ class Contact(Cached, Table, Plottable):
         Raises InputError for scenes too large for exact arithmetic, and ProofError where nothing is
         proved.
         """
-        from convexrough.proof import (
-            NearState,
-            prove,
-            refuse_many,
-        )  # a higher layer
+        from convexrough.proof import NearState, prove, refuse_many  # a higher layer
 
         refuse_many(self.scene)
         by_load, n = self.prescribed_load is not None, len(self.scene)

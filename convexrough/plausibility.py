@@ -72,14 +72,11 @@ def warnings_of(contact: Contact) -> Iterator[str]:
 
 
 def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
-    """Warnings about the limits of the model, which the certificate does not cover."""
+    """Warnings about the limits of the model, which the certificate does not cover.
+
+    normal : the contact's `limits_of`
+    """
     yield from unlikely_modulus(normal["contact_modulus"], units)
-    named = units.force and units.length
-    yield from doubts(normal, f"{units.force}/{units.length}²" if named else "")
-
-
-def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
-    """Reasons not to rely on a contact, from its `limits_of`, each a sentence with numbers."""
     if 0 < normal["contact"] < FEW:
         yield (
             f"asperities in contact: {normal['contact']}, fewer than {FEW}: too few for a rough "
@@ -112,7 +109,7 @@ def doubts(normal: Mapping[str, Any], pressure_unit: str = "") -> Iterator[str]:
             "not represent the pressure of the disc at these summits"
         )
     if normal["beyond_hardness"]:
-        unit = f" {pressure_unit}" if pressure_unit else ""
+        unit = f" {units.force}/{units.length}²" if units.force and units.length else ""
         yield (
             f"mean pressure up to {normal['mean_pressure']:.4g}{unit} exceeds the hardness "
             f"{normal['hardness']:.4g}{unit} on {normal['beyond_hardness']} of "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 class Plottable:
     """A result that can be plotted."""
 
-    def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
+    def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the main figure of the result, as `convexrough.plots.plot`; return the axes."""
         from convexrough.plots import plot  # it imports matplotlib
 
-        return plot(self, axes, **options)
+        return plot(self, axes)
 
     def _picture(self) -> str:
         """A small map as an HTML image, made without solving anything."""

@@ -52,7 +52,7 @@ def load(path: Path) -> Any:
     return module
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "path",
     [path for path in SCRIPTS if path.stem not in ("boundary_elements", "measured_surface")],

@@ -82,8 +82,8 @@ def test_shear_forces() -> None:
     rough[2] *= 1 + 1e-4
     message = failure(assert_shear_certified, pressed, rough, force=force, within=1e-6)
     assert first_named(message, "force error") == 2
-    message = failure(assert_shear_certified, pressed, state.forces, force=force * (1 + 1e-5))
-    assert message.startswith("the total force is not the prescribed one\n")
+    message = failure(assert_shear_certified, pressed, state.forces, force=force * 1.02)
+    assert "the total force is not the prescribed one" in message.splitlines()[0]
 
 
 def test_nothing_to_prove() -> None:

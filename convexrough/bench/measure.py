@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -132,28 +132,23 @@ def measure_attempt(
 ) -> Row:
     """The row of an attempt: least time of assembling and solving, in runs of `patience` [s]."""
     row = Row("solve", family, len(scene), solver=attempt.solver, setting=attempt.setting)
-    memory = MemoryRise()
 
     def solved(_: object = None) -> tuple[NormalProblem, Solution]:
         """Of a problem of its own each time: an operator keeps what it has computed once."""
         problem = NormalProblem.assemble(scene, approach=APPROACH, influence=attempt.influence)
         return problem, attempt.settings.solve(problem)
 
-    try:
-        (problem, solution), risen = solved(), memory.risen()
-        seconds, runs = least(lambda: None, solved, patience)
-    except (InputError, SolverError) as error:
-        return replace(row, outcome=_outcome(error), message=str(error))
+    row, found = _timed(row, lambda: None, solved, patience)
+    if found is None:
+        return row
+    problem, solution = found
     loads = np.zeros(len(scene))
     loads[problem.candidates] = solution.loads * problem.units.force  # a power of two
     return replace(
         row,
         touching=int(np.count_nonzero(loads)),
-        seconds=seconds,
-        runs=runs,
         iterations=solution.iterations,
         error=math.nan if reference is None else reference.error(loads),
-        memory=risen,
     )
 
 
@@ -161,17 +156,11 @@ def measure_task(name: str, family: Family, size: int, patience: float) -> Row:
     """The row of one of TASKS on a scene of about this size."""
     make, task = partial(scene, family, REFINEMENTS[size]), TASKS[name]
     row = Row(name, family, len(make()), product=plain_product(make()))
-    memory = MemoryRise()
-    try:
-        found = task.work(task.prepare(make))
-        risen = memory.risen()
-        seconds, runs = least(lambda: task.prepare(make), task.work, patience)
-    except (InputError, SolverError) as error:
-        return replace(row, outcome=_outcome(error), message=str(error))
+    row, found = _timed(row, lambda: task.prepare(make), task.work, patience)
     if isinstance(found, Contact):
         touching, largest = int(np.count_nonzero(found.loads)), float(found.loads.max())
         row = replace(row, touching=touching, bound=found.certificate.load_error / largest)
-    return replace(row, seconds=seconds, runs=runs, memory=risen)
+    return row
 
 
 def measure_sweep(size: int, scenes: int, workers: int) -> Row:
@@ -196,8 +185,19 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
     return Row("sweep", "rough", size, message=said, seconds=seconds, runs=1)
 
 
-def _outcome(error: InputError | SolverError) -> Literal["refused", "failed"]:
-    return "refused" if isinstance(error, InputError) else "failed"
+def _timed(
+    row: Row, prepare: Callable[[], Any], work: Callable[[Any], Any], patience: float
+) -> tuple[Row, Any]:
+    """The row with time and memory, and the first result; None where the work raises an error."""
+    memory = MemoryRise()
+    try:
+        found = work(prepare())
+        risen = memory.risen()
+        seconds, runs = least(prepare, work, patience)
+    except (InputError, SolverError) as error:
+        outcome: Any = "refused" if isinstance(error, InputError) else "failed"
+        return replace(row, outcome=outcome, message=str(error)), None
+    return replace(row, seconds=seconds, runs=runs, memory=risen), found
 
 
 def least(

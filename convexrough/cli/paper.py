@@ -27,6 +27,7 @@ def paper(
     from convexrough.atomic import write_text
     from convexrough.paper import example
     from convexrough.paper.figure_data import figure_data
+    from convexrough.paper.states import PaperStates
     from convexrough.run.results import (
         results_folder,
         slider_page,
@@ -42,11 +43,12 @@ def paper(
             result.prepare(figures=False)
         contact = found[0].contact
         comparison = example.compare(found)
-        files = write_tables(new, figure_data(contact))
+        states = PaperStates.of(contact)
+        files = write_tables(new, figure_data(states))
         if not no_figures:
             from convexrough.paper.figures import paper_figures
 
-            files += write_figures(new, paper_figures(contact), formats=formats, dpi=dpi)
+            files += write_figures(new, paper_figures(contact, states), formats=formats, dpi=dpi)
         if html:
             page = slider_page(found[0])
             files.append(write_text(new / "slider.html", page))

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from convexrough import checks, fields
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
-from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState, shear
 from convexrough.sphere import mindlin
 
@@ -75,18 +74,9 @@ def energies(state: ShearState) -> Array:
     return frozen(limits * (scales * mindlin.loss(shares) + 4.0 * forwards))
 
 
-def cycle_energy(contact: Contact, maximum: float, minimum: float | None = None) -> float:
-    """[force length] energy lost per steady cycle between two shear forces [force].
-
-    It is the sum of `energies` at Q = (maximum - minimum) / 2; the minimum defaults to -maximum.
-    """
-    limit = checks.friction(contact.scene.friction) * contact.load
-    upper = float(checks.bearable("maximum", maximum, limit))
-    lower = -upper if minimum is None else float(checks.bearable("minimum", minimum, limit))
-    if lower > upper:
-        expected = f"at least the minimum, {lower}"
-        raise InputError("maximum", found=upper, expected=expected)
-    return float(energies(shear(contact, force=(upper - lower) / 2.0)).sum())
+def cycle_energy(contact: Contact, maximum: float) -> float:
+    """[force length] energy lost per steady cycle between `maximum` and -`maximum` [force]."""
+    return float(energies(shear(contact, force=maximum)).sum())
 
 
 def _adhered(state: ShearState) -> NDArray[np.bool_]:

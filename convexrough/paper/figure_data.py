@@ -16,12 +16,8 @@ from convexrough.plots.cycle import smooth_loop
 Columns = dict[str, NDArray[Any]]
 
 
-def figure_data(contact: cr.Contact, found: PaperStates | None = None) -> dict[str, Columns]:
-    """The numbers behind the paper's Figs. 3 to 9: names of tables, with their columns.
-
-    found : the states and paths of the figures, if already computed
-    """
-    found = found or PaperStates.of(contact)
+def figure_data(found: PaperStates) -> dict[str, Columns]:
+    """The numbers behind the paper's Figs. 3 to 9: names of tables, with their columns."""
     return _at_half(found) | _loading(found)
 
 

@@ -42,10 +42,7 @@ from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 
 
-def paper_figures(
-    contact: Contact,
-    found: PaperStates | None = None,
-) -> Figures:
+def paper_figures(contact: Contact, found: PaperStates | None = None) -> Figures:
     """The figures of the paper's example, or of any contact with asperities in rings.
 
     "fig3_pressure"   : contact pressure

@@ -16,7 +16,17 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
 from convexrough.plots.measure import Measure, Scale
-from convexrough.plots.style import COLOURS, DASHED, DOTTED, FAINT, SMOOTH, bar, label, round_ticks
+from convexrough.plots.style import (
+    COLOURS,
+    DASHED,
+    DOTTED,
+    FAINT,
+    SMOOTH,
+    bar,
+    disc_handle,
+    label,
+    round_ticks,
+)
 
 #: From these numbers on, discs are pixels inside a vector file, and a mosaic replaces them.
 DENSE, CROWDED = 200, 3000
@@ -74,7 +84,6 @@ def draw_map(
     *,
     smooth: Sequence[float] = (),
     window: Window | None = None,
-    dots: str = FAINT,
 ) -> Window:
     """The window of a map that is drawn here: discs at points, faint dots at points without one.
 
@@ -92,7 +101,7 @@ def draw_map(
     if int(shown.sum()) >= CROWDED:
         _draw_mosaic(axes, points, _blended(layers, whole), shown, window)
     else:
-        _draw_open(axes, points[~shown & window.holds(points)], dots)
+        _draw_open(axes, points[~shown & window.holds(points)])
         for each in layers:
             draw_discs(axes, points, each)
     draw_outline(axes, [length.of(axis) for axis in smooth])
@@ -177,7 +186,7 @@ def status_handles(statuses: Iterable[str], *, stick: bool = False) -> list[Line
     entries = [each for status, each in LOOKS.items() if status in statuses]
     if stick and "partial" in statuses:
         entries.insert(0, (STICK, "stick disc"))
-    return [_handle(colour, text) for colour, text in entries]
+    return [disc_handle(*entry) for entry in entries]
 
 
 def smooth_handles(scale: Scale, *, stick: bool) -> list[Line2D]:
@@ -203,10 +212,6 @@ def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
     return np.where(chosen, float(np.clip(0.42 * apart, 0.006 * size, 0.05 * size)), 0.0)
 
 
-def _handle(colour: str, text: str) -> Line2D:
-    return Line2D([], [], ls="", marker="o", ms=6, mew=0.4, mec=SMOOTH, mfc=colour, label=text)
-
-
 def map_window(
     points: Array, radii: Array, length: Measure, smooth: Sequence[float] = ()
 ) -> Window:
@@ -222,10 +227,10 @@ def map_window(
     return Window(float(x), float(y), 0.53 * (float((high - low).max()) or 1.0))
 
 
-def _draw_open(axes: Axes, points: Array, colour: str) -> None:
+def _draw_open(axes: Axes, points: Array) -> None:
     """Draw open asperities as faint dots, smaller if they are many."""
     size = float(np.clip(25.0 / np.sqrt(len(points) + 1), 0.4, 1.5))
-    axes.plot(*points.T, "o", ms=size, mew=0, color=colour, rasterized=len(points) >= CROWDED,
+    axes.plot(*points.T, "o", ms=size, mew=0, color=FAINT, rasterized=len(points) >= CROWDED,
               label="open")  # fmt: skip
 
 

@@ -85,19 +85,13 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
     axes.plot([], [], color=SMOOTH, lw=0.7, label="smooth sphere")
     legend_below(axes, 3, title="factor", title_fontsize=TICK)
     axes.set_ylim(bottom=0.0)
-    label(
-        axes,
-        "phase [°]; 90: in step",
-        unit.label(r"W\,/\,\mathrm{factor}^3"),
-    )
+    label(axes, "phase [°]; 90: in step", unit.label(r"W\,/\,\mathrm{factor}^3"))
 
 
 def draw_path(axes: Axes, path: LoadPath) -> None:
     """Draw the path, and the memory curve at some of its points."""
-    f, unit = (
-        path.scene.friction or 1.0,
-        _plane(axes, float(path.loads.max()), path.scene.units.force),
-    )
+    f = path.scene.friction or 1.0
+    unit = _plane(axes, float(path.loads.max()), path.scene.units.force)
     P, T = unit.of(path.loads), unit.of(path.forces / f)
     axes.plot(np.append(unit.of(path.start), P), np.append(0.0, T), color=FAINT, lw=0.9)
     chosen = evenly_chosen(range(len(P)), MOST_CURVES)
@@ -124,10 +118,8 @@ def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
 
 def draw_closed(axes: Axes, found: Cycle) -> None:
     """Draw a closed path, and the two lines that fix the point (L*, T*)."""
-    f, unit = (
-        found.scene.friction or 1.0,
-        _plane(axes, float(found.loads.max()), found.scene.units.force),
-    )
+    f = found.scene.friction or 1.0
+    unit = _plane(axes, float(found.loads.max()), found.scene.units.force)
     P, T = (np.append(each, each[0]) for each in (found.loads, found.forces / f))
     level, height = found.level, found.force_level / f
     ends = np.array([level, P.max()])

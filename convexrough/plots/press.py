@@ -137,14 +137,13 @@ def distances(scale: Scale) -> Array:
     return away / scale.length.size
 
 
-def _draw_points(axes: Axes, x: Array, y: Array, top: float, label: str) -> bool:
-    """Draw a dot for each point; if there are many, their density and median, and return True."""
+def _draw_points(axes: Axes, x: Array, y: Array, top: float, label: str) -> None:
+    """Draw a dot for each point; if there are many, their density and median."""
     if len(x) >= CROWDED:
         draw_density(axes, x, y, top, label)
-        return True
-    size = float(np.clip(40.0 / np.sqrt(len(x)), 1.2, 4.0))
-    axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=label, clip_on=False, zorder=3)
-    return False
+    else:
+        size = float(np.clip(40.0 / np.sqrt(len(x)), 1.2, 4.0))
+        axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=label, clip_on=False, zorder=3)
 
 
 def census(contact: Contact) -> str:

@@ -12,8 +12,10 @@ from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
+from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
+from numpy.typing import ArrayLike
 
 from convexrough.arrays import Array
 from convexrough.plots.measure import literal as literal
@@ -68,15 +70,28 @@ def few_ticks(axis: Axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def legend_above(axes: Axes, markerscale: float = 1.0, ncols: int = 3) -> None:
+def legend_above(axes: Axes, ncols: int = 3) -> None:
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=ncols, fontsize=TICK,
-                markerscale=markerscale, frameon=False, borderpad=0.2, columnspacing=1.0,
-                handletextpad=0.4, handlelength=1.6)  # fmt: skip
+                frameon=False, borderpad=0.2, columnspacing=1.0, handletextpad=0.4,
+                handlelength=1.6)  # fmt: skip
 
 
 def legend_below(axes: Axes, ncols: int = 2, **more: Any) -> None:
     axes.legend(loc="upper center", bbox_to_anchor=(0.45, -0.2), ncols=ncols, fontsize=TICK - 1,
                 frameon=False, columnspacing=1.0, handletextpad=0.4, **more)  # fmt: skip
+
+
+def disc_handle(colour: str, text: str) -> Line2D:
+    """The legend entry of discs of this colour."""
+    return Line2D([], [], ls="", marker="o", ms=6, mew=0.4, mec=SMOOTH, mfc=colour, label=text)
+
+
+def write_beside(axes: Axes, text: str, place: ArrayLike) -> None:
+    """Write a small text next to a place, readable on any ground."""
+    x, y = np.asarray(place)
+    box = dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.85)
+    axes.annotate(text, (x, y), xytext=(6, 6), textcoords="offset points", fontsize=TICK - 1,
+                  bbox=box, zorder=5)  # fmt: skip
 
 
 def legend_outside(figure: Any, handles: Sequence[Any], place: str, ncols: int) -> None:
@@ -112,7 +127,7 @@ def shades_of(count: int, low: float = 0.3) -> Array:
     return np.asarray(matplotlib.colormaps[COLOURS](np.linspace(low, 1.0, count)))
 
 
-def mark_points(axes: Axes, x: Array, y: Array, first: int = 1) -> None:
+def mark_points(axes: Axes, x: Array, y: Array) -> None:
     """Draw dots; if there are few, number them. Dots at one place share a label.
 
     Each number is on the first of eight sides, from the top, that is free of dots and labels.
@@ -130,7 +145,7 @@ def mark_points(axes: Axes, x: Array, y: Array, first: int = 1) -> None:
     taken = [spots[i] for i in groups]
     halo = [withStroke(linewidth=2.0, foreground="white")]
     for i, group in groups.items():
-        text = ", ".join(str(first + each) for each in group)
+        text = ", ".join(str(1 + each) for each in group)
         sides = np.deg2rad([90, -90, 45, -45, 135, -135, 0, 180])
         reach = 0.12 + 0.03 * len(text) * np.abs(np.cos(sides))
         places = spots[i] + np.column_stack((np.cos(sides), np.sin(sides))) * reach[:, None]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.image import AxesImage
-from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough.arrays import Array, Number
@@ -27,10 +24,12 @@ from convexrough.plots.style import (
     TICK,
     UNSURE,
     bar,
+    disc_handle,
     label,
     legend_outside,
     round_ticks,
     title,
+    write_beside,
 )
 from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
 from convexrough.surface.summits import Summits
@@ -133,10 +132,10 @@ def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Fig
     for axes in (upper, middle, lower):
         axes.axvspan(0.0, _place(until), color="0.92", lw=0.0, zorder=0)
         axes.axvline(_place(chosen), color=SMOOTH, lw=0.9, ls=":")
-    trusted = "nowhere" if np.isnan(first) else f"from {100 * first:.3g} %"
+    advised = "none is enough" if np.isnan(first) else f"at least {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
     size = f"   ($Sz$ = {quantity(float(tallest), unit)})" if tallest else ""
-    title(upper, f"to be trusted: {trusted}{size}")
+    title(upper, f"advised pruning: {advised}{size}")
     return figure
 
 
@@ -181,9 +180,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
     scale = bar(axes, image, "", above=True)
     highest = float(np.abs(surface.heights).max())
     scale.ax.set_title(_count(scale.ax.yaxis, "$z$", surface.unit, highest), fontsize=TICK)
-    look: dict[str, Any] = dict(marker="o", ls="", ms=5.0, mec="0.4", mew=0.3)
-    handles = [Line2D([], [], color=colour, label=label, **look) for colour, label in named]
-    legend_outside(figure, handles, "lower center", 2)
+    legend_outside(figure, [disc_handle(*each) for each in named], "lower center", 2)
     return figure
 
 
@@ -202,10 +199,7 @@ def _draw_contacts(axes: Axes, contact: Contact) -> float:
     draw_outline(axes, scale.axes, colour="white")
     pairs, _ = crowded(contact)
     for i, j in pairs[:1]:
-        place = contact.scene.asperities.positions[[i, j]].mean(axis=0)
-        box = dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.85)
-        axes.annotate(f"{i}, {j}", place, xytext=(7, 7), textcoords="offset points",
-                      fontsize=TICK - 1, bbox=box, zorder=5)  # fmt: skip
+        write_beside(axes, f"{i}, {j}", contact.scene.asperities.positions[[i, j]].mean(axis=0))
     return edge
 
 

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array
 from convexrough.friction.verdict import ShearVerdict
 from convexrough.normal.claims import Claim
 from convexrough.plots.asperity_map import CROWDED, Layer, draw_map, even_radii
-from convexrough.plots.measure import Measure, measure
+from convexrough.plots.measure import measure
 from convexrough.plots.notebook import Figure, Figures
-from convexrough.plots.style import DOUBLE, SINGLE, TICK, UNSURE, legend_below, title
+from convexrough.plots.style import (
+    DOUBLE,
+    SINGLE,
+    UNSURE,
+    disc_handle,
+    legend_below,
+    title,
+    write_beside,
+)
 from convexrough.scene.scene import Scene
 from convexrough.verdict import Verdict
 
@@ -54,15 +60,14 @@ def draw_claim(axes: Axes, claim: Claim, scene: Scene) -> None:
         if name in status
     ]
     draw_map(axes, points, layers, length)
-    handles = [
-        Line2D([], [], ls="", marker="o", ms=6, mec="0.4", mew=0.3, color=SHADES[each.status],
-               label=NAMES.get(each.status, each.status)) for each in layers
-    ]  # fmt: skip
+    said = [each.status for each in layers]
+    handles = [disc_handle(SHADES[status], NAMES.get(status, status)) for status in said]
     marked = list(zip(MARKS, claim.wrong.items(), strict=True))
     for mark, (what, those) in [*marked, ("^", ("undecided", claim.undecided))]:
         if len(those):
             handles.append(_mark(axes, length.of(points[those]), mark, f"{what} ({len(those):,})"))
-    _number(axes, points, claim.suspects[:NUMBERED], length)
+    for i in claim.suspects[:NUMBERED]:
+        write_beside(axes, str(i), length.of(points[i]))
     verdict = "holds" if claim.holds else "does not hold"
     title(axes, f"{claim.many}: the claim {verdict}")
     legend_below(axes, handles=handles)
@@ -73,11 +78,3 @@ def _mark(axes: Axes, points: Array, mark: str, what: str) -> Line2D:
     (line,) = axes.plot(*points.T, mark, ls="", mfc="white", mec=UNSURE, mew=1.1, ms=size,
                         label=what, rasterized=len(points) > CROWDED)  # fmt: skip
     return line
-
-
-def _number(axes: Axes, points: Array, suspects: Indices, length: Measure) -> None:
-    """Write the index next to each suspect."""
-    for i in suspects:
-        place: Any = dict(xytext=(5, 5), textcoords="offset points", fontsize=TICK - 1)
-        box = dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.8)
-        axes.annotate(str(i), tuple(length.of(points[i])), bbox=box, zorder=5, **place)

@@ -45,21 +45,10 @@ def deflection(x: Number) -> Number:
     return x * (2.0 - x)
 
 
-def excess_deflection(x: Number) -> Number:
-    """phi - (2/3) t."""
-    return x * x * (3.0 - 2.0 * x) / 3.0
-
-
 def potential(x: Number) -> Number:
     """The integral of phi over t."""
     s = 1.0 - x
     return x * x * (0.4 + s * (0.8 + s * (1.2 + s * 0.6)))
-
-
-def excess_potential(x: Number) -> Number:
-    """The integral of phi - (2/3) t over t."""
-    s = 1.0 - x
-    return x * x * x * (1.0 + s * (3.0 + s * (6.0 + s * 5.0))) / 15.0
 
 
 def loss(x: Number) -> Number:

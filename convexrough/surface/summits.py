@@ -162,9 +162,7 @@ class Summits(Table, Asperities, Plottable):
         prune = checks.between("prune", prune, self.origin.prune, 1.0)
         keep = self.prominences >= prune * self.origin.max_height
         more = self.origin.pruned + int(np.count_nonzero(~keep))
-        return self._chosen(keep, replace(self.origin, prune=prune, pruned=more))
-
-    def _chosen(self, keep: NDArray[np.bool_], origin: Origin) -> Summits:
+        origin = replace(self.origin, prune=prune, pruned=more)
         if not keep.any():
             found = f"none of {origin.maxima:,} maxima is left"
             raise InputError("summits", found=found, expected="at least one: prune less")

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-plt.rcParams["font.size"] = 14  # to be read from the last row
+plt.rcParams["font.size"] = 14  # readable from the last row
 
 Array = NDArray[np.float64]
 

@@ -30,7 +30,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-plt.rcParams["font.size"] = 14  # to be read from the last row
+plt.rcParams["font.size"] = 14  # readable from the last row
 
 Array = NDArray[np.float64]
 

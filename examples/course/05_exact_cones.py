@@ -30,7 +30,7 @@ import numpy as np
 
 import convexrough as cr
 
-plt.rcParams["font.size"] = 14  # to be read from the last row
+plt.rcParams["font.size"] = 14  # readable from the last row
 
 S = 0.8
 t = cp.Variable(nonneg=True)

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 import convexrough as cr
 
-plt.rcParams["font.size"] = 14  # to be read from the last row
+plt.rcParams["font.size"] = 14  # readable from the last row
 
 Array = NDArray[np.float64]
 MATERIAL = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)

@@ -26,7 +26,7 @@ import numpy as np
 
 import convexrough as cr
 
-plt.rcParams["font.size"] = 14  # to be read from the last row
+plt.rcParams["font.size"] = 14  # readable from the last row
 
 Pair = tuple[Fraction, Fraction]
 A = Fraction(1, 4)

@@ -197,6 +197,14 @@ def test_in_metres_the_list_has_room_for_both_coordinates(browser: Browser, tmp_
     shown.close()
 
 
+@in_browser
+@pytest.mark.parametrize("width", [1300, 1000, 400])
+def test_lines_of_the_certificate_are_not_clipped(opened: Opened, width: int) -> None:
+    opened.page.set_viewport_size({"width": width, "height": 900})
+    overflow = "text => text.scrollWidth - text.clientWidth"
+    assert opened.page.locator("#certificate").evaluate(overflow) <= 0
+
+
 def near(values: Any) -> Any:
     """A point of a loop is v_k - 2 v_i, each of five digits: off by 3 x 5e-5 at most."""
     return pytest.approx(values, rel=0.0, abs=1.5e-4 * np.abs(values).max())

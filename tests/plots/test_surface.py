@@ -64,7 +64,7 @@ def test_the_curve_is_drawn_where_it_is() -> None:
     assert_allclose(middle.lines[0].get_ydata(), curve.crowding)
     assert_allclose(lower.lines[0].get_ydata(), 100 * curve.model_error)
     title = upper.get_title(loc="left")
-    assert title.startswith(f"to be trusted: from {100 * curve.trusted_from:.3g} %")
+    assert title.startswith(f"advised pruning: at least {100 * curve.trusted_from:.3g} %")
 
 
 def test_one_summit() -> None:

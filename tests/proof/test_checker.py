@@ -252,7 +252,7 @@ def test_order_is_as_the_inverse_says() -> None:
     assert (H[:9] > 0).sum() > 9  # some off the diagonal, too
     for i, row in enumerate(H):
         own = row[i] if i < 9 else 1.0
-        true = np.maximum(-row, 0).sum() - own
+        true = np.maximum(-row / own, 0).sum() - 1.0
         assert float(found[i]) / checker.ONE == pytest.approx(true, abs=1e-12)
         assert found[i] > checker.ONE * (Fraction(true) - Fraction(1e-13))
 

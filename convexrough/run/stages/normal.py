@@ -153,7 +153,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
         ("convexity number", f"{proof['convexity_number']:.4g}  (convex below 1)"),
         ("load error", f"{known('load_error')}{relative}"),
         ("gap error", known("gap_error")),
-        ("duality gap", known("duality_gap")),
+        ("duality gap", f"{known('duality_gap')}  (bound on the excess energy)"),
     ]
     if "solver" in normal:
         steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
