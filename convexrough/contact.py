@@ -230,9 +230,9 @@ def levels_of(contact: Contact) -> Levels:
     named = {each().name: each for each in solvers.SOLVERS.values()}
     solver: Solver = vars(contact).get("_by") or named.get(contact.solver, solvers.Newton)()
 
-    def pressed(at_load: NormalProblem) -> Array:
+    def pressed(at_load: NormalProblem, start: Array | None) -> Array:
         try:
-            return solver.solve(at_load).loads
+            return solver.solve(at_load, start).loads
         except SolverError:  # crowded contacts: start from the known loads
             return solver.solve(at_load, state.loads.high).loads
 

@@ -12,6 +12,7 @@ with c = dP/dn = (3/2) P^(1/3) / k.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -41,8 +42,8 @@ SOLVED = 1e-6
 #: Largest number of candidates for which levels are solved together: beyond, nothing is gained.
 MOST = 512
 
-#: A solver: from a problem to the loads of its candidates, in the problem's own units.
-Press = Callable[[NormalProblem], Array]
+#: A solver: from a problem, and loads to start from, to the loads of its candidates, in own units.
+Press = Callable[[NormalProblem, Array | None], Array]
 
 
 class Response(NamedTuple):
@@ -323,13 +324,24 @@ class Levels:
         return self._solved(self.problem.at_approach(approach), None)
 
     def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
-        state = refined_loads(problem, self._press(problem))
-        boxes = None if self.top.solution is None else iter((self.top.solution.box.closed,))
-        found = proved(problem, state, boxes)
+        """The solution in the box of `top`, sought from nothing, then from the loads of `top`."""
+        state, found = self._sought(problem, None)
+        top = self.top.solution
+        if isinstance(found, Obstacle) and top is not None:
+            with suppress(SolverError):
+                state, found = self._sought(problem, top.trial.loads.high)
         if isinstance(found, Obstacle):
             total = Ball.exact(state.loads).sum() if load is None else load
             return Level.unproved(problem, state, total)
         return Level.of(found, found.total if load is None else load)
+
+    def _sought(
+        self, problem: NormalProblem, start: Array | None
+    ) -> tuple[Trial, Proved | Obstacle]:
+        """A solution, and what is proved of it in the box of `top`, if there is one."""
+        state = refined_loads(problem, self._press(problem, start))
+        boxes = None if self.top.solution is None else iter((self.top.solution.box.closed,))
+        return state, proved(problem, state, boxes)
 
 
 def _key(load: Ball) -> tuple[float, float, float]:
@@ -363,6 +375,7 @@ def rows_of(levels: Sequence[Level]) -> Rows:
     return Rows(load, approach, loads, indentation, touching, open_)
 
 
+@np.errstate(invalid="ignore")  # unproved levels
 def energies(levels: Sequence[Level]) -> Ball:
     """(k,) V(L) of levels of one scene."""
     high, low, radius = np.zeros((3, len(levels)))
@@ -386,6 +399,7 @@ def energies(levels: Sequence[Level]) -> Ball:
         uncertainty = np.array([float(level.load.radius) for level in loaded])
         rate = np.array([float(level.approach.size) for level in loaded])
         error = found.radius + above + (missing.size + uncertainty) * rate * (1 + SAFETY)
-        known = Ball.around(found.mid, error)
+        proved_ones = np.array([level.solution is not None for level in loaded])
+        known = Ball.around(found.mid, np.where(proved_ones, error, np.inf))
         high[which], low[which], radius[which] = *known.mid, known.radius
     return Ball(Pair(high, low), radius)

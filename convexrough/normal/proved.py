@@ -39,6 +39,7 @@ NONE = np.zeros(0, dtype=np.intp)
 
 CROWDED = "their discs overlap so far that the energy is not known to be convex"
 POORLY_KNOWN = "their loads are not known well enough to stay in a box where the energy is convex"
+ELSEWHERE = "no given box is proved to hold their loads"
 NOT_OPEN = "they are fixed open, but their gaps are not proved"
 
 
@@ -100,8 +101,8 @@ def proved(
 ) -> Proved | Obstacle:
     """The solution in the first box that is proved to hold it, or the obstacle to a proof.
 
-    boxes : boxes of all candidates, which come first; default `boxes.tried`. If none is proved to
-        hold the solution, boxes follow in which only the touching candidates are not fixed open
+    boxes : the boxes; default `boxes.tried`, and if none of these is proved to hold the solution,
+        boxes in which only the touching candidates are not fixed open
     """
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
@@ -110,6 +111,8 @@ def proved(
             box.fixed_open.any() and (box.fixed_open & ~found.open).any()
         ):
             return found
+    if boxes is not None:
+        return Obstacle(ELSEWHERE, NONE)
     touching, room, obstacle = state.inside, np.zeros(len(loads)), Obstacle("", NONE)
     for _ in range(ATTEMPTS):
         fixed = box_of_touching(problem, loads, touching, room)

@@ -164,6 +164,29 @@ def test_gradients_of_gaps_are_within_their_bounds() -> None:
         assert abs(Fraction(gradient.heights[0]) - true) <= Fraction(gradient.height_errors[0])
 
 
+@pytest.mark.parametrize("control", ["load", "approach"])
+def test_one_of_two_contacts_that_exclude_each_other(control: str) -> None:
+    """The blunt one alone touches. At less load the sharp one alone would do so as well."""
+    points = [[0.0, 0.0], [0.05, 0.0]]
+    both = cr.Asperities(points, [1.0, 16.0], [0.0, -0.05])
+    scene, blunt = (
+        cr.Scene(1e6, each, MATERIAL, friction=0.5, geometry="summit")
+        for each in (both, cr.Asperities(points[1:], 16.0, -0.05))
+    )
+    pressed = cr.press(scene, load=0.1)
+    assert pressed.status.tolist() == ["open", "contact"]
+    assert cr.press(scene, load=0.05).status.tolist() == ["contact", "open"]
+    contact = cr.press(scene, **{control: getattr(pressed, control)}, start=pressed.loads)
+    alone = cr.press(blunt, load=contact.load)
+    state, cycle = cr.shear(contact, force=0.025), cr.cycle(contact, maximum=0.025)
+    assert np.abs(state.forces - [0.0, 0.025]).max() <= 1e-16
+    assert state.status.tolist() == ["open", "partial"]
+    assert cycle.loss == pytest.approx(cr.cycle(alone, maximum=0.025).loss, rel=1e-12)
+    path, true = (cr.history(each, forces=[0.025, -0.025]) for each in (contact, alone))
+    assert path.order == cycle.order == "proved"
+    assert path.losses == pytest.approx(true.losses, rel=1e-12)
+
+
 def test_the_smallest_shear_is_borne() -> None:
     path = cr.load_path(PAPER, loads=[P, P], forces=[0.0, -1e-17 * P])
     missing = abs(path.asperity_forces[-1].sum() - path.forces[-1])
