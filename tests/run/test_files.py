@@ -212,7 +212,7 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
 
 def test_an_endless_lattice_is_counted_not_built(tmp_path: Path) -> None:
     (line,) = mistakes(tmp_path, HEXAGONAL.replace("0.0025", "1e-9"))
-    assert line.startswith("[asperities] spacing: found 3.63e+14 asperities")
+    assert line.startswith("[asperities] within / spacing = 1e+07: found 3.63e+14 asperities")
 
 
 @pytest.mark.parametrize(
