@@ -212,7 +212,10 @@ class _Swept:
             downhill = scaled.sum(axis=2) + 1.0 / w - price[todo, None]
             bending = scaled @ scaled.mT
             bending[:, diagonal, diagonal] += 1.0 / w**2
-            step = np.linalg.solve(bending, downhill[:, :, None])[:, :, 0]
+            try:
+                step = np.linalg.solve(bending, downhill[:, :, None])[:, :, 0]
+            except np.linalg.LinAlgError:  # singular by rounding: what is found is verified later
+                break
             shrinks = np.maximum(
                 (-step / w).max(axis=1), (-np.einsum("is,isk->ik", step, scaled)).max(axis=1)
             )

@@ -12,7 +12,16 @@ import numpy as np
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.tabular.table import HOLES, Reading, read_table
-from convexrough.tabular.text import SAMPLE, STYLES, WORKBOOKS, Style, lines_of, sniff, stripped
+from convexrough.tabular.text import (
+    SAMPLE,
+    STYLES,
+    WORKBOOKS,
+    Style,
+    lines_of,
+    sheet_lines,
+    sniff,
+    stripped,
+)
 
 #: Other names of the column of heights.
 HEIGHTS = ("z", "h")
@@ -48,7 +57,9 @@ def read_grid(path: Path) -> HeightGrid:
     """
     comments: list[str] = []
     body: list[tuple[int, str]] = []
-    for number, line in () if path.suffix.lower() in WORKBOOKS else lines_of(path):
+    workbook = path.suffix.lower() in WORKBOOKS
+    names = ("x", "y", "height", *HEIGHTS)
+    for number, line in sheet_lines(path, names) if workbook else lines_of(path):
         text = line.strip()
         if text.startswith(("#", "%")) or (not body and _SAID.fullmatch(text)):
             comments.append(text)
@@ -88,7 +99,19 @@ def _numbers(path: Path, body: Sequence[tuple[int, str]], style: Style) -> Array
             where = f"{path}: row {number}"
             raise InputError("cells", found=len(values), expected=expected, where=where)
         rows.append(values)
-    return np.array(rows)
+    heights = np.array(rows)
+    if min(heights.shape) > 2:
+        _refuse_numbers(path, "row 1", heights[0, 1:])
+        _refuse_numbers(path, "column 1", heights[1:, 0])
+    return heights
+
+
+def _refuse_numbers(path: Path, place: str, line: Array) -> None:
+    """Raise InputError for numbers of rows or columns, here without the first."""
+    if line[0] in (0, 1, 2) and (np.diff(line) == 1).all():
+        said = ", ".join(f"{each:g}" for each in line[:3])
+        expected = "heights: pandas leaves numbers out with header=False, index=False"
+        raise InputError(place, found=f"numbers {said}, ...", expected=expected, where=str(path))
 
 
 def _said(comments: Sequence[str], heights: Array) -> HeightGrid:

@@ -1,4 +1,4 @@
-"""Holes of a map, filled by a harmonic function, and single pixels that look like errors."""
+"""Holes of a map, filled by a harmonic function, and pixels that look like errors."""
 
 from __future__ import annotations
 
@@ -29,6 +29,19 @@ def spikes(heights: Array) -> Indices:
         apart = np.abs(padded[tuple((found + step).T)] - heights[tuple(found.T)])
         alike += apart < away[tuple(found.T)] / 2  # also the pixel itself
     return found[alike <= 2]
+
+
+def clipped(heights: Array) -> int:
+    """The number of pixels with exactly the largest height, if these are surprisingly many.
+
+    That is if they are at least ten, and more than those below in the next 1 % of the range, or at
+    the next height of all.
+    """
+    top = heights.max()
+    highest = int(np.count_nonzero(heights == top))
+    following = heights.max(where=heights < top, initial=heights.min())
+    near = int(np.count_nonzero(heights >= min(top - 0.01 * np.ptp(heights), following))) - highest
+    return highest if highest >= 10 and highest > near else 0
 
 
 def filled(heights: Array) -> Array:

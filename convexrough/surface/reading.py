@@ -25,7 +25,7 @@ TEXT = ("", ".csv", ".txt", ".dat", ".asc", ".tsv", ".xyz", ".gz", *WORKBOOKS)
 HEIGHTS = ("heights", "height", "z")
 
 #: Rms slopes outside this range suggest different units of heights and pixels.
-SLOPES = (1e-7, 10.0)
+SLOPES = (1e-5, 10.0)
 
 #: Numbers that mark holes, and the size from which any number does. Only numbers count that differ
 #: from the median of all other heights by more than FAR times their range.

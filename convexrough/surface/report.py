@@ -178,7 +178,9 @@ def describe_surface(scanned: Scanned) -> list[str]:
     described = labelled(lines)
     described += ["", *_describe_statistics(scanned)]
     if scanned.curve is not None:
-        described += ["", *_describe_curve(scanned.curve, surface.unit)]
+        doubts = surface.warnings or (scanned.contact is not None and scanned.contact.warnings)
+        more = ", but see the warnings" if doubts else ""
+        described += ["", *_describe_curve(scanned.curve, surface.unit, more)]
     if scanned.contact is not None:
         described += _describe_crowded(scanned.contact)
     if scanned.whole is not None:
@@ -203,19 +205,21 @@ def _describe_statistics(scanned: Scanned) -> list[str]:
     return aligned(table, left=1, digits=4)
 
 
-def _describe_curve(curve: Provability, unit: str) -> list[str]:
+def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
     height = f"height [{unit}]" if unit else "height"
     table = [["pruning", height, "summits", "contacts", "undecided", "proof", "crowding",
-              "model error", "trusted"]]  # fmt: skip
+              "model error", "assumptions"]]  # fmt: skip
     for row in rows_of(curve_columns(curve)):
         table.append([
             f"{100 * row['prune']:.3g} %", f"{row['height']:.4g}", f"{row['summits']:,}",
             f"{row['contacts']:,}", f"{row['undecided']:,}", row["scope"],
             f"{row['crowding']:.3g}", f"{row['model_error']:.2g}",
-            ("yes" if row["trusted"] else "no") if row["contacts"] else "-",
+            ("met" if row["trusted"] else "not met") if row["contacts"] else "-",
         ])  # fmt: skip
     first = curve.trusted_from
-    said = "no pruning is strong enough" if np.isnan(first) else f"at least {100 * first:.3g} %"
+    said = (
+        "no pruning is strong enough" if np.isnan(first) else f"at least {100 * first:.3g} %{more}"
+    )
     if not curve.contacts.any():
         said = "none, because nothing touches"
     return [*aligned(table), "", *labelled([("advised pruning", said)])]
@@ -278,6 +282,13 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
             yield (
                 f"the map is {width:.4g} {surface.unit} wide, and the base {diameter:.4g} "
                 f"{surface.unit}: check the units of the map (--unit, --pixel) and of the radius"
+            )
+    if scanned.whole is not None:
+        less = 1.0 - scanned.whole.contact.load / scanned.whole.load
+        if abs(less) > UNLIKE:
+            yield (
+                f"the asperities carry {abs(less):.0%} {'less' if less > 0 else 'more'} than the "
+                "whole map at the same approach: the asperity model does not represent this map"
             )
     if contact is None:
         yield f"at a pruning of {chosen:g} no solution was found"

@@ -14,9 +14,9 @@ from convexrough.arrays import Array, frozen
 from convexrough.errors import InputError
 from convexrough.plottable import Plottable
 from convexrough.record import Record
+from convexrough.surface import holes
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
 from convexrough.surface.hills import Hills, hills
-from convexrough.surface.holes import spikes
 from convexrough.surface.moments import Moments, moments_of
 from convexrough.surface.summits import Origin, Summits, find_summits
 from convexrough.tabular.units import known_unit
@@ -40,6 +40,8 @@ class Surface(Record, Plottable):
     unit    : unit of all lengths, "" if unknown
     removed : planes and spheres subtracted from the heights, in this order
     filled  : number of pixels that were holes
+    clipped : number of pixels at the largest height, if the map seems to be cut off there, else 0;
+        by default counted in the heights
     source  : the file, or a description
 
     Raises InputError for maps that are constant or have holes, and for pixels with one side more
@@ -56,6 +58,7 @@ class Surface(Record, Plottable):
     removed: tuple[Removed, ...]
     filled: int
     source: str
+    clipped: int
 
     def __init__(
         self,
@@ -65,12 +68,15 @@ class Surface(Record, Plottable):
         removed: tuple[Removed, ...] = (),
         filled: int = 0,
         source: str = "",
+        clipped: int | None = None,
     ) -> None:
         object.__setattr__(self, "heights", _checked(heights))
         object.__setattr__(self, "pixel", checked_pixel(pixel))
         for name, value in (("unit", unit), ("removed", removed), ("filled", filled)):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "source", source)
+        there = holes.clipped(self.heights) if clipped is None else clipped
+        object.__setattr__(self, "clipped", there)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -105,7 +111,7 @@ class Surface(Record, Plottable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings of a plane or sphere that explains most of the variance, and of spikes.
+        """Warnings of a plane or sphere that explains most of the variance, and of wrong pixels.
 
         The plane or sphere is fitted to at most 256 by 256 of the pixels. Spikes are single pixels
         or pairs far from all others.
@@ -130,10 +136,15 @@ class Surface(Record, Plottable):
                 found = f"{name}, explains {part} of the variance of the heights: "
                 found += f'detrend="{kind}", or --detrend {kind}, removes it'
             left = least
-        return (*([found] if found else []), *self._spikes())
+        return (*([found] if found else []), *self._wrong_pixels())
 
-    def _spikes(self) -> Iterator[str]:
-        if len(places := spikes(self.heights)):
+    def _wrong_pixels(self) -> Iterator[str]:
+        if self.clipped:
+            yield (
+                f"the highest {self.clipped:,} pixels have exactly the same height: the map seems "
+                "to be cut off at the top, where asperities touch, and their tip radii are wrong"
+            )
+        if len(places := holes.spikes(self.heights)):
             row, column = places[0]
             yield (
                 f"spikes or drop-outs: {len(places):,} pixels far from their neighbours, the first "

@@ -147,7 +147,7 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
     """
     lines: list[tuple[int, str]] = []
     comment, separator = "", "\t" if path.suffix.lower() in WORKBOOKS else ""
-    for number, line in _workbook(path, known) if separator else lines_of(path):
+    for number, line in sheet_lines(path, known) if separator else lines_of(path):
         text = line.strip("\r\n")
         inner = text.strip()
         if not lines and not separator and re.fullmatch(r"sep=.", inner):  # Excel
@@ -247,7 +247,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, str]]:
                 yield number, line
 
 
-def _workbook(path: Path, known: Sequence[str]) -> Iterator[tuple[int, str]]:
+def sheet_lines(path: Path, known: Sequence[str]) -> Iterator[tuple[int, str]]:
     """Numbered rows, with tabs, of the first sheet with a known column, else of the first sheet."""
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():

@@ -6,6 +6,7 @@ bounds that the proof speaks of.
 
 from fractions import Fraction
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from convexrough.bench.scenes import scene as bench_scene
 from convexrough.friction import order
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import enclosed
-from convexrough.friction.sweeping import swept_rates
+from convexrough.friction.sweeping import NEIGHBOURS, swept_rates
 
 NOTHING = Fraction(0)
 
@@ -163,6 +164,28 @@ def test_swept_rates_bound_those_of_all_softer_contacts(name: str) -> None:
         softer = c * rng.random(len(c)) ** rng.integers(0, 4)
         rates = np.linalg.solve(np.eye(len(c)) + A * softer, np.ones(len(c)))
         assert (rates >= bounds).all()
+
+
+def test_a_singular_system_ends_the_search_for_weights(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only weights of least energy are left, and nothing false is proved."""
+    solve, found = np.linalg.solve, []
+
+    def singular(a: Any, b: Any) -> Any:
+        if a.ndim == 3 and a.shape[-1] != NEIGHBOURS + 5:
+            found.append(a.shape)
+            raise np.linalg.LinAlgError
+        return solve(a, b)
+
+    monkeypatch.setattr(np.linalg, "solve", singular)
+    contact = cr.press(bench_scene("scattered", 1.5), approach=5e-5)
+    problem = levels_of(contact).top.problem
+    c = np.where(contact.loads[problem.candidates] > 0, 1.0, 0.0) / problem.stiffness(
+        np.maximum(levels_of(contact).top.loads.value, 1e-3)
+    )
+    bounds = swept_rates(problem.influence, c, np.zeros(len(c)), 1000)
+    rates = solve(np.eye(len(c)) + problem.influence.matrix * c, np.ones(len(c)))
+    assert found
+    assert (bounds <= rates).all()
 
 
 def test_order_of_thousands_is_proved_without_an_inverse() -> None:

@@ -32,6 +32,15 @@ def matrix(heights: Any = HEIGHTS, separator: str = " ", ending: str = "\n") -> 
     return "".join(separator.join(map(repr, row)) + ending for row in np.asarray(heights).tolist())
 
 
+def test_a_matrix_in_a_workbook(tmp_path: Path) -> None:
+    book = pytest.importorskip("openpyxl").Workbook()
+    for row in HEIGHTS.tolist():
+        book.active.append(row)
+    book.save(tmp_path / "a.xlsx")
+    found = cr.surface.read(tmp_path / "a.xlsx", pixel=1.0, detrend=None)
+    np.testing.assert_array_equal(found.heights, HEIGHTS)
+
+
 def test_arrays(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", HEIGHTS)
     surface = raw(tmp_path / "a.npy", pixel=2.0, unit="um")
@@ -150,6 +159,12 @@ HOLED = np.where(X == Y, np.nan, HEIGHTS)
         ("", {}, "empty"),
         ("x,y,z\n", {}, "rows: found none below the header"),
         ("1 2 3 4\n", {"pixel": 1.0}, "shape"),
+        ("0 1 2 3 4 5 6 7 8\n" + matrix(), {"pixel": 1.0}, "row 1: found numbers 1, 2, 3, ..."),
+        (
+            "".join(f"{i},{line}\n" for i, line in enumerate(matrix().replace(" ", ",").split())),
+            {"pixel": 1.0},
+            "column 1: found numbers 1, 2, 3, ...",
+        ),
     ],
 )
 def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -> None:

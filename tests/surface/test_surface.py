@@ -176,3 +176,14 @@ def test_spikes_and_drop_outs_are_named() -> None:
     (said,) = cr.surface.Surface(grooved, 1.0).warnings
     assert said.startswith("spikes or drop-outs: 3 pixels far from their neighbours, the first in")
     assert "in row 7, column 9; make them nan and use fill=True, or --fill" in said
+
+
+def test_a_map_that_is_cut_off_at_the_top_is_named() -> None:
+    """Also after a plane is subtracted from its flat tops."""
+    heights = NOISE + 0.01 * np.arange(NOISE.shape[1])
+    cut = np.minimum(heights, np.quantile(heights, 0.97))
+    for surface in (cr.surface.Surface(cut, 1.0), cr.surface.Surface(cut, 1.0).detrend("plane")):
+        assert any("exactly the same height" in each for each in surface.warnings)
+    levels = np.round(heights * 20)  # as of a byte for each pixel
+    for whole in (heights, levels):
+        assert cr.surface.Surface(whole, 1.0).clipped == 0

@@ -162,6 +162,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
             ("model error", f"{model_error:.2g}  (from point forces in place of pressures)"),
             ("crowding", f"{crowding:.3g}  (contact discs overlap above 1)"),
             *([("bodies", beta)] if beta else []),
+            ("mean pressure", _described_pressure(normal, units)),
             ("geometry", _described_geometry(normal)),
             ("contact modulus", plausibility.described_modulus(normal["contact_modulus"], units)),
             ("solver", f"{normal['solver']}, {steps}"),
@@ -178,6 +179,12 @@ def _neglected(normal: Summary) -> str:
         f"Dundurs' beta = {beta:.3g}, neglected: pressing would shear the surfaces by some "
         f"{abs(100 * beta):.2g} % of the pressure"
     )
+
+
+def _described_pressure(normal: Summary, units: UnitNames) -> str:
+    """The largest mean pressure, and whether yield is checked."""
+    known = f"at most {normal['mean_pressure']:.4g} {unit_of('mean_pressure', units)}".rstrip()
+    return known if normal["hardness"] else f"{known}  (no hardness given: yield is not checked)"
 
 
 def _described_geometry(normal: Summary) -> str:
