@@ -17,7 +17,8 @@ from convexrough.errors import blamed_on
 @click.option("--format", "formats", type=click.Choice(["cbf", "json", "mps", "npz"]),
               multiple=True, help="Only this format; may be repeated.")  # fmt: skip
 @click.option("--bristles", metavar="M", type=click.IntRange(1), default=64, show_default=True,
-              help="Bristles per asperity in the quadratic program; HiGHS is slow above 16.")  # fmt: skip
+              help="Bristles per asperity in the quadratic program (HiGHS is slow above 16).",
+              )  # fmt: skip
 @out_option
 @force_option
 @json_option
