@@ -52,9 +52,7 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Proved:
-    """A proved solution, as balls over the n candidates (asperities that may touch).
-
-    Numbers are in the units of `problem`.
+    """A proved solution, as balls over the n candidates (may touch), in the units of `problem`.
 
     trial     : the loads P from which it was proved
     box       : a box of loads that holds exactly one solution
