@@ -173,8 +173,13 @@ class Contact(Cached, Table, Plottable):
     @property
     def mean_pressures(self) -> Array:
         """Load over contact area (n,) [force / length^2], 0 where open."""
-        areas = np.pi * self.contact_radii**2
-        return frozen(np.divide(self.loads, areas, out=np.zeros(len(areas)), where=areas > 0))
+        return frozen(mean_pressures(self.loads, self.contact_radii))
+
+
+def mean_pressures(loads: Array, radii: Array) -> Array:
+    """Loads over contact areas (n,), 0 where the contact radius is 0."""
+    areas = np.pi * radii**2
+    return np.asarray(np.divide(loads, areas, out=np.zeros(len(areas)), where=areas > 0))
 
 
 def press(
@@ -292,7 +297,7 @@ def _contact(
         certificate=certificate,
         model_error=model_error,
         crowding=crowding,
-        covered=_covered(scene, radii),
+        covered=covered(scene, radii),
         candidates=len(problem),
         influence=problem.influence.name,
         solver=solver.name,
@@ -313,6 +318,9 @@ def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solu
         if error.iterate is not None:
             error.iterate = problem.to_scene(error.iterate * problem.units.force)
         raise
+    if not isinstance(solution, Solution):
+        found = type(solution).__name__
+        raise SolverError(f"returned {found}, expected a Solution", solver=solver.name)
     try:
         loads = checks.array("loads", solution.loads, length=len(problem), sign="not negative")
     except InputError as error:
@@ -334,7 +342,7 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
     return float((moved / prescribed[touching]).max()), A.crowding(a)
 
 
-def _covered(scene: Scene, radii: Array) -> int:
+def covered(scene: Scene, radii: Array) -> int:
     """The number of open summits under contact discs with these radii (n,) [length]."""
     discs, summits = np.flatnonzero(radii), np.flatnonzero(radii == 0)
     nearest = 0.0 if scene.lattice is None else scene.lattice.spacing

@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.contact import Contact
+from convexrough.arrays import Array
+from convexrough.contact import Contact, mean_pressures
+from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 from convexrough.tabular.units import UnitNames
 
@@ -41,24 +44,31 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     beyond_hardness : number of asperities whose mean pressure exceeds the hardness
     mismatch     : Dundurs' beta of two bodies, which the model neglects
     """
-    scene, touching = contact.scene, contact.loads > 0
-    radii, hardness = contact.contact_radii, scene.material.hardness
+    areas = contact.crowding, contact.covered
+    return limits(contact.scene, contact.loads, contact.contact_radii, *areas)
+
+
+def limits(
+    scene: Scene, loads: Array, radii: Array, crowding: float, covered: int
+) -> dict[str, Any]:
+    """The measures of `limits_of` for loads and contact radii (n,)."""
+    touching, hardness, pressures = loads > 0, scene.material.hardness, mean_pressures(loads, radii)
     reaches = (
         (np.linalg.norm(scene.contact_points[touching, axes], axis=1) + radii[touching]) / R
         for R, axes in scene.curved
     )
     return {
         "contact": int(touching.sum()),
-        "crowding": contact.crowding,
-        "covered": contact.covered,
+        "crowding": crowding,
+        "covered": covered,
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
-        "array_extent": _array_extent(contact),
+        "array_extent": _array_extent(scene, float(loads.sum())),
         "steepness": float((radii / scene.asperities.tip_radii).max()),
-        "mean_pressure": float(contact.mean_pressures.max()),
+        "mean_pressure": float(pressures.max()),
         "hardness": hardness,
         "mismatch": scene.material.mismatch,
         "contact_modulus": scene.material.contact_modulus,
-        "beyond_hardness": int((contact.mean_pressures > (hardness or np.inf)).sum()),
+        "beyond_hardness": int((pressures > (hardness or np.inf)).sum()),
     }
 
 
@@ -68,7 +78,12 @@ def warnings_of(contact: Contact) -> Iterator[str]:
         yield "not certified: nothing is proved about these loads"
     elif undecided := int((contact.status == "undecided").sum()):
         yield f"not certified: undecided asperities: {undecided}"
-    yield from cautions(limits_of(contact), contact.scene.units)
+    yield from cautions_of(contact)
+
+
+def cautions_of(contact: Contact) -> Iterator[str]:
+    """The `cautions` about a contact."""
+    return cautions(limits_of(contact), contact.scene.units)
 
 
 def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
@@ -117,13 +132,31 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         )
 
 
-def _array_extent(contact: Contact) -> float | None:
+def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
+    """True if simple bounds show that `cautions` has nothing to say, at a fraction of its cost."""
+    tips, a, touching = scene.asperities.tip_radii, float(radii.max()), np.count_nonzero(loads)
+    smooth = hertz.contact_radius(loads.sum(), scene.material.contact_modulus, scene.mean_radius)
+    far = float(scene.asperities.distances.max())
+    return bool(
+        scene.lattice is not None
+        and 2 * a < 0.99 * scene.lattice.spacing
+        and touching >= FEW
+        and a < 0.99 * STEEP * float(tips.min())
+        and all(far + a < 0.99 * STEEP * R for R, _ in scene.curved)
+        and (touching < ARRAY or (isinstance(scene.sphere_radius, float)
+             and np.abs(scene.asperities.positions).max(axis=0).min() > 1.01 * CUT_OFF * smooth))
+        and scene.material.hardness is None
+        and not any(unlikely_modulus(scene.material.contact_modulus, scene.units))
+    )  # fmt: skip
+
+
+def _array_extent(scene: Scene, load: float) -> float | None:
     """The smaller of max |x| / a and max |y| / b; a row of asperities has only one of them."""
-    smooth = smooth_reference(contact.scene, contact.load) if contact.load > 0 else None
+    smooth = smooth_reference(scene, load) if load > 0 else None
     if smooth is None:
         return None
     axes = smooth.semi_axes if isinstance(smooth, SmoothEllipsoid) else smooth.contact_radius
-    reached = np.abs(contact.scene.asperities.positions).max(axis=0)
+    reached = np.abs(scene.asperities.positions).max(axis=0)
     return float((reached / axes)[reached > 0].min(initial=np.inf))
 
 

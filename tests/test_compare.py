@@ -52,6 +52,27 @@ class Sloppy:
         return replace(solution, loads=loads, refine=False, trial=None)
 
 
+@dataclass(frozen=True)
+class Empty:
+    """A solver that returns nothing."""
+
+    name: str = "empty"
+
+    def solve(self, problem: NormalProblem, start: Any = None) -> Any:
+        return None
+
+
+def test_errors_of_solvers_from_elsewhere_are_entries() -> None:
+    raises = Sloppy(instead=ValueError("boom"))
+    found = compare(paper(), approach=PAPER_APPROACH, solvers=[raises, Empty(), Conic()])
+    assert [(entry.outcome, entry.message) for entry in found.entries] == [
+        ("answered", ""),
+        ("failed", "ValueError: boom"),
+        ("failed", "empty: returned NoneType, expected a Solution"),
+        ("answered", ""),
+    ]
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("name", NAMED)

@@ -39,9 +39,9 @@ def compare(
     If SCS and QOCO are installed, they also solve the cone program. With --solver, only the named
     solvers are compared with Newton's method.
 
-    The exit status is also 3 if a load differs from Newton's by more than --within, if a solver
-    refuses the scene, or if two certified results contradict each other, which would be a mistake
-    in the mathematics or the code.
+    The exit status is 3 if a result is not certified, if a load differs from Newton's by more than
+    --within, if a solver refuses the scene, or if two certified results contradict each other,
+    which would be a mistake in the mathematics or the code.
     """
     from convexrough.compare import compare as compare_solvers
     from convexrough.compare import solver_named

@@ -82,7 +82,7 @@ def sweep(
         raise click.UsageError("--resume and --force exclude each other.")
     from convexrough.errors import WorkerError
     from convexrough.sweeps.file import read_sweep
-    from convexrough.sweeps.report import describe, failures, progress_kept, summarise
+    from convexrough.sweeps.report import cautions, describe, failures, progress_kept, summarise
     from convexrough.sweeps.sweep import run
 
     assert sweep is not None  # one of the two
@@ -100,8 +100,8 @@ def sweep(
         return SOLVER_FAILED
     said = summarise(done.table, done)
     echo(said, describe(said), as_json)
-    for failed in failures(done.table):
-        say_aside("warning", failed)
+    for line in (*failures(done.table), *cautions(done.table)):
+        say_aside("warning", line)
     return _status(said)
 
 

@@ -45,7 +45,7 @@ def claim_options(command: Command) -> Command:
         force_option,
         out_option,
         click.option("--explain", is_flag=True, help="Report how the files are read, and stop."),
-        click.option("--shear-force", metavar="Q", type=float, help="Prescribed sum of FORCES."),
+        click.option("--shear-force", metavar="Q", type=float, help="Prescribed shear force."),
         click.option("--shear", metavar="FORCES", type=PATH,
                      help="Also check the shear forces in this file."),
         click.option("--nodes", is_flag=True,
@@ -123,8 +123,8 @@ def verify(
     asperities.
 
     Exit status: 0 only if the claimed set is proved right, every load and shear force is close
-    enough, and prescribed totals agree; 2 wrong input; 3 otherwise; 4 no shear state was found to
-    compare with.
+    enough, and prescribed totals agree; 2 wrong input; 3 otherwise; 4 if the shear problem could
+    not be solved. With --explain it is 0 if the files can be read.
     """
     from convexrough.run.results import results_folder
     from convexrough.run.scene_file import read_scene

@@ -61,8 +61,8 @@ def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
         counts = ", ".join(f"{first[status]} {status}" for status in COUNTS if first[status])
         lines.append(f"asperities         {counts}")
     lines += [
-        f"disagreement       largest difference from {first['solver']}, over the largest load",
-        "load error         bound on the error of any load, over the largest load",
+        f"disagreement       largest difference from {first['solver']}, over its largest load",
+        "load error         bound on the error of any load, over the solver's own largest load",
         f"duality gap        {f'in {work}, ' if work else ''}computed from the loads alone",
         "MB                 increase of the memory of the process during the solution",
         "",

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from convexrough.sweeps.measures import FAILURES, Column, Numbers, measured
+from convexrough.sweeps.measures import FAILURES, Column, Measured, measured
 from convexrough.sweeps.scenes import Asked, Source
 from convexrough.sweeps.together import measured_together
 from convexrough.threads import one_thread
@@ -66,20 +66,21 @@ def compute(batch: Batch) -> BatchRows:
     return BatchRows(table(batch, [rows[number] for number in batch.numbers]), VERSIONS)
 
 
-def _row(asked: Asked, known: tuple[Numbers, str] | None, columns: tuple[Column, ...]) -> Row:
+def _row(asked: Asked, known: Measured | None, columns: tuple[Column, ...]) -> Row:
     """The row of one scene.
 
     known : its numbers if it was measured together with others, else None
     """
     try:
         wanted = {column.stage for column in columns}
-        found, unsure = known or measured(asked.pressed(), asked.stages, wanted)
+        found, unsure, warned = known or measured(asked.pressed(), asked.stages, wanted)
         values = [found[column.number, column.row] for column in columns]
     except FAILURES as error:
         return _failed(error, columns)
     except KeyError as error:  # a swept list may be shorter than the first
         return "failed", f"has no number {error}", [np.nan] * len(columns)
-    return ("undecided" if unsure else "certified"), unsure, values
+    said = "; ".join(filter(None, (unsure, warned)))
+    return ("undecided" if unsure else "certified"), said, values
 
 
 def _failed(error: Exception, columns: tuple[Column, ...]) -> Row:

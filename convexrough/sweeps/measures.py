@@ -16,6 +16,7 @@ from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.errors import ConvexroughError, InputError
 from convexrough.friction.onset import onset_of_sliding
+from convexrough.plausibility import cautions_of
 from convexrough.run.stage import Stage, limit, unit_of
 from convexrough.tabular.units import UnitNames
 
@@ -46,11 +47,16 @@ class Column(NamedTuple):
         return self.number.partition(".")[0]
 
 
-def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> tuple[Numbers, str]:
-    """The numbers of the wanted stages, and the reasons why these are not certified, or "".
+class Measured(NamedTuple):
+    """The numbers of a scene, and why they are not certified and the model may not hold, or ""."""
 
-    The stage "normal" is always computed.
-    """
+    numbers: Numbers
+    doubts: str
+    cautions: str
+
+
+def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measured:
+    """The numbers of the wanted stages. The stage "normal" is always computed."""
     found: Numbers = {}
     doubts: list[str] = []
     for name, stage in stages.items():
@@ -63,7 +69,7 @@ def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> tuple[
         onsets = onset_of_sliding(contact, which=which) / (limit(contact) or 1.0)
         at = np.quantile(onsets, QUANTILES) if len(which) else np.full(len(QUANTILES), np.nan)
         found |= {(ONSET, f"{q:g}"): float(it) for q, it in zip(QUANTILES, at, strict=True)}
-    return found, "; ".join(doubts)
+    return Measured(found, "; ".join(doubts), "; ".join(cautions_of(contact)))
 
 
 def _numbers(
@@ -100,7 +106,9 @@ def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[C
 
     for stage in (*stages, *((ONSET,) if ONSET in measures else ())):
         if not all(map(number, measures)):
-            new = measured(contact, {stage: stages[stage]} if stage in stages else {}, {stage})[0]
+            new = measured(
+                contact, {stage: stages[stage]} if stage in stages else {}, {stage}
+            ).numbers
             for each, row in new:
                 rows.setdefault(each, []).append(row)
     columns = []

@@ -70,6 +70,19 @@ def failures(table: SweepTable) -> list[str]:
     return named
 
 
+def cautions(table: SweepTable) -> list[str]:
+    """A warning that counts the scenes with a message which did not fail; [] if there are none."""
+    count, first = 0, ""
+    for block in table.blocks(["scene", "status", "message"]):
+        rows = np.flatnonzero((block["status"] == "certified") & (block["message"] != ""))
+        if len(rows) and not count:
+            first = f"scene {block['scene'][rows[0]]}: {block['message'][rows[0]]}"
+        count += len(rows)
+    if not count:
+        return []
+    return [f"{count:,} certified scenes of {len(table):,} have warnings, the first {first}"]
+
+
 def write_summary(
     folder: Path, table: SweepTable, found: Columns, *, overwrite: bool = False
 ) -> list[Path]:

@@ -10,11 +10,15 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from convexrough.arrays import Array
+from convexrough.contact import covered
+from convexrough.plausibility import cautions, clear_of_cautions, limits
 from convexrough.rows import PressedRows, in_rows
 from convexrough.run.stages import Cycle
-from convexrough.sphere import mindlin
+from convexrough.scene.neighbours import crowding
+from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz, mindlin
 from convexrough.sphere.smooth import smooth_reference
-from convexrough.sweeps.measures import FAILURES, Column, Numbers, row_label
+from convexrough.sweeps.measures import FAILURES, Column, Measured, Numbers, row_label
 from convexrough.sweeps.scenes import Asked
 
 #: Arrays along the rows, by the names of `Contacts` or `Cycles`.
@@ -51,9 +55,7 @@ CYCLE: dict[str, Callable[[Found], Array]] = {
 KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYCLE}
 
 
-def measured_together(
-    asked: Mapping[int, Asked], columns: Sequence[Column]
-) -> dict[int, tuple[Numbers, str]]:
+def measured_together(asked: Mapping[int, Asked], columns: Sequence[Column]) -> dict[int, Measured]:
     """The result of `measured` for the scenes that are proved in rows, by their numbers."""
     if not {column.number for column in columns} <= KNOWN:
         return {}
@@ -67,7 +69,7 @@ def measured_together(
                 len(cycle.maximum_fraction) if cycle else 0,
             )
             groups.setdefault(key, []).append(number)
-    found: dict[int, tuple[Numbers, str]] = {}
+    found: dict[int, Measured] = {}
     for (_, by_load, _), numbers in groups.items():
         some = [asked[number] for number in numbers]
         controls = np.array([each.load if by_load else each.approach for each in some])
@@ -75,7 +77,7 @@ def measured_together(
             for rows in in_rows([each.scene for each in some], controls, by_load):
                 mine = [some[k] for k in rows.places.tolist()]
                 for k, known in _known(rows, mine, columns).items():
-                    found[numbers[rows.places[k]]] = known, ""
+                    found[numbers[rows.places[k]]] = known
         except FAILURES:  # some scene caused it; each is then measured alone
             continue
     return found
@@ -90,8 +92,8 @@ def _cycle(asked: Asked, columns: Sequence[Column]) -> Cycle | None:
 
 def _known(
     rows: PressedRows, asked: Sequence[Asked], columns: Sequence[Column]
-) -> dict[int, Numbers]:
-    """The numbers of the certified rows, by their positions."""
+) -> dict[int, Measured]:
+    """What is measured of the certified rows, by their positions."""
     contacts = rows.contacts()
     good = ~(contacts["status"] == "undecided").any(axis=1)
     normal = {name: number(contacts) for name, number in NORMAL.items()}
@@ -121,4 +123,16 @@ def _known(
             for k, known in enumerate(numbers):
                 label = row_label((low[k], high[k]))
                 known |= {(f"cycle.{name}", label): float(it[k]) for name, it in cycle.items()}
-    return {int(k): numbers[k] for k in np.flatnonzero(good)}
+    return {
+        k: Measured(numbers[k], "", _cautions(asked[k].scene, contacts["asperity_loads"][k]))
+        for k in np.flatnonzero(good).tolist()
+    }
+
+
+def _cautions(scene: Scene, loads: Array) -> str:
+    """The `cautions` of `Measured`, from loads (n,)."""
+    radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
+    if clear_of_cautions(scene, loads, radii):
+        return ""
+    crowded = crowding(scene.contact_points, radii), covered(scene, radii)
+    return "; ".join(cautions(limits(scene, loads, radii, *crowded), scene.units))

@@ -209,8 +209,9 @@ def _table(claim: Claim, scene: Scene, which: Indices) -> list[str]:
 
 
 def _off(claim: Claim) -> str:
-    beyond = f"; beyond that: {len(claim.off):,}" if len(claim.off) else ""
-    return f"at most {_size(claim)} {claim.one} ({claim.within:g} allowed{beyond})"
+    beyond = f"; exceeded by {len(claim.off):,}" if len(claim.off) else ""
+    allowed = f"{100 * claim.within:g} %" if claim.within > PERCENT else f"{claim.within:g}"
+    return f"at most {_size(claim)} {claim.one} ({allowed} allowed{beyond})"
 
 
 def _total(claim: Claim, unit: str) -> str:
