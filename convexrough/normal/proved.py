@@ -52,7 +52,7 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Proved:
-    """A proved solution, as balls over the n candidates (may touch), in the units of `problem`.
+    """A proved solution, as balls over the n candidates of `problem`, in its units.
 
     trial     : the loads P from which it was proved
     box       : a box of loads that holds exactly one solution
