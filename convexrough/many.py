@@ -35,8 +35,8 @@ class Contacts(Table):
     loads, approaches : (m,) totals [force], and D0 [length];  load_errors, approach_errors : (m,)
     asperity_loads : (m, n) [force];  asperity_load_errors : (m, n)
     status   : (m, n) "contact" or "open" where that is proved, else "undecided"
-    alone    : (k,) indices of the scenes that were pressed one by one, because the computation of
-        all together did not prove their solution to be the only one
+    alone    : (k,) indices of the scenes that were pressed one by one, because the joint
+        computation did not prove that their solution is the only one
 
     >>> contacts = cr.press_many([scene, scene], approach=[5e-5, 1e-5])
     >>> contacts.asperity_loads.shape, (contacts.status == "contact").sum(axis=1).tolist()

@@ -44,7 +44,7 @@ CYCLE = ("losses", "loss_errors", "displacement_amplitudes", "displacement_error
 class PressedRows(NamedTuple):
     """Scenes that were proved together: a stack of m rows.
 
-    places  : (m,) indices of the scenes;  problem : the one with the units of the stack
+    places  : (m,) indices of the scenes;  problem : the problem whose units the stack has
     high    : their solutions;  squares : (m, n) squared distances from the axis [length^2]
     """
 
@@ -134,7 +134,7 @@ def _in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> Iterato
 
 
 def _family(scene: Scene) -> tuple[Any, ...]:
-    """A key; scenes with equal keys differ only in heights and friction."""
+    """A key that is equal for scenes that differ only in heights and friction."""
     asperities = scene.asperities
     shape = asperities.positions.tobytes(), asperities.tip_radii.tobytes()
     elastic = scene.material.contact_modulus, scene.material.poisson_ratio

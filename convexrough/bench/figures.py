@@ -28,17 +28,17 @@ LOOKS: dict[str, dict[str, Any]] = {
     "bristles + Newton step": dict(marker="^", color="#4f8a4f", ls=":"),
 }
 
-#: Of each family.
+#: Marker of each family of scenes.
 MARKERS: dict[Family, str] = {"lattice": "o", "rough": "^", "scattered": "s"}
 
 COLUMNS = 3
 
-#: Errors below are drawn as this: an exact answer has to be somewhere.
+#: Smaller errors, such as 0, are shown as this on the logarithmic axis.
 EXACT = 1e-17
 
 
 def bench_figures(bench: Bench) -> dict[str, Figure]:
-    """The figures of what was measured, by the stem of the file each belongs in.
+    """The figures of the measurements, by file name without extension.
 
     "work-precision" : time against true error, a panel for each scene, the frontier in grey
     "cost"           : time of a press against the number of asperities
@@ -79,7 +79,7 @@ def _draw_panel(axes: Axes, rows: list[Row]) -> None:
             axes.plot(*_coordinates(points), label=name, **style)
     if best := frontier(rows):
         x, y = _coordinates(best)
-        # Up from the most accurate point, down to the left of the fastest.
+        # Extend the frontier to errors above that of the fastest point.
         x, y = np.append(x, 10.0), np.append(y, y[-1])
         axes.step(x, y, "-", where="post", color=FAINT, lw=2.5, zorder=0, label="frontier")
     axes.xaxis.set_major_locator(LogLocator(base=1e4, numticks=6))

@@ -17,7 +17,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB
 
 
 def describe_machine() -> dict[str, Any]:
-    """Processor, memory, threads, versions, date, and the present load of the machine."""
+    """Processor, memory [bytes], threads, versions, date, and current load of the machine."""
     import psutil
 
     limits = [f"{name}={os.environ[name]}" for name in THREADS if name in os.environ]

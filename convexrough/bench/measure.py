@@ -27,17 +27,17 @@ from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.threads import cores
 
-#: The largest proved error over the largest load at which loads are a reference: two units in the
-#: last place of that.
+#: Largest proved error, relative to the largest load, of loads that serve as a reference: two
+#: roundoffs.
 ACCURATE = 2.0**-52
 
-#: Least and most runs of which the fastest counts; more than the least while patience lasts.
+#: Least and largest number of runs, of which the fastest counts; `patience` [s] limits the number.
 LEAST_RUNS, MOST_RUNS = 3, 25
 
-#: Plain products, warm, of which the fastest is the unit.
+#: Number of timed plain products, of which the fastest is the unit of time.
 PRODUCTS = 8
 
-#: (P, T) over the load at the paper's approach: pressing, shear, unloading and turning round.
+#: Vertices (P, Q / f) of a load path, over the load at the paper's approach.
 CORNERS = np.array(
     [(0.6, 0), (0.6, 0.3), (1, 0.3), (1, -0.15), (0.7, -0.15), (0.7, 0.2), (0.5, 0.1)]
 )
@@ -50,11 +50,11 @@ Make = Callable[[], Scene]
 
 @dataclass(frozen=True)
 class Attempt:
-    """One point of the diagram.
+    """One point of the diagram of time against error.
 
-    solver    : which method, in words;  setting : how it is set, in words
-    settings  : the solver itself;  influence : the coupling that is asked for
-    most      : of more asperities it would take too long
+    solver    : name of the method;  setting : description of its settings
+    settings  : the solver;  influence : compliance operator; None for the cheapest
+    most      : largest number of asperities for which it is run
     """
 
     solver: str
@@ -65,9 +65,7 @@ class Attempt:
 
 
 class Task(NamedTuple):
-    """prepare : makes the argument of `work`, anew for each run; not timed
-    work : the function that is timed
-    """
+    """A function `work` that is timed, and `prepare`, which makes its argument for each run."""
 
     prepare: Callable[[Make], Any]
     work: Callable[[Any], object]
@@ -91,7 +89,7 @@ def _along_corners(contact: Contact) -> LoadPath:
     return load_path(contact.scene, loads=contact.load * P, forces=_bearable(contact) * T)
 
 
-#: What is timed at many sizes, by name.
+#: The tasks that are timed at many sizes, by name.
 TASKS: dict[str, Task] = {
     "press": Task(lambda make: make(), _pressed),
     "from nothing": Task(lambda make: make, lambda make: _pressed(make())),
@@ -107,7 +105,7 @@ TASKS: dict[str, Task] = {
 
 
 class Reference(NamedTuple):
-    """loads : (n,) [force];  bound : proved bound on each error, over the largest load"""
+    """Reference loads (n,) [force], with a proved bound on their errors over the largest load."""
 
     loads: Array
     bound: float
@@ -134,7 +132,7 @@ def measure_attempt(
     row = Row("solve", family, len(scene), solver=attempt.solver, setting=attempt.setting)
 
     def solved(_: object = None) -> tuple[NormalProblem, Solution]:
-        """Of a problem of its own each time: an operator keeps what it has computed once."""
+        """The solution of a newly assembled problem, because operators cache what they compute."""
         problem = NormalProblem.assemble(scene, approach=APPROACH, influence=attempt.influence)
         return problem, attempt.settings.solve(problem)
 
@@ -164,7 +162,7 @@ def measure_task(name: str, family: Family, size: int, patience: float) -> Row:
 
 
 def measure_sweep(size: int, scenes: int, workers: int) -> Row:
-    """Random heights on one array, a load, a cycle each: a scene's share of the whole time."""
+    """The row of a sweep over random heights with a cycle each; the time is that of one scene."""
     from convexrough.sweeps.sweep import sweep
 
     a = 1.0 / REFINEMENTS[size]
@@ -214,10 +212,10 @@ def least(
 
 
 def plain_product(scene: Scene) -> float:
-    """[s] nothing but the transforms of a product of float64, by all cores, as scipy has them.
+    """[s] the time of the Fourier transforms of one product with the lattice operator.
 
-    On the box of sites that holds all asperities, padded to twice its size: the least of eight,
-    after one that makes tables and threads. nan off a lattice.
+    They are scipy's, in float64 on all cores, on the box of sites of the asperities, padded to
+    twice its size: the least of `PRODUCTS` times, after a first product. nan without a lattice.
     """
     from scipy import fft
 

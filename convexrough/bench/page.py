@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 
-#: Tasks with a column of seconds, beside those of a press.
+#: Tasks with a column of seconds, in addition to those of a press.
 OTHERS = [task for task in TASKS if task not in ("press", "from nothing")]
 
 
 def describe(bench: Bench) -> list[str]:
-    """Aligned lines for the terminal."""
+    """The measurements as aligned lines for the terminal."""
     lines = [machine_line(bench)]
     for (family, n), rows in bench.panels().items():
         lines += ["", f"{n:,} asperities ({family})", *aligned(_work_table(rows), left=2)]
@@ -61,7 +61,7 @@ def machine_line(bench: Bench) -> str:
 
 
 def size_table(bench: Bench) -> list[list[str]]:
-    """Seconds of each task, a line for each scene; of a press also in plain products."""
+    """A heading and a row for each scene: seconds of each task; for a press also plain products."""
     on = f"in products on {bench.machine['cores']} cores"
     heading = ["scene", "asperities", "touching", "press", on, "from nothing", on, *OTHERS]
     table = [[*heading, "MB", "proved error"]]
@@ -80,7 +80,7 @@ def size_table(bench: Bench) -> list[list[str]]:
 
 
 def _messages(bench: Bench) -> list[str]:
-    """What follows, what a scene of a sweep takes, and why some did not answer."""
+    """Sentences: the conclusions, the time of a scene in sweeps, and the reasons of failures."""
     lines = bench.verdicts()
     for row in bench.rows:
         if row.task == "sweep":
@@ -93,9 +93,9 @@ def _messages(bench: Bench) -> list[str]:
 
 
 def write_bench(folder: Path, bench: Bench, *, figures: bool, page: Path | None) -> list[Path]:
-    """Write bench.json, rows.csv and the figures; renew the page, if one is given.
+    """Write bench.json, rows.csv, the figures and the page, if one is given; return the paths.
 
-    Returns the paths. Raises FileError; files already written stay.
+    Raises FileError; files already written remain.
     """
     rows = [asdict(row) for row in bench.rows]
     written = write_tables(
@@ -116,7 +116,7 @@ def _drawn(bench: Bench) -> dict[str, Figure]:
 
 
 def _renew(page: Path, bench: Bench) -> list[Path]:
-    """The figures first, so that the page never shows what is not there."""
+    """Write the figures, then the page that shows them; return the paths."""
     before, after = split_page(page)
     folder, written = page.parent / "figures", []
     with file_errors(folder, "be made"):
@@ -130,7 +130,7 @@ def _renew(page: Path, bench: Bench) -> list[Path]:
 
 
 def split_page(page: Path) -> tuple[str, str]:
-    """What is before and after the block of a page; FileError where there is not one block."""
+    """The text before and after the block of a page; FileError unless there is one block."""
     with file_errors(page, "be read"):
         text = page.read_text(encoding="utf-8")
     before, begin, rest = text.partition(BEGIN)

@@ -18,7 +18,7 @@ from convexrough.progress import LOGGER
 from convexrough.record import Table
 from convexrough.solvers import Newton, Solver
 
-#: Times over the least at which `rows` looks.
+#: Factors of the least time for which `Profile.rows` reports parts.
 FACTORS = (1, 2, 5, 10, 100)
 
 
@@ -38,7 +38,7 @@ class Profile(Table):
 
     @property
     def ratios(self) -> Array:
-        """(k, m) seconds over those of the fastest right answer to the case."""
+        """(k, m) seconds over the time of the fastest right answer to each case."""
         least = self.seconds.min(axis=0)
         none = np.full_like(self.seconds, np.inf)
         ratios: Array = np.divide(self.seconds, least, where=np.isfinite(least), out=none)
@@ -64,7 +64,7 @@ class Profile(Table):
         ]
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Part of the cases against time over the least; axes in, axes out."""
+        """Axes, new unless given, with the part of the cases against the time over the least."""
         if axes is None:
             axes = Figure(figsize=(SINGLE, 3.8), layout="constrained").subplots()
         finite = self.ratios[np.isfinite(self.ratios)]
@@ -98,11 +98,11 @@ def profile_of(
     cases: Sequence[str] = (),
     within: float = 1e-3,
 ) -> Profile:
-    """Time solvers on the hard cases, once each, and judge what they answer.
+    """Times and outcomes of solvers on the hard cases, run once each.
 
-    solvers : settings objects; the default is every one of `compare`. Newton's method is the first
-    cases   : names of cases or families; all, if none is given
-    within  : how far loads may be from the answer, over the largest, to be right
+    solvers : settings objects; default: every solver of `compare`. Newton's method is always first
+    cases   : names of cases or families; default: all
+    within  : largest error of right loads, over the largest load
     """
     others = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
     wanted = names(*cases)

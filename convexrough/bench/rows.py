@@ -12,10 +12,10 @@ import numpy as np
 from convexrough.bench.scenes import FAMILIES, Family
 from convexrough.version import __version__
 
-#: A point has to be this much faster before it counts as faster: what timing can tell.
+#: Relative difference of times up to which they count as equal.
 NOISE = 0.1
 
-#: Exponents of time are fitted from so many asperities on: below, fixed costs count.
+#: Smallest number of asperities for fits of exponents: below, fixed costs dominate.
 FITTED_FROM = 10_000
 
 
@@ -25,11 +25,11 @@ class Row:
 
     task    : "solve" is one point of the diagram of time against error, by `solver` as `setting`
         says; the others are "from nothing", "sweep" and those of `convexrough.bench.measure.TASKS`
-    outcome : "refused": the scene is not one for this solver; and `message` why
-    seconds : [s] the least of `runs`; of a sweep, of one scene
-    product : [s] the unit of `products`, the least of 8 warm plain products; nan off a lattice
-    error   : max |P - P_ref| / max P_ref;  bound : what is proved of it
-    memory  : [bytes] by which that of the process rose at most, None where unknown
+    outcome : "refused": the solver does not accept the scene; `message` says why
+    seconds : [s] the least of `runs`; for a sweep, the time of one scene
+    product : [s] the unit of `products`, from `measure.plain_product`; nan without a lattice
+    error   : max |P - P_ref| / max P_ref;  bound : proved bound on the largest relative error
+    memory  : [bytes] largest increase of the memory of the process; None where unknown
     """
 
     task: str
@@ -50,17 +50,17 @@ class Row:
 
     @property
     def default(self) -> bool:
-        """Whether the row is of the default solver with its default settings."""
+        """True for the default solver with its default settings."""
         return (self.solver, self.setting) == ("newton", "default")
 
     @property
     def products(self) -> float:
-        """The time in plain products of the same size."""
+        """The time over that of a plain product of the same size."""
         return self.seconds / self.product
 
     @property
     def known(self) -> bool:
-        """Whether the row has an answer whose error is known."""
+        """True if the row has an answer with a known error."""
         return self.outcome == "answered" and math.isfinite(self.error)
 
 
@@ -74,7 +74,7 @@ class Bench:
     seconds: float
 
     def panels(self) -> dict[tuple[Family, int], list[Row]]:
-        """What came of every solver, by the scenes on which they were tried."""
+        """The rows of all solvers, by family and number of asperities."""
         found: dict[tuple[Family, int], list[Row]] = {}
         for row in self.rows:
             if row.task == "solve":
@@ -82,13 +82,13 @@ class Bench:
         return found
 
     def presses(self, family: Family, least: int = 0) -> list[Row]:
-        """Answered presses of a family, of so many asperities and more."""
+        """Answered presses of a family with at least so many asperities."""
         wanted = "press", family, "answered"
         rows = [row for row in self.rows if (row.task, row.family, row.outcome) == wanted]
         return [row for row in rows if row.asperities >= least]
 
     def exponent(self, family: Family) -> float:
-        """Of the time of presses against the number of asperities; nan for fewer than two sizes."""
+        """b if the time of a press grows as n^b with n asperities; nan for fewer than two sizes."""
         large = self.presses(family, FITTED_FROM)
         return exponent([row.asperities for row in large], [row.seconds for row in large])
 
@@ -106,7 +106,7 @@ class Bench:
         }
 
     def verdicts(self) -> list[str]:
-        """Whether the default solver is on the frontier, and how its time grows."""
+        """Sentences: whether the default solver is on the frontier, and how its time grows."""
         lines = []
         for (family, n), rows in self.panels().items():
             beaten = [f"{row.solver}, {row.setting}" for row in better_than_default(rows)]
@@ -121,7 +121,7 @@ class Bench:
 
 
 def frontier(rows: Iterable[Row]) -> list[Row]:
-    """The points than which no other is at least as fast and as accurate, and better in one."""
+    """The Pareto frontier: points to which no other is at least equal in both and better in one."""
     points = [row for row in rows if row.known]
 
     def dominated(row: Row) -> bool:
@@ -136,9 +136,9 @@ def frontier(rows: Iterable[Row]) -> list[Row]:
 
 
 def better_than_default(rows: Iterable[Row]) -> list[Row]:
-    """The points that are faster than the default by more than noise, and at least as accurate.
+    """The points at least as accurate as the default, and faster by more than `NOISE`.
 
-    Where the default has no answer: every point.
+    If the default has no answer, all points.
     """
     points = [row for row in rows if row.known]
     default = next((row for row in points if row.default), None)

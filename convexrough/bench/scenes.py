@@ -12,14 +12,14 @@ from convexrough.scene.scene import Scene
 
 Family = Literal["lattice", "rough", "scattered"]
 
-#: [R] The paper's approach; it reaches as far as the asperities go.
+#: The paper's approach, in units of the sphere's radius.
 APPROACH = 5e-5
 
 #: A hexagonal lattice of equal asperities; with random heights (standard deviation 1e-6 R) and tip
 #: radii (10 %); with every asperity moved at random, by up to 0.15 of the spacing.
 FAMILIES: tuple[Family, ...] = ("lattice", "rough", "scattered")
 
-#: Refinements by which a scene has about so many asperities.
+#: Refinement of a scene by approximate number of asperities.
 REFINEMENTS = {61: 1.0, 700: 3.4, 8_400: 12.0, 13_000: 15.0, 36_000: 25.0, 120_000: 45.0,
                330_000: 75.0, 1_300_000: 150.0, 5_200_000: 300.0}  # fmt: skip
 

@@ -25,14 +25,14 @@ from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 
 Sizes = tuple[tuple[Family, int], ...]
 
-#: How often the default solver and what seems to beat it are timed in turns.
+#: How often the default solver and solvers that seem to be faster are timed again, alternately.
 ROUNDS = 4
 
-#: Couplings that Newton's method is tried with, and up to how many asperities.
+#: Compliance operators for Newton's method, with the largest number of asperities for each.
 COUPLINGS: dict[Kind | None, int] = {None: 10**9, "dense": 2_000, "lattice": 10**9,
                                      "scattered": 10**9}  # fmt: skip
 
-#: Up to how many asperities a cone or quadratic program is tried: it takes the square of them.
+#: Largest number of asperities for cone and quadratic programs: their memory grows as its square.
 PROGRAMS = 1_000
 
 
@@ -40,17 +40,17 @@ def _of(family: Family, *sizes: int) -> Sizes:
     return tuple((family, size) for size in sizes)
 
 
-#: Where every solver is compared.
+#: Scenes on which all solvers are compared.
 WORK = (*_of("lattice", 61, 700, 8_400), *_of("rough", 8_400), *_of("scattered", 8_400))
 
-#: Where the default one is timed.
+#: Scenes on which a press with the default solver is timed.
 PRESSES = (
     *_of("lattice", 61, 700, 13_000, 36_000, 120_000, 330_000, 1_300_000, 5_200_000),
     *_of("rough", 13_000, 36_000, 120_000, 330_000, 1_300_000),
     *_of("scattered", 13_000, 36_000, 120_000, 330_000),
 )
 
-#: The same of what follows a press, by the name of the task.
+#: Scenes of the tasks that follow a press.
 FOLLOWING = {
     "shear": _of("lattice", 61, 700, 36_000, 120_000, 330_000),
     "loss curve": _of("lattice", 61, 700, 120_000),
@@ -58,16 +58,16 @@ FOLLOWING = {
     "gradient": _of("lattice", 700, 36_000, 330_000),
 }
 
-#: Size, scenes, and processes.
+#: Sweeps: asperities of a scene, number of scenes, number of processes.
 SWEEPS = ((61, 10_000, 1), (61, 10_000, 2), (700, 500, 1), (700, 500, 2))
 
-#: A quick run leaves out larger sizes, compares solvers on the first three scenes only, and takes a
-#: part of the scenes of the first sweep.
+#: A quick run leaves out presses of more than QUICK asperities, compares solvers on three scenes
+#: only, and runs only the first sweep, with 1 / PART of its scenes.
 QUICK, PART = 20_000, 20
 
 
 def attempts(quick: bool) -> list[Attempt]:
-    """Every solver at several tolerances, those that end with a Newton step also without it."""
+    """All solvers at several tolerances; those that end with a Newton step also without it."""
     found = [Attempt("newton", "default", Newton())]
     for kind, most in COUPLINGS.items():
         label = "newton" if kind is None else f"newton, {kind}"
@@ -89,11 +89,11 @@ def attempts(quick: bool) -> list[Attempt]:
 
 
 def run(*, quick: bool) -> Bench:
-    """The measurements of the whole list, or of its quick part."""
+    """The measurements of the whole list, or of a quick run."""
     patience = 0.1 if quick else 1.0
     began, machine, rows = time.perf_counter(), describe_machine(), list[Row]()
-    for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # have them import what they need
-        with suppress(InputError, SolverError):  # it will come again, and be told
+    for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # so that imports are not timed
+        with suppress(InputError, SolverError):  # `_panel` reports such errors
             press(scene("lattice", 1.0), approach=APPROACH, solver=solver)
     for family, size in WORK[:3] if quick else WORK:
         rows += _panel(family, size, quick, patience)
@@ -109,10 +109,10 @@ def run(*, quick: bool) -> Bench:
 
 
 def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]:
-    """Every attempt at one scene.
+    """The rows of all attempts on one scene.
 
-    What seems to beat the default solver is timed again, and so is that: in turns. Both keep their
-    least times, so that a moment in which the machine was busy decides nothing.
+    The default solver and the solvers that seem to be faster are timed again, alternately. Each
+    keeps its least time, so that a short load on the machine does not change the order.
     """
     LOGGER.info(f"{family}, about {size:,}: reference")
     each = scene(family, REFINEMENTS[size])

@@ -1,1 +1,1 @@
-"""Mathematics without contact mechanics: Newton steps on normal maps, cones, solver libraries."""
+"""Mathematics without contact mechanics: Newton steps on normal maps, cones, definiteness."""

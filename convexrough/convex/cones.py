@@ -62,8 +62,7 @@ def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = Non
     lifts : columns, (n,) each, of y2, y3, y4, y5, z (four-cone form), or of y1, y2, y3, y4, y5, z
         (five-cone form), among all variables of the program
     width : how many variables the program has
-    ones  : (n,) columns of variables that stand for the 1 of each lift: then a lift may be a part
-        of a whole, of that size
+    ones  : (n,) columns of variables that replace the constant 1 in the cones of each lift
 
     Rows are grouped by lift: the cones of the first, three rows each, then those of the second.
     """

@@ -1,20 +1,20 @@
-"""Positive definite or not: Cholesky's factorisation as a test, and as a proof.
+"""Tests and proofs that a matrix is positive definite, by Cholesky's factorisation.
 
-The proof (Demmel; Rump, BIT 46 (2006) 433). Where the factorisation of a computed (n, n) matrix C
-of positive diagonal runs to its end, its factor satisfies R'R = C + E with
+The proof (Demmel; Rump, BIT 46 (2006) 433). If the factorisation of a computed (n, n) matrix C
+with a positive diagonal succeeds, its factor R satisfies R'R = C + E with
 |E_ij| <= g / (1 - g) (C_ii C_jj)^(1/2), g = (n + 1) u / (1 - (n + 1) u) and u the roundoff. The
 right side is a matrix of rank one and norm g / (1 - g) trace C, and R'R >= 0. So
 
-    C >= -(n + 2) u trace C    where 2 (n + 1) (n + 2) u <= 1: for all n that fit in a memory.
+    C >= -(n + 2) u trace C    where 2 (n + 1) (n + 2) u <= 1: for all n that fit into memory.
 
-Let C be M off the diagonal and 1 - mu - s on it, and let each entry of M, as computed, have a
-relative error of at most e: a matrix whose norm is at most its largest row sum. With trace C <= n,
+Let C be M off the diagonal and 1 - mu - s on it, and let each computed entry of M have a relative
+error of at most e. The norm of the errors is at most their largest row sum. With trace C <= n,
 
     s >= e max_i sum_j |M_ij| + (n + 2) n u    proves    I + M >= mu I.
 
-A tenth more in s is for the rounding of the sums, of s and, with the n u to spare where n + 1 would
-do for n + 2, of the diagonal. Entries that are not finite, or overflow, leave a diagonal of the
-factor that is not: LAPACK need not see that, and no such factor counts.
+The code takes 1.1 s, which covers the rounding errors of the sums, of s and of the diagonal.
+Entries that are not finite, and overflow, make the diagonal of the factor nan or infinite. LAPACK
+need not report that, so the diagonal is checked.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from convexrough.roundoff import ROUNDOFF
 
 
 def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
-    """The largest of some margins, from small to large, that is proved; else 0. By bisection."""
+    """The largest of the margins (in increasing order) that is proved, by bisection; else 0."""
     low, high = -1, len(margins)
-    middle = 0  # most of the time, what is not proved with the smallest is not proved at all
+    middle = 0  # first the smallest: if no margin is proved, one test is enough
     while high - low > 1:
         if proved(margins[middle]):
             low = middle
@@ -42,10 +42,10 @@ def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
 
 
 def is_definite(matrix: Array) -> bool:
-    """Whether Cholesky's factorisation of a symmetric matrix runs to its end: no proof yet."""
+    """True if Cholesky's factorisation of a symmetric matrix succeeds, which is no proof yet."""
     from scipy.linalg.lapack import dpotrf  # 0.2 s to import: only when asked
 
-    # The transpose of a symmetric matrix is itself, and in LAPACK's order.
+    # The transpose of a symmetric matrix is equal to it and has LAPACK's memory order.
     factor, failed = dpotrf(matrix.T, lower=1, clean=0)
     return not failed and bool(np.isfinite(factor.diagonal()).all())
 
@@ -53,11 +53,11 @@ def is_definite(matrix: Array) -> bool:
 def proved_margin(
     couplings: Array, margins: Sequence[float], entry_error: float, spare: float = 0.0
 ) -> float:
-    """The first of some margins mu for which  I + M >= (mu + spare) I  is proved, as above; else 0.
+    """The first margin mu for which  I + M >= (mu + spare) I  is proved as above; else 0.
 
     couplings   : (n, n) M as computed, symmetric, 0 on its diagonal
     margins     : each from 0 to 1
-    entry_error : e, bound on the error of each entry relative to it
+    entry_error : e, bound on the relative error of each entry
     """
     n = len(couplings)
     perturbation = entry_error * float(np.abs(couplings).sum(axis=1).max())
@@ -77,15 +77,16 @@ def proved_sparse_margin(
     margins: Sequence[float],
     errors: Array,
 ) -> float:
-    """The largest mu with  S >= mu I  proved, of a symmetric sparse matrix S; else 0.
+    """The largest margin mu for which  S >= mu I  is proved for a sparse symmetric S; else 0.
 
-    diagonal : (n,);  pairs, values : of entries above the diagonal;  errors : bounds on theirs
-    margins  : from small to large
+    diagonal : (n,);  pairs, values, errors : indices of entries above the diagonal, the entries,
+        and bounds on their errors
+    margins  : in increasing order
 
-    By elimination without exchange of rows: where L and U are computed, S = L U + E with
-    |E| <= g / (1 - g) |L| |U|, g = n u (Higham, Accuracy and Stability, theorem 9.3, in any order
-    of the sums). With D the diagonal of U, positive, S - L D L' = E + L (U - D L') is symmetric, so
-    its norm is at most its largest row sum.
+    By elimination without exchange of rows: the computed L and U satisfy S = L U + E with
+    |E| <= g / (1 - g) |L| |U|, g = n u (Higham, Accuracy and Stability, theorem 9.3). If the
+    diagonal D of U is positive, S - L D L' = E + L (U - D L') is symmetric, so that its norm is at
+    most its largest row sum.
     """
     from scipy.sparse import coo_array
 
@@ -96,7 +97,7 @@ def proved_sparse_margin(
     where = (np.concatenate((every, i, j)), np.concatenate((every, j, i)))
 
     def proved(margin: float) -> bool:
-        # A hundredth more is for what elimination loses.
+        # 0.01 mu covers the errors of the elimination.
         entries = np.concatenate((diagonal - 1.01 * margin - off, values, values))
         slack = _elimination_slack(coo_array((entries, where), shape=(n, n)).tocsc())
         return 1.1 * slack < 0.01 * margin
@@ -105,7 +106,7 @@ def proved_sparse_margin(
 
 
 def _elimination_slack(matrix: Any) -> float:
-    """e such that  matrix >= -e I  is proved, infinite where it is not definite."""
+    """e such that  matrix >= -e I  is proved; infinite if the elimination fails."""
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
 

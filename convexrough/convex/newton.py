@@ -1,14 +1,14 @@
-"""Newton's method on a normal map, safeguarded by its energy: one loop for every law of contact.
+"""Newton's method on a normal map, with a line search on the energy, for every law of contact.
 
-Pressing, shear and vector friction are problems of one kind. Forces p(eta) are a monotone function
-of an unknown eta, what each asperity takes up itself, and with the coupling A the law is
+Pressing, shear and vector friction lead to the same equation. Forces p(eta) are a monotone function
+of the local displacements eta of the asperities, and with the compliance operator A the law is
 
-    F(eta) = eta + A p(eta) - X = 0,
+    F(eta) = eta + A p(eta) - X = 0.
 
-once differentiable: no active set is guessed. It is the condition of the least of an energy
-Phi(p), convex in the convex range. A step d solves F + F' d = 0, as well as it is asked to, and is
-halved until Phi falls enough (docs/theory/newton.md). What is different from law to law is in a
-`Law`; when to stop, how well to solve and how to search along a step is here.
+F is continuously differentiable, so no active set is guessed. F = 0 is the first-order condition of
+an energy Phi(p), convex in the convex range. A step d solves F + F' d = 0 to a given tolerance and
+is halved until Phi decreases enough (docs/theory/newton.md). A `Law` defines p, A and Phi; this
+module contains the stopping rule, the tolerance of each step and the line search.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from convexrough.arrays import Array
 from convexrough.errors import SolverError
 from convexrough.progress import log_step
 
-#: Most of the defect that a linear solver may leave in a step; less as steps succeed, by the square
-#: of what the last one left (Eisenstat and Walker, SIAM J. Sci. Comput. 17 (1996) 16, choice 2).
+#: Largest relative residual of the linear system of a step. It decreases with the square of the
+#: last reduction of the defect (Eisenstat and Walker, SIAM J. Sci. Comput. 17 (1996) 16, choice 2).
 MOST_LEFT = 0.1
 
-#: No need to solve for less than this part of the defect with which the method may stop. Heuristic.
+#: Least residual of the linear system, relative to the defect at which the method stops. Heuristic.
 OVERSOLVED = 0.3
 
-#: Armijo's constant: part of the fall that the slope promises which a step must bring.
+#: Armijo's constant: least decrease of the energy, relative to the slope times the step.
 PROMISED = 1e-4
 
-#: The shortest part of a step that is tried.
+#: The shortest step that is tried, as a fraction of the full step.
 SHORTEST = 1e-12
 
 
 class Iterate(Protocol):
     """A point of the iteration.
 
-    unknown  : eta;  forces : p(eta), as far as the constraints let them;  defect : F
-    energy   : Phi(p);  residual : the largest |F|;  scale : what residuals are relative to
+    unknown  : eta;  forces : p(eta), moved onto the constraints;  defect : F
+    energy   : Phi(p);  residual : the largest |F|;  scale : residuals are relative to it
     """
 
     @property
@@ -62,9 +62,9 @@ Point = TypeVar("Point", bound=Iterate)
 
 
 class Law(Protocol[Point]):
-    """What Newton's method asks of a law of contact.
+    """What Newton's method needs of a law of contact.
 
-    solver : whose error it is if it stops;  unit : what residuals are relative to, in a word
+    solver : the solver that errors name;  unit : the name of the scale of residuals
     """
 
     @property
@@ -77,23 +77,23 @@ class Law(Protocol[Point]):
         ...
 
     def direction(self, state: Point, left: float) -> Array:
-        """The step d. `left` : part of the defect that it may leave, in the 2-norm."""
+        """The step d, with |F + F' d| at most about left |F| in the 2-norm."""
         ...
 
     def gradient(self, state: Point) -> Array:
-        """dPhi/dp, but for multipliers of the constraints."""
+        """dPhi/dp, without the multipliers of the constraints."""
         ...
 
     def energy_rounding(self, state: Point) -> float:
-        """By how much rounding can make the energy seem to rise."""
+        """Bound on the rounding error of a change of the energy."""
         ...
 
     def noise(self, state: Point) -> float:
-        """2-norm of a defect that is small beside what rounding can make of A p."""
+        """2-norm of a defect that is small compared with the rounding errors of A p."""
         ...
 
     def advice(self, state: Point) -> str:
-        """What a user might try where the method stopped here."""
+        """What a user can try if the method fails at this state."""
         ...
 
 
@@ -101,11 +101,11 @@ class Law(Protocol[Point]):
 class Stopping:
     """When Newton's method ends.
 
-    accurate  : residual, over its scale, that every answer must reach unless it is asked for less
-    tolerance : residual, over its scale, at which it ends at once; 0 asks for all float64 can do
-    most      : steps, at most
-    linear    : 2-norm of a defect that is as good as none: it also ends where another step is
-        expected to leave no more, because what is left of the law is linear; 0 for not
+    accurate  : largest residual of an answer, over its scale, unless `tolerance` is larger
+    tolerance : residual, over its scale, at which the method ends at once; 0 for the least possible
+    most      : largest number of steps
+    linear    : 2-norm of a defect: the method also ends, without the next step, if that step is
+        expected to leave no more than this, because one linear correction will do; 0 for never
     """
 
     accurate: float
@@ -121,13 +121,13 @@ def solve(
     *,
     before: float = np.inf,
 ) -> tuple[Point, int]:
-    """The state that is as good as it gets, and how many steps it took.
+    """The final state, and the number of steps.
 
-    before : 2-norm of the defect that the start can be said to come from, for the first step
+    before : 2-norm of an estimated defect one step before the start, to choose the first tolerance
 
-    It ends where  residual <= tolerance * scale;  or, once  residual <= accurate * scale,  where
-    the defect is small beside rounding, which a certificate has to allow for anyway, or where a
-    step does not halve the residual (the better of the two states is the answer). Else SolverError.
+    The method ends if  residual <= tolerance * scale;  or, once  residual <= accurate * scale,  if
+    the defect is below `noise` or a step does not halve the residual (the better of the two states
+    is returned); or by `Stopping.linear`. Raises SolverError after `most` steps.
     """
     for step in range(1, stopping.most + 1):
         log_step(law.solver, step, state.energy, _relative(state))
@@ -162,7 +162,7 @@ def _relative(state: Iterate) -> float:
 
 
 def descend(law: Law[Point], state: Point, direction: Array) -> Point:
-    """The state along the step, halved until the energy falls: Armijo's rule along p(eta)."""
+    """The state after the step, halved until the energy decreases enough by Armijo's rule."""
     gradient, rounding = law.gradient(state).ravel(), law.energy_rounding(state)
     length = 1.0
     while length > SHORTEST:
@@ -181,5 +181,5 @@ def descend(law: Law[Point], state: Point, direction: Array) -> Point:
 
 
 def falls(change: Any, slope: Any, rounding: Any) -> Any:
-    """Whether energies change by as much as Armijo's rule asks, but for rounding."""
+    """True where the change of the energy satisfies Armijo's rule, up to rounding."""
     return change <= PROMISED * np.minimum(slope, 0.0) + rounding

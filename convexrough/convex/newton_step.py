@@ -6,11 +6,11 @@ W = diag(c)^(1/2) a step from the defect F is (docs/theory/newton.md, "The norma
     d = beta - F - A W y,     (I + W A W) y = W (beta - F),
 
 where beta is 0, or such that the loads keep their sum: sum W y = 0. The matrix is the Hessian of
-the energy, scaled by its local part: positive definite in the convex range, and 1 where c is 0, so
-asperities without load cost nothing and no load has to be kept away from zero. A W y is known
-when conjugate gradients end, and with it what happens to every asperity, touching or not.
+the energy, scaled by its local part. It is positive definite in the convex range, and its row is
+that of the identity where c is 0, so loads of 0 are allowed. Conjugate gradients also return A W y,
+and so the step d of every asperity, touching or not.
 
-Where the matrix is not positive definite the shells are added, which makes it so for any layout.
+If the matrix is not positive definite, the shells are added, which make it so for any layout.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import SolverError
 from convexrough.influence.coupling import Influence, Smoother
 
-#: Up to so many touching asperities, a Cholesky factor is cheapest: with a stored matrix, and
-#: without. Heuristics, from timings: a step is the same to what it is asked for.
+#: Number of touching asperities up to which a Cholesky factor is cheapest, with a stored matrix and
+#: without. Heuristics, from timings.
 FACTORISED, FACTORISED_UNSTORED = 1500, 100
 
-#: What conjugate gradients in single and double precision can still reduce the residual to.
+#: Least relative residual that conjugate gradients reach in single and in double precision.
 SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 
-#: The energy of the residual may fall below that by this part: it is mostly that of short waves, of
-#: which A W r has little.
+#: Conjugate gradients also end if (r'M r)^(1/2) falls by this factor times the limit. The factor is
+#: below 1 because r consists mostly of short waves, which contribute little to A W r.
 ENERGY = 1e-2
 
 MOST_ITERATIONS = 500
@@ -53,9 +53,9 @@ def correct(
 
     root      : (n,) W, 0 where open;  defect : (n,) F
     balanced  : keep the sum of the loads
-    tolerance : what conjugate gradients may leave of the residual; a factorisation leaves nothing
+    tolerance : largest 2-norm of F + F' d over that of F, unless the system is factorised
 
-    Raises SolverError where even the shells leave the matrix indefinite, that is by rounding.
+    Raises SolverError if rounding errors make the matrix indefinite even with the shells.
     """
     touching = root.nonzero()[0]
     if len(touching) == 0:
@@ -149,10 +149,10 @@ def _iterate(
 
 
 class _Smoothed:
-    """The smoother M; where balanced, on the plane sum W y = 0.
+    """The preconditioner M; if balanced, projected onto the plane sum W y = 0.
 
-    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376.) The residual is kept on the
-    plane, too, so that single precision does not lose it beside the shift, the sum of deviations.
+    (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376.) The residual is projected as
+    well, and `shift` sums its corrections, so that single precision does not lose small residuals.
     """
 
     def __init__(self, smooth: Smoother, w: Values, balanced: bool) -> None:
@@ -161,7 +161,7 @@ class _Smoothed:
         self.weight = 0.0 if self.border is None else float(w @ self.border)
 
     def __call__(self, residual: Values) -> tuple[Values, float, float]:
-        """M r, once r is put back on the plane; of r as it was, the 2-norm of A W r, and r' M r."""
+        """M r of the projected r, and for the given r the 2-norm of A W r, and r' M r."""
         z, left = self.smooth(residual)
         whole = float(residual @ z)
         if self.border is not None:

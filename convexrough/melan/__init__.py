@@ -1,1 +1,1 @@
-"""Shakedown: the factor of a load path up to which sliding of asperities ceases."""
+"""Shakedown: the largest factor of a load path at which asperities stop sliding."""

@@ -1,9 +1,10 @@
-"""`shakedown`: the factor of a load path up to which sliding of asperities ceases.
+"""`shakedown`: the largest factor of a load path at which asperities stop sliding.
 
-The points of the path are (P0, Q0) + factor (p, q). With t = q / f and the largest values r+ of
--(p + t) and r- of -(p - t), nothing slips in the steady cycle below the load
-L* = P0 - factor (r+ + r-) / 2. Asperity i slides in every cycle if L* is below its onset, the load
-at which it first touches: docs/theory/shakedown.md, "The exact limit".
+The points of the path are (P0, Q0) + factor (p, q), with mean load P0, mean shear force Q0 and
+amplitudes p, q. With the coefficient of friction f, t = q / f and the largest values r+ of -(p + t)
+and r- of -(p - t), the contact discs at the load L* = P0 - factor (r+ + r-) / 2 stay stuck in the
+steady cycle. Asperity i slides or opens in every cycle if L* is below its onset, the load at which
+it first touches: docs/theory/shakedown.md, "The exact limit".
 """
 
 from __future__ import annotations
@@ -43,17 +44,17 @@ Limit: TypeAlias = "Callable[..., Shakedown]"
 class Shakedown(Table, Plottable):
     """The largest factor of a load path that shakes down, with proved bounds.
 
-    kind    : "exact": asperities slip partially; any path. "elastic" and "vector": Melan's theorem
-        for asperities that stick until they slide, with the scalar and the full kernel; P0 constant
+    kind    : "exact": with partial slip, for any path. "elastic" and "vector": Melan's theorem for
+        asperities that stick until they slide, with the scalar or full kernel, at constant load P0
     factor  : the smallest of `factors`, or the solution of Melan's program
     lower, upper : proved bounds on it; 0 and infinite without a proof
     factors : (n,) the factor of each asperity that touches at the load P0; nan for others and for
-        those not computed; one number for all by "vector"
+        those not computed; for "vector" the same factor for all
     gross   : the factor at which the path reaches the friction limit of the whole contact
-    witness : (n,) or (n, 2) [force] shear forces of a state at rest in which no asperity slides on
-        the path times `lower`
-    mechanism : (n,) slips just beyond `upper`, the largest 1; (m, n, 2) at each point by "vector"
-    order   : "exact" needs "proved", as in `Cycle.order`, for its bounds; None for other kinds
+    witness : (n,) or (n, 2) [force] shear forces of a state from which no asperity slides along the
+        path scaled by `lower`
+    mechanism : (n,) slips just above `upper`, scaled to a largest of 1; (m, n, 2) for "vector"
+    order   : for "exact" as in `Cycle`, bounds need "proved"; None for other kinds
     load, force : [force] P0 and Q0;  Q0 (2,) for "vector"
     load_amplitudes, force_amplitudes : (m,) [force] p and q;  q (m, 2) for "vector"
 
@@ -94,7 +95,7 @@ class Shakedown(Table, Plottable):
         return self.lower > 0 and bool(self.upper < np.inf or self.factor == np.inf)
 
     def _variables(self) -> Variables:
-        """The variables; for "vector" with the dimensions of its vectors."""
+        """The variables; for "vector", vectors have a dimension "direction"."""
         found = super()._variables()
         if self.kind == "vector":
             for name, along in (
@@ -116,7 +117,7 @@ def shakedown(
     kind: Theory = "exact",
     influence: Kind | None = None,
 ) -> Shakedown:
-    """The largest factor of a closed path for which sliding of asperities ceases.
+    """The largest factor of a closed path at which asperities stop sliding.
 
     The points of the path are (loads, forces) + factor (load_amplitudes, force_amplitudes).
 
@@ -128,7 +129,7 @@ def shakedown(
 
     Raises InputError for invalid values, |Q0| >= f P0, or a path of equal points.
 
-    Example: in the paper's scene sliding ceases up to amplitudes of 0.3517 f P.
+    Example: in the paper's scene (f = 0.5, so Q is 0.1 f P) sliding ceases up to 0.3517 f P.
 
     >>> Q = 0.05 * contact.load
     >>> limit = cr.shakedown(scene, loads=contact.load, force_amplitudes=[Q, -Q])
@@ -263,7 +264,7 @@ def _vector(limit: Limit, contact: Contact, t0: Array, t: Array) -> Shakedown:
 
 
 def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
-    """(m, 2) forces in the plane, checked; if one is expected, a number is one along x."""
+    """(m, 2) forces in the plane, checked; a number, if one vector is expected, is along x."""
     given = checks.numbers(what, values)
     if given.ndim == 0 and dimensions == 1:
         given = np.array([float(given), 0.0])

@@ -48,7 +48,7 @@ CROWDED_MARGINS = tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 
 class Box(NamedTuple):
-    """A box of loads that holds the solution, and the convexity of the energy on it; or rows."""
+    """A box of loads that holds the solution, and its convexity; for one problem or a stack."""
 
     scope: Scope
     problem: NormalProblem | Stack  # with the shells that prove convexity
@@ -147,7 +147,7 @@ def _scaled(influence: Influence, stiffness: Array) -> Array:
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
-    """Asperities in pairs that no energy minimum can have, else in pairs whose shells meet."""
+    """Loaded asperities in pairs that no energy minimum has, else whose shells meet; else all."""
     which = np.flatnonzero(loads)
     if len(which) < 2:
         return which

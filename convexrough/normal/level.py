@@ -36,13 +36,13 @@ from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
-#: A residual that refinement leaves above this fraction of its first size is more than rounding.
+#: Largest residual of a response after refinement, relative to the first one.
 SOLVED = 1e-6
 
-#: Largest number of candidates for which levels are solved together: beyond, nothing is gained.
+#: Largest number of candidates for which levels are solved together: for more this saves no time.
 MOST = 512
 
-#: A solver: from a problem, and loads to start from, to the loads of its candidates, in own units.
+#: A solver: takes a problem and initial loads or None, and returns loads, in the problem's units.
 Press = Callable[[NormalProblem, Array | None], Array]
 
 
@@ -75,7 +75,7 @@ class Springs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The normal solution at one total load, as balls over the candidates, in own units.
+    """The normal solution at one total load, as balls over the candidates, in the problem's units.
 
     load     : () L;  approach : () D0(L)
     loads    : (n,) P_i(L);  indentation : (n,) n_i(L), minus the gap where open
@@ -243,7 +243,7 @@ class Level:
         short = float((total - Ball.exact(x).sum()).size)
 
         def excess(others: float) -> tuple[Array, float, float]:
-            """Bounds e on the residual if j makes up the total and others carry up to `others`."""
+            """Bounds e on the residual if j takes the missing total and others carry `others`."""
             missing = short + others
             missing_effect = (missing + others) * problem.largest_entry
             e = left.size + missing_effect
@@ -274,7 +274,7 @@ class Level:
 
 
 class Levels:
-    """The normal solutions of one scene at total loads up to that of `top`; each is cached.
+    """The normal solutions of one scene at total loads up to that of `top`; `at` caches them.
 
     top : the level with the highest load, that of a pressed contact
     together : Newton's method may solve several levels at once, as rows of a stack
@@ -308,7 +308,7 @@ class Levels:
         return self._solved(self.problem.at_load(load), load)
 
     def prepare(self, loads: Ball) -> list[Level | None]:
-        """The levels at positive loads (k,), solved together; None where `at` must solve alone."""
+        """The levels at positive loads (k,), solved together; None for those left to `at`."""
         found, problem = self.top.solution, self.problem
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or found is None or found.box.fixed_open.any():
@@ -320,11 +320,11 @@ class Levels:
         return levels
 
     def at_approach(self, approach: Ball) -> Level:
-        """The level at an approach, in own units, which is above that of first touch."""
+        """The level at an approach above first touch, in the problem's units. Not cached."""
         return self._solved(self.problem.at_approach(approach), None)
 
     def _solved(self, problem: NormalProblem, load: Ball | None) -> Level:
-        """The solution in the box of `top`, sought from nothing, then from the loads of `top`."""
+        """The solution in the box of `top`; if not proved, sought again from the loads of `top`."""
         state, found = self._sought(problem, None)
         top = self.top.solution
         if isinstance(found, Obstacle) and top is not None:
@@ -338,7 +338,7 @@ class Levels:
     def _sought(
         self, problem: NormalProblem, start: Array | None
     ) -> tuple[Trial, Proved | Obstacle]:
-        """A solution, and what is proved of it in the box of `top`, if there is one."""
+        """Refined loads, and the solution proved in the box of `top` (if `top` is proved)."""
         state = refined_loads(problem, self._press(problem, start))
         boxes = None if self.top.solution is None else iter((self.top.solution.box.closed,))
         return state, proved(problem, state, boxes)
@@ -392,7 +392,7 @@ def energies(levels: Sequence[Level]) -> Ball:
         local = data.coefficients * Ball.exact(trial).two_thirds()
         per_load = local * Fraction(3, 5) + product * 0.5 - data.offsets
         found = Ball.exact(trial).dot(per_load)
-        # The trial loads cost at most e'|P - P*| more than the least, at their own total.
+        # The energy of the trial loads exceeds the least at their total by at most e'|P - P*|.
         loads = Ball.stacked([level.loads for level in loaded])
         off = loads.error + np.abs(loads.mid.low)
         above = (excess(gap, trial.high > 0) * off).sum(axis=-1) * (1 + SAFETY)

@@ -1,4 +1,4 @@
-"""Bounds by a total load, before the problem is solved, on the approach and the contact radius."""
+"""A priori bounds on the approach and the contact radius under a total load."""
 
 from __future__ import annotations
 
@@ -30,10 +30,9 @@ STRAIGHT = 1e-11
 def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array) -> Array:
     """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load; or of rows, with loads (m, 1).
 
-    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it grows and is convex in tau:
-    Newton's method descends on the root once it is to the right of it, which it is after one step;
-    in few steps, as it is nearly straight. The shift is counted from the highest, so that loads of
-    any size come out to all digits.
+    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is increasing and convex in tau,
+    and nearly straight. From the second step on, Newton's method approaches the root from the
+    right. The shift is relative to the largest delta, to keep the precision of small loads.
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, softness = indentation - highest, 1.0 / coefficients
@@ -68,7 +67,7 @@ def approach_bound(
 
         D0 <= lambda L + (4/27) sum alpha_i^3 / (lambda - c_i)^2 - d'q.
 
-    A number, or (m, 1) of rows with loads (m, 1).
+    A number, or (m, 1) for loads (m, 1) of a stack.
 
     displacement : (n,) no less than A times weights;  offsets : (n,) no more than d
     """
@@ -101,7 +100,7 @@ def approach_bound(
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
     """An upper bound on the approach [length] at every solution of total `load` [force].
 
-    `approach_bound` with the loads that Hertz's smooth sphere suggests.
+    It is `approach_bound` with the trial loads `smooth_loads`.
     """
     modulus = scene.material.contact_modulus
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)

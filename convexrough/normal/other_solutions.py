@@ -24,7 +24,7 @@ class OtherSolutions(NamedTuple):
     """Properties of all solutions other than the one found."""
 
     possible: bool
-    crowding: float  # their crowding is above this; infinite if none is possible
+    crowding: float  # lower bound on their crowding; infinite if there are none
     cover: bool  # each of them has a disc over its nearest neighbour's summit
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Shells about asperities that may overlap: how definite the coupling of crowded contacts is.
+"""Bounds on the convexity of crowded contacts, by overlapping shells about the asperities.
 
 docs/theory/crowded.md, "Shells that overlap". For asperities of lengths t_i = scale / h_i and any
 radii s_i, with U the energy of two shells of charge 1, the matrix
@@ -48,7 +48,7 @@ class Overlaps(NamedTuple):
 
 
 def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[float]) -> float:
-    """The largest mu for which  H + A >= mu H  is proved, else 0; t (n,) [length] of H."""
+    """The largest mu for which  H + A >= mu H  is proved, else 0; lengths t = scale / h."""
     points = influence.points
     if len(points) > MOST_ELIMINATED:
         return 0.0

@@ -40,9 +40,8 @@ from convexrough.scene.base import Radius, along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: The part of the room between neighbours that fitted shells share out by size. A heuristic: any
-#: part gives shells that hold, some of them sharper bounds (docs/theory/certificate.md, "Which
-#: box", 3).
+#: Weight of the contact radii in the sizes of fitted shells; the rest is half the distances. A
+#: heuristic: any weight gives valid shells (docs/theory/certificate.md, "Which box", 3).
 FITTED = 0.9
 
 #: Number of candidates in a block, chosen to fit into a cache.
@@ -56,7 +55,7 @@ NEARBY = 1e-13
 INVERSE_PI = Fraction("0.318309886183790671537767526745028724068919291480912897495334688118")
 
 
-#: A correction by conjugate gradients reduces the residual by this; a factor leaves rounding.
+#: Factor by which one correction by conjugate gradients reduces the residual.
 REDUCTION = 1e-7
 
 
@@ -182,7 +181,7 @@ class NormalProblem:
         )
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """A P of other loads nearby: sharp where that is cheap, else from the change alone."""
+        """A P of other loads nearby: accurate where that is cheap, else from the change alone."""
         change = others - loads
         small = NEARBY * float(loads.high.max())
         if self.influence.stored and float(np.abs(change.high).max()) > small:

@@ -28,8 +28,8 @@ from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 from convexrough.roundoff import SAFETY
 
-#: Number of boxes of touching asperities that are tried, and the factor by which a box exceeds the
-#: last error bounds. Each is larger than the last, or has more asperities. Heuristics.
+#: Number of boxes of touching asperities that are tried, and the ratio of a box to the last error
+#: bounds. Each box is larger than the one before or has more asperities. Both values are heuristic.
 ATTEMPTS, ROOM = 6, 2.0
 
 #: Relative error above which loads are also bounded through their indentations.
@@ -52,7 +52,7 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Proved:
-    """A proved solution, as balls over the n candidates (asperities that may touch), in own units.
+    """A proved solution, as balls over the n candidates of `problem`, in its units.
 
     trial     : the loads P from which it was proved
     box       : a box of loads that holds exactly one solution
@@ -90,7 +90,7 @@ class Proved:
         return Ball.around(trial.mid, trial.radius + spread + float(self.trial.missing.size))
 
     def moves(self, coupling: Coupling) -> Array:
-        """(m,) bounds on |A (P - P*)| at the targets of a coupling."""
+        """(m,) bounds on the error of A P at the m points to which `coupling` maps loads."""
         missing = self.trial.missing.size * self.problem.largest_entry
         reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.stiffness)
         return np.asarray((self.distance * reach + missing) * (1 + SAFETY))
@@ -101,8 +101,8 @@ def proved(
 ) -> Proved | Obstacle:
     """The solution in the first box that is proved to hold it, or the obstacle to a proof.
 
-    boxes : the boxes; default `boxes.tried`, and if none of these is proved to hold the solution,
-        boxes in which only the touching candidates are not fixed open
+    boxes : default: those of `normal.boxes.tried`, and if none of these succeeds, boxes in which
+        all candidates without a load are fixed open
     """
     loads = state.loads.high
     for box in boxes or tried(problem, loads, state.product.value):
@@ -185,7 +185,7 @@ class Known(NamedTuple):
 
 
 class _Missing(NamedTuple):
-    """The part of the total load that the trial loads P lack: (1 + t) P have this total.
+    """The part of the total load that the trial loads P lack: (1 + t) P have the prescribed total.
 
     The factor 1 + t adds (2/3) t k P^(2/3) + t A P to D0 + d in the contact law. The
     approach takes up a constant part, and the rest enters the residuals.
@@ -216,7 +216,7 @@ class _Missing(NamedTuple):
 
 
 def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
-    """The loads; poorly known loads are replaced by (n / k)^(3/2), n the indentation, if better."""
+    """The loads; where it is smaller, the ball (indentation / k)^(3/2) replaces an inexact load."""
     which = np.nonzero(loads.radius > POOR * loads.mid.high)
     if len(which[0]) == 0:
         return loads

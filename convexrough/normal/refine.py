@@ -1,10 +1,10 @@
-"""The contact law on balls, and Newton's corrections that bring any loads to thirty digits.
+"""The contact law on balls, and Newton's corrections of given loads to thirty digits.
 
-All of it is for a problem, with arrays (n,), or for m problems in rows, with arrays (m, n): what is
-one number of a problem is then (m, 1).
+Functions take a problem, with arrays (n,), or m problems in rows, with arrays (m, n); quantities
+with one number per problem are then (m, 1).
 
-With loads P known as pairs, the residual  k P^(2/3) + A P - d - D0  is a ball: its radius counts
-all that the data, the product and the arithmetic lose. A correction is one Newton step on the
+With loads P known as pairs, the residual  k P^(2/3) + A P - d - D0  is a ball, whose radius bounds
+the errors of the data, the product and the arithmetic. A correction is one Newton step on the
 normal map (docs/theory/newton.md) in float64 from a residual in pairs.
 """
 
@@ -30,13 +30,13 @@ from convexrough.sphere import hertz
 #: Largest number of corrections: each squares the error, or reduces it by conjugate gradients.
 CORRECTIONS = 12
 
-#: Fraction of the residual's rounding that corrections may leave: less would not sharpen the proof.
+#: Fraction of the residual's rounding error to which corrections reduce the residual.
 ENOUGH = 0.1
 
 #: Number of candidates up to which refinement with a matrix costs no more than the solution.
 FEW = 700
 
-#: Loads whose sum is wrong by less than this are not scaled: only the largest changes. Heuristic.
+#: Relative error of the total below which only the largest load is adjusted. Heuristic.
 FITS = 1e-6
 
 
@@ -46,13 +46,13 @@ Problem: TypeAlias = NormalProblem | Stack
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Loads of the candidates, and how well they fit the contact law. In own units.
+    """Loads of the candidates, and their residuals in the contact law, in the problem's units.
 
     loads   : (n,) P;  product : (n,) A P
     local   : (n,) k P^(2/3), to float64
     gap     : (n,) k P^(2/3) + A P - d - D0
     approach : D0, prescribed, or under a prescribed load the one that fits best
-    missing : what the loads miss the prescribed total by; 0 where none is prescribed
+    missing : prescribed total minus the sum of the loads; 0 where none is prescribed
     """
 
     problem: Problem
@@ -70,7 +70,7 @@ class Trial:
 
     @cached_property
     def excess(self) -> Array:
-        """(n,) how far the contact law is from holding."""
+        """(n,) violations of the contact law."""
         return excess(self.gap, self.inside)
 
     def frozen(self) -> Trial:
@@ -156,7 +156,7 @@ def refined_loads(problem: Problem, loads: Array) -> Trial:
 def corrected(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bool_]) -> Trial:
     """One Newton step on the normal map, in the rows that are still to do.
 
-    enough : a reduction of the residual by this factor is enough: a number, or (m,) of rows
+    enough : factor by which the residual must be reduced: a number, or (m,) for rows
     """
     loads, missing = completed(problem, _after_step(problem, state, enough, todo))
     return trial(problem, loads, missing, problem.moved(state.loads, state.product, loads))
@@ -171,7 +171,7 @@ def _after_step(problem: Problem, state: Trial, enough: Any, todo: NDArray[np.bo
     defect = np.where(inside, gap, np.minimum(gap, 0.0))
     size = largest(np.abs(defect))
     step = size * problem.correct(slopes, defect / np.where(size > 0, size, 1.0), enough, todo)
-    # P ((1 + step / n)^(3/2) - 1) of those that touch, and all of those that begin to
+    # P ((1 + step / n)^(3/2) - 1) where P > 0, and the whole load of new contacts
     ratio = np.divide(step, local, out=np.zeros(gap.shape), where=inside)
     change[inside] = loads.high[inside] * np.expm1(1.5 * np.log1p(np.maximum(ratio[inside], -0.5)))
     left = inside & (ratio <= -0.5)

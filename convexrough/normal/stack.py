@@ -1,4 +1,4 @@
-"""Many normal problems with equally many candidates, one in each row.
+"""Many normal problems with equal numbers of candidates, one in each row.
 
 The functions of `refine` and `proved` take such a stack in place of a single problem.
 """
@@ -24,7 +24,7 @@ from convexrough.roundoff import SAFETY
 class Stack:
     """Problems in m rows, in their own units: arrays (m, n), or (n,) where all rows share them.
 
-    coupled : slices of the rows, each with a problem that has the coupling of these rows
+    coupled : slices of the rows, each with a problem whose compliance operator these rows share
     exact  : k, which may be (1,) or (m, 1), and d;  shells : as in `NormalProblem`
     exact_load, exact_approach : (m, 1) the prescribed quantity; the other one is None
     """
@@ -110,7 +110,7 @@ class Stack:
         return joined([problem.product(loads.at(rows)) for rows, problem in self.coupled])
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
-        """(m, n) A P of other loads, computed anew to as many digits."""
+        """(m, n) A P of other loads, to about thirty digits."""
         return self.product(others)
 
     def convexity_at(self, stiffness: Array) -> Array:
@@ -125,7 +125,7 @@ class Stack:
         """(m, n) the step of `convex.newton_step.correct`; nan in rows with an indefinite matrix.
 
         slopes : (m, n) c = dP/dn;  todo : (m,) rows that need a step; the others get 0
-        enough : not used, because a factor leaves nothing but rounding
+        enough : not used, because a factorisation leaves only rounding errors
         """
         from scipy.linalg.lapack import dposv  # takes 0.2 s to import
 

@@ -1,7 +1,7 @@
 """Many normal problems, one in each row of an array, solved and proved in one computation.
 
 Newton's method, the refinement in pairs of float64 numbers and the theorem treat all rows at once.
-A row that the cheapest proof does not settle is solved on its own by the caller.
+The caller solves rows one by one that the cheapest proof does not cover.
 """
 
 from __future__ import annotations
@@ -175,10 +175,11 @@ def solved(
 
 @quietly
 def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Array:
-    """(m, n) indentations to start from: those under the displacement of Hertz's pressure.
+    """(m, n) initial indentations, from loads distributed as Hertz's pressure.
 
     prescribed : (m, n) or (n,) d at a prescribed load, D at a prescribed approach
-    squares : r^2 likewise;  reach : (m, 1) squared contact radius of the smooth body, or infinite
+    squares : (m, n) or (n,) squared distances from the axis;  reach : (m, 1) squared contact radius
+        of the smooth body, or infinite
     """
     s = np.sqrt(np.maximum(1.0 - squares / (WIDER * reach), 0.0)) + 0.0 * prescribed
     alone = s.sum(axis=1) == 0

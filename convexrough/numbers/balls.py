@@ -1,4 +1,4 @@
-"""Balls: numbers known to within a radius. A formula evaluated on balls proves its own error.
+"""Balls: numbers known to within a radius. A formula on balls gives its value and an error bound.
 
 The midpoint of a ball is a pair of float64 numbers, its radius a float64 number. Every operation
 returns a ball that contains the result for every choice of numbers in the operands.
@@ -20,16 +20,16 @@ from convexrough import threads
 from convexrough.arrays import Array
 from convexrough.numbers.pairs import CHUNK, PAIR_ROUNDOFF, Pair
 
-#: A factor above the rounding of a short chain of float64 operations on radii.
+#: Factor that covers the rounding errors of a few float64 operations on radii.
 UP = 1.0 + 2.0**-40
 
 #: Upper bound on the underflow error of one operation on pairs.
 TINY = 2.0**-1000
 
-#: Numbers that stand for themselves: they become balls of radius 0.
+#: Numbers known exactly. They become balls of radius 0, but a Fraction is rounded.
 Exact: TypeAlias = "float | int | Fraction | Array | Pair"
 
-#: Of each number on its own, from midpoints and radii to a midpoint and a radius.
+#: Elementwise function of midpoints and radii that returns a midpoint and a radius.
 Elementwise: TypeAlias = "Callable[..., tuple[Pair, Array]]"
 
 quietly = np.errstate(all="ignore")
@@ -37,7 +37,7 @@ quietly = np.errstate(all="ignore")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ball:
-    """All numbers within a radius of a midpoint. Arrays of any one shape.
+    """All numbers within a radius of a midpoint: arrays `mid` and `radius` of the same shape.
 
     >>> third = Ball.exact(1.0) / 3.0
     >>> float(third.mid.high), bool(third.radius < 1e-28)
@@ -52,7 +52,7 @@ class Ball:
 
     @classmethod
     def exact(cls, value: Exact) -> Ball:
-        """Numbers that are known exactly; a Fraction to the rounding of the nearest pair."""
+        """Balls of numbers known exactly; a Fraction has the rounding error as its radius."""
         if isinstance(value, Fraction):
             pair = Pair.nearest(value)
             return cls.around(pair, PAIR_ROUNDOFF * abs(pair.high) + TINY)
@@ -63,7 +63,7 @@ class Ball:
     @classmethod
     @quietly
     def around(cls, value: Exact, radius: Any) -> Ball:
-        """Numbers known to within a radius."""
+        """Balls of numbers known to within this radius."""
         ball = cls.exact(value)
         return cls(*_finished(ball.mid, (ball.radius + radius) * UP + 0.0 * ball.mid.high))
 
@@ -76,7 +76,7 @@ class Ball:
 
     @classmethod
     def stacked(cls, balls: list[Ball]) -> Ball:
-        """Balls of one shape, along a new first axis."""
+        """Balls of the same shape, stacked along a new first axis."""
         return cls(
             Pair(np.stack([b.mid.high for b in balls]), np.stack([b.mid.low for b in balls])),
             np.stack([b.radius for b in balls]),
@@ -124,7 +124,7 @@ class Ball:
 
     @property
     def _margin(self) -> Array:
-        """Above the rounding of an end of the ball."""
+        """Bounds on the rounding errors of `lower` and `upper`."""
         return np.asarray(2.0**-51 * (np.abs(self.mid.high) + self.radius) + TINY)
 
     @property
@@ -173,21 +173,21 @@ class Ball:
         return Ball(Pair(self.mid.high * unit, self.mid.low * unit), self.radius * unit)
 
     def positive_part(self) -> Ball:
-        """max(x, 0): |max(x, 0) - max(m, 0)| <= r."""
+        """max(x, 0), with errors of at most r for |x - m| <= r."""
         above = self.mid.high > 0
         high, low = (np.where(above, part, 0.0) for part in self.mid)
         return Ball(Pair(high, low), np.where(self.upper <= 0, 0.0, self.radius))
 
     def sqrt(self) -> Ball:
-        """Square roots of the positive parts: |x^(1/2) - m^(1/2)| <= r / m^(1/2), r^(1/2)."""
+        """Square roots of the positive parts, with errors of at most min(r / m^(1/2), r^(1/2))."""
         return elementwise(_root(Pair.sqrt, np.sqrt), self)
 
     def cbrt(self) -> Ball:
-        """Cube roots of the positive parts: |x^(1/3) - m^(1/3)| <= r / m^(2/3), r^(1/3)."""
+        """Cube roots of the positive parts, with errors of at most min(r / m^(2/3), r^(1/3))."""
         return elementwise(_root(Pair.cbrt, np.cbrt), self)
 
     def two_thirds(self) -> Ball:
-        """x^(2/3) of the positive parts: |x^(2/3) - m^(2/3)| <= r / m^(1/3), r^(2/3)."""
+        """x^(2/3) of the positive parts, with errors of at most min(r / m^(1/3), r^(2/3))."""
         return elementwise(_root(Pair.two_thirds, lambda x: np.cbrt(x) ** 2), self)
 
     @quietly
@@ -204,13 +204,13 @@ class Ball:
 
 
 def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
-    """Of two balls, one for each place."""
+    """Elements of `yes` where the condition is True, else of `no`, as in numpy.where."""
     high, low = (np.where(condition, a, b) for a, b in zip(yes.mid, no.mid, strict=True))
     return Ball(Pair(high, low), np.where(condition, yes.radius, no.radius))
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
-    """function(array, ...) of each array that such values are made of."""
+    """`function` applied to the arrays of values of one type: arrays, pairs or balls."""
     first = values[0]
     if isinstance(first, np.ndarray):
         return function(*values)
@@ -221,7 +221,7 @@ def of_rows(function: Callable[..., Any], *values: Any) -> Any:
 
 
 def joined(balls: Sequence[Ball]) -> Ball:
-    """The rows of all of them."""
+    """The balls concatenated along the first axis."""
     joint: Ball = of_rows(lambda *each: np.concatenate(each), *balls)
     return joint
 
@@ -233,9 +233,9 @@ def as_ball(value: Ball | Exact) -> Ball:
 
 @quietly
 def elementwise(operation: Elementwise, *balls: Ball) -> Ball:
-    """operation(mid, radius, mid, radius, ...) of each number; on all cores where there are many.
+    """operation(mid, radius, mid, radius, ...) of each number; large arrays in parallel.
 
-    All have one shape, or one number stands for all, or the result is computed at once.
+    Operands of unequal size, except single numbers, are broadcast in one call, not in parallel.
     """
     sizes = [ball.radius.size for ball in balls]
     count = max(sizes)
@@ -261,7 +261,7 @@ def _flat(ball: Ball) -> Ball:
 
 
 def _finished(mid: Pair, radius: Array) -> tuple[Pair, Array]:
-    """With an infinite radius where a number is none; the radius counts the midpoint's rounding."""
+    """The result, with midpoint 0 and infinite radius where the midpoint is not finite."""
     high, low, radius = np.asarray(mid.high), np.asarray(mid.low), np.asarray(radius)
     if math.isfinite(np.add.reduce(radius, axis=None)):
         return Pair(high, low), radius
@@ -276,7 +276,7 @@ def _sum(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
 
 
 def _product(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
-    """|x y - X Y| <= (|X| + dx) dy + dx |Y|; what is exactly 0 makes 0, whatever the other is."""
+    """|x y - X Y| <= (|X| + dx) dy + dx |Y|; an exact 0 times any ball has radius TINY or so."""
     product = x * y
     radius = np.fmax((np.abs(x.high) + dx) * dy, 0.0) + np.fmax(dx * np.abs(y.high), 0.0)
     return product, (radius * UP + _lost(product)) * UP
@@ -291,7 +291,7 @@ def _quotient(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
 
 
 def _root(power: Callable[[Pair], Pair], plain: Callable[[Array], Array]) -> Elementwise:
-    """A concave power f of positive parts: |f(x) - f(m)| <= r f(m) / m, f(r)."""
+    """A concave power f of positive parts: |f(x) - f(m)| <= min(r f(m) / m, f(r))."""
 
     def root(x: Pair, dx: Array) -> tuple[Pair, Array]:
         safe, above = positive(x)
@@ -307,7 +307,7 @@ def _root(power: Callable[[Pair], Pair], plain: Callable[[Array], Array]) -> Ele
 
 
 def positive(x: Pair) -> tuple[Pair, NDArray[np.bool_]]:
-    """The numbers themselves, with 1 for those that are not positive; and where they are."""
+    """The numbers with 1 in place of those <= 0, and a mask of the positive ones."""
     above = x.high > 0
     if above.all():
         return x, above
@@ -315,7 +315,7 @@ def positive(x: Pair) -> tuple[Pair, NDArray[np.bool_]]:
 
 
 def power_error(x: Pair, dx: Array, steep: Array, power: Callable[[Array], Array]) -> Array:
-    """Bounds on |f(x) - f(m)| of a concave power of positive parts: `steep` is dx f(m) / m."""
+    """Error bounds of a concave power f at midpoints x with radii dx; `steep` is dx f(x) / x."""
     wide = dx > x.high
     if not wide.any():
         return steep
@@ -324,5 +324,5 @@ def power_error(x: Pair, dx: Array, steep: Array, power: Callable[[Array], Array
 
 
 def _lost(result: Pair) -> Array:
-    """Above what one operation on pairs loses."""
+    """Bounds on the rounding error of one operation on pairs."""
     return np.asarray(PAIR_ROUNDOFF * np.abs(result.high) + TINY)

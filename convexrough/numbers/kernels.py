@@ -1,4 +1,4 @@
-"""The formula that is evaluated most, with one running bound instead of a ball per operation."""
+"""The residual of the contact law on balls, with one error bound instead of one per operation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def residual(k: Ball, loads: Ball, displacement: Ball, depth: Ball) -> Ball:
 def _residual(
     k: Pair, dk: Array, P: Pair, dP: Array, v: Pair, dv: Array, D: Pair, dD: Array
 ) -> tuple[Pair, Array]:
-    """The sum of low parts loses some 20 squared roundoffs of the sizes, all else fewer than 64."""
+    """Rounding errors: about 20 squared roundoffs of `sizes` by low parts, below 64 by all else."""
     safe, loaded = positive(P)
     power = safe.two_thirds()
     slope = power.high / safe.high

@@ -1,8 +1,8 @@
 """Double-double numbers: unevaluated sums of two float64 numbers, some 31 decimal digits.
 
-Sums and products of float64 numbers without error are Knuth's and Dekker's (Numer. Math. 18 (1971)
-224). No fused operations are assumed, and nothing longer than float64. Errors are relative, away
-from underflow and overflow (Joldes, Muller and Popescu, ACM Trans. Math. Softw. 44 (2017) 15).
+The error-free sums and products of float64 numbers are those of Knuth and Dekker (Numer. Math. 18
+(1971) 224); they need neither fused operations nor longer numbers. Error bounds are relative and
+hold away from underflow and overflow (Joldes, Muller and Popescu, ACM TOMS 44 (2017) 15).
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ import numpy as np
 from convexrough import threads
 from convexrough.arrays import Array, Number, frozen
 
-#: Bound on the relative error of one operation on pairs: a sum loses 3 squared roundoffs, a product
-#: 5, a quotient, a root or a cube root, each one Newton step from float64, fewer than 64.
+#: Bound on the relative error of one operation on pairs. In squared roundoffs, it is 3 for a sum, 5
+#: for a product, and below 64 for quotients and roots, which are one Newton step from float64.
 PAIR_ROUNDOFF = 2.0**-98
 
-#: Numbers added up together, at most.
+#: Largest number of terms that are summed at once.
 MANY = 2**18
 
-#: Numbers worked on together: what a cache holds.
+#: Number of elements that are processed at once; they fit in a cache.
 CHUNK = 2**14
 
-#: The sign, the exponent and the first 26 bits of a float64 number.
+#: Mask of the sign, the exponent and the first 26 significant bits of a float64 number.
 _FIRST_BITS = np.int64(-(1 << 27))
 
 
 class Pair(NamedTuple):
-    """high + low, where |low| is at most a roundoff of high. Arrays of any one shape, or floats."""
+    """high + low, where |low| is at most a roundoff of high: arrays of one shape, or floats."""
 
     high: Number
     low: Number
 
     @classmethod
     def exact(cls, values: Number) -> Pair:
-        """Float64 numbers as they are."""
+        """Pairs of float64 numbers, with low parts 0."""
         high = np.asarray(values, dtype=np.float64)
         return cls(high, np.zeros_like(high))
 
@@ -49,7 +49,7 @@ class Pair(NamedTuple):
         return cls(high, float(value - Fraction(high)))
 
     def at(self, index: Any) -> Pair:
-        """Some of the numbers."""
+        """The numbers at this index."""
         return Pair(self.high[index], self.low[index])
 
     def __add__(self, other: object) -> Pair:
@@ -85,10 +85,10 @@ class Pair(NamedTuple):
         return Pair(*_settled(first, left / (2.0 * first)))
 
     def inverse_root(self) -> Pair:
-        """1 / sqrt(x) to 2^-98 of it, and 0 of 0.
+        """1 / sqrt(x) with a relative error below 2^-98; 0 where x is 0.
 
-        From 1 / sqrt(x) in float64, y, and e = 1 - x y^2, which is known to 2^-104: y (1 + e / 2),
-        as |e| < 2^-51 and what is left out is 3 e^2 / 8.
+        With y = 1 / sqrt(x) in float64, and e = 1 - x y^2 computed to within 2^-104, the result is
+        y (1 + e / 2). Its truncation error is about 3 e^2 / 8, and |e| < 2^-51.
         """
         with np.errstate(divide="ignore"):
             first = 1.0 / np.sqrt(self.high)
@@ -104,21 +104,21 @@ class Pair(NamedTuple):
         return Pair(*_settled(root, left / (3.0 * square)))
 
     def two_thirds(self) -> Pair:
-        """x^(2/3) of positive numbers: c^2 + 2 c d, as d^2 is nothing."""
+        """x^(2/3) of positive numbers: c^2 + 2 c d for the cube root c + d (d^2 is negligible)."""
         root, square, rest, left = self._cube_root()
         return Pair(*_settled(square, rest + left / (1.5 * root)))
 
     def _cube_root(self) -> tuple[Number, Number, Number, Number]:
-        """c near x^(1/3), c^2 as a pair, and x - c^3."""
+        """c near x^(1/3), the high and low parts of c^2, and x - c^3."""
         root = np.cbrt(self.high)
         square, rest = two_square(root)
         near, less = two_product(square, root)
         return root, square, rest, ((self.high - near) - less) + (self.low - rest * root)
 
     def total(self) -> Pair:
-        """The sum along the last axis, to 2^-97 of the sum of magnitudes.
+        """The sum along the last axis, with an error of at most 2^-97 of the sum of magnitudes.
 
-        Slices of so few bits that they add up exactly, in any order; an ordinary sum of the rest.
+        The numbers are cut into parts of so few bits that float64 sums of them are exact.
         """
         high, low = np.asarray(self.high), np.asarray(self.low)
         n = high.shape[-1]
@@ -140,7 +140,7 @@ class Pair(NamedTuple):
 
 
 def in_parts(length: int, part: Callable[[slice], Pair]) -> Pair:
-    """(length,) numbers, of which `part` computes a slice, on all cores; read-only."""
+    """(length,) numbers, read-only; `part` computes each slice of them, on all cores."""
     found = Pair(np.empty(length), np.empty(length))
 
     def compute(some: slice) -> None:
@@ -158,7 +158,7 @@ def two_sum(a: Number, b: Number) -> tuple[Number, Number]:
 
 
 def two_product(a: Number, b: Number) -> tuple[Number, Number]:
-    """The rounded product and its error, the latter to a roundoff of itself."""
+    """The rounded product, and its error with a relative error of one roundoff."""
     total = a * b
     (a1, a2), (b1, b2) = _halves(a), _halves(b)
     return total, ((a1 * b1 - total) + a1 * b2 + a2 * b1) + a2 * b2
@@ -172,13 +172,13 @@ def two_square(a: Number) -> tuple[Number, Number]:
 
 
 def rounded(values: Array, unit: Array) -> Array:
-    """The nearest multiples of a power of two, of numbers below 2^51 of it."""
+    """The multiples of `unit`, a power of two, nearest to values below 2^51 `unit`."""
     shift = 1.5 * 2.0**52 * unit
     return np.asarray((values + shift) - shift)
 
 
 def square_sum(x: Array, *others: Array) -> Pair:
-    """x^2 + y^2 of two coordinates, x^2 of one."""
+    """x^2 + y^2 for two coordinates, x^2 for one."""
     total = Pair(*two_square(x))
     for y in others:
         total = total + Pair(*two_square(y))
@@ -191,7 +191,7 @@ def _settled(high: Number, low: Number) -> tuple[Number, Number]:
 
 
 def _halves(a: Number) -> tuple[Number, Number]:
-    """The first 26 bits, and the other 27."""
+    """Two parts with the first 26 and the other 27 significant bits."""
     bits = np.asarray(a, dtype=np.float64)
     first = (bits.view(np.int64) & _FIRST_BITS).view(np.float64)
     return first, bits - first

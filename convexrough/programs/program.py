@@ -44,14 +44,14 @@ class Program(Record):
     form        : "cones", "dual" or "bristles"
     what        : description of the form
     data        : the arrays of the program, a ConeProgram or a QuadraticProgram
-    asperities  : (m,) indices of the asperities in the program; all others carry no load
+    asperities  : (m,) indices of the asperities in the program; the others carry no load, or less
+        than 1e-12 of the largest bound
     count       : number of asperities of the scene
     force_unit  : [force] unit of the loads in the program
     energy_unit : [force length] unit of the objective
-    objective   : minimum of the objective in energy_unit; of the dual, minus its maximum; of
-        bristles as OSQP finds it, nan where it does not
-    constant    : constant to add to the objective for the energy, in energy_unit; 0 if the approach
-        is prescribed
+    objective   : minimum of the objective, in energy_unit; for bristles as OSQP finds it, or nan
+    constant    : the energy is constant + objective, or constant - objective for the dual, in
+        energy_unit; 0 for bristles and if the approach is prescribed
     off         : estimated error of the loads of an exact solution, relative to the largest load
 
     >>> program = cr.program(scene, "bristles", approach=5e-5, bristles=16)
@@ -86,7 +86,7 @@ class Program(Record):
         return loads
 
     def energy(self, objective: float) -> float:
-        """[force length] energy for an objective value; for the dual a lower bound on it."""
+        """[force length] the energy that corresponds to a value of the objective."""
         sign = -1.0 if self.form == "dual" else 1.0
         return self.energy_unit * (sign * objective + self.constant)
 
@@ -96,7 +96,7 @@ class Program(Record):
         cones, dual : .cbf, .json (Clarabel) or .npz (sparse matrices)
         bristles    : .mps or .npz (qpsolvers, dense)
 
-        Raises InputError for other endings, and FileError.
+        Raises InputError for other endings, and FileError if the file cannot be written.
         """
         path, valid = Path(path), WRITERS[self.form]
         if (ending := path.suffix.removeprefix(".")) not in valid:
@@ -151,7 +151,7 @@ def program(
 
 
 def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Program:
-    """The program of a problem, given the loads (n,) of its solution in own units."""
+    """The program of a problem, given the loads (n,) of its solution in the problem's units."""
     if form not in FORMS:
         expected = f"a form of program; {checks.nearest(str(form), FORMS)}"
         raise InputError("form", found=repr(form), expected=expected)

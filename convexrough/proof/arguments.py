@@ -89,7 +89,7 @@ class TrialState:
 
     @cached_property
     def best_approach(self) -> float:
-        """[length] the prescribed approach, or that which fits the touching asperities best."""
+        """[length] the prescribed approach, or the one that fits the touching asperities best."""
         if self.approach is not None:
             return self.approach
         wanted = self.local + self.pushed - self.scene.offsets

@@ -1,4 +1,4 @@
-"""What all solvers of the cone program share: the choice of boxes, and the check of the answer.
+"""The choice of boxes and the check of the answer, for all solvers of the cone program.
 
 The lifted program (docs/theory/exact-cones.md) is exact in boxes 0 <= P_i <= B_i whose convexity
 numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most 21/25 (four cones) or 1 (five). A box that
@@ -24,9 +24,9 @@ from convexrough.solvers.programs import ProgramAnswer
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: Asperities whose a priori bound is below this part of the largest are left out of the program;
-#: only a Newton step can give them a load. A heuristic, well below the accuracy of a solver. If it
-#: were too large, the check of the contact law, which includes all asperities, would fail.
+#: Asperities whose a priori bound, relative to the largest, is at most this are left out of the
+#: program; only a Newton step can give them a load. A heuristic: if it were too large, the check of
+#: the contact law, which includes all asperities, would fail.
 NEGLIGIBLE = 1e-12
 
 #: Ratio of the contact radius of a box to that of the a priori bound, where the convex range

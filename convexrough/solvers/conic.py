@@ -4,9 +4,10 @@
     subject to  p = B y3,  four or five cones per asperity,  and sum p = load if prescribed.
 
 The unknowns are the loads p and, for each asperity, the lifted variables y1 to y5 and z. The loads
-lie in boxes 0 <= p <= B with convexity numbers S_i. D is the prescribed approach of each asperity,
-e = k B^(5/3) with the local coefficients k, and M = A + diag(shells), positive semidefinite, with
-the compliance operator A. The only solution is the contact state (docs/theory/exact-cones.md).
+lie in boxes 0 <= p <= B with convexity numbers S_i. D = D0 + d is the approach plus the offsets
+(under a prescribed load D0 is an upper bound on the approach), e = k B^(5/3) with the local
+coefficients k, and M = A + diag(shells) is positive semidefinite, with the compliance operator A.
+The loads of every solution satisfy the contact law (docs/theory/exact-cones.md).
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from convexrough.solvers.programs import (
 #: Number of asperities from which Clarabel's supernodal factorisation is faster.
 SUPERNODAL = 300
 
-#: Statuses of Clarabel with which its point is checked. At tight tolerances it often stops a little
-#: before it reaches them, at a correct point: the contact law decides, not the status.
+#: Statuses of Clarabel after which its solution is checked against the contact law. With tight
+#: tolerances Clarabel often reports AlmostSolved at a correct solution.
 STOPPED = ("Solved", "AlmostSolved")
 
 
@@ -73,7 +74,7 @@ class Conic(ConeSolver):
 
 @dataclass(frozen=True, eq=False)
 class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
-    """The contact law in boxes (docs/theory/exact-cones.md, "The lifted program").
+    """The cone program on boxes 0 <= p <= B (docs/theory/exact-cones.md, "The lifted program").
 
     The variables are the loads p, then y2 to y5 and z (with five cones y1 to y5 and z), each in a
     block of n.
@@ -122,7 +123,7 @@ class LiftedProgram(Reduction[ConeProgram, RawAnswer, ProgramAnswer]):
         return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
 
     def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """The loads and the approach: `approach_bound` less the multiplier of the total load."""
+        """The loads and the approach; under a prescribed load, from the multiplier of the total."""
         approach = self.problem.approach
         if approach is None:
             approach = self.problem.approach_bound - float(raw.multipliers[0])

@@ -89,7 +89,7 @@ class ConicCVXPY(ConeSolver):
         return LiftedModel.assemble(self, problem, ConeBoxes.choose(problem, five=five))
 
     def run(self, program: Any) -> Any:
-        """A cvxpy.Problem, solved."""
+        """Solve a cvxpy.Problem and return it."""
         cp = load_library("cvxpy", self.name)
         options: dict[str, float] = {}
         if names := OPTIONS.get(self.solver):
@@ -110,9 +110,9 @@ class ConicCVXPY(ConeSolver):
 
 
 def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
-    """The reason why CVXPY cannot use this solver, and an advice; None if it can.
+    """The reason why CVXPY cannot use this solver, and what to do; None if it can.
 
-    The advice names a package only if the solver's name is correct.
+    A package is named only if the solver's name is correct.
     """
     from cvxpy.reductions.solvers import defines  # which solver knows which cones
 
@@ -136,14 +136,14 @@ def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
-    """A compiled cone program as CVXPY objects, in the problem's own units.
+    """A compiled cone program as CVXPY objects, in the scaled units of `normal`.
 
     settings : the solver;  normal : the contact problem;  boxes : bounds on its loads
     program  : the cvxpy.Problem
     D0       : cvxpy.Parameter: the approach, or its upper bound if the load is prescribed
     p        : cvxpy.Variable: the loads of `boxes.members`
     link     : the constraint p == B y3, whose multiplier is minus the gap where p = 0
-    total    : the constraint sum p == load, or None; its multiplier is D0 less the approach
+    total    : the constraint sum p == load, or None; its multiplier is D0 minus the approach
     """
 
     settings: ConicCVXPY
@@ -163,7 +163,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
 
     @classmethod
     def assemble(cls, settings: ConicCVXPY, normal: NormalProblem, boxes: ConeBoxes) -> LiftedModel:
-        """Program (1) of docs/theory/exact-cones.md, with five cones (1) and (2)."""
+        """Program (1) of docs/theory/exact-cones.md; for five cones, (2) replaces its first."""
         cp = load_library("cvxpy", settings.name)
         i, n = boxes.members, len(boxes.members)
         checks.fits_in_memory("asperities of the cone program in CVXPY", n, 400, power=2)
@@ -197,7 +197,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
     def solve(self, approach: float | None = None) -> Solution:
         """The solution of the program, compiled only once.
 
-        approach : a new approach in own units, at most `normal.approach_bound`; default unchanged
+        approach : a new approach in units of `normal`, at most its `approach_bound`; or unchanged
         """
         normal = self.normal
         if approach is not None:
@@ -219,7 +219,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
 
     @property
     def loads(self) -> Array:
-        """(m,) loads of the last solution in own units, not checked."""
+        """(m,) loads of the last solution in units of `normal`, not checked."""
         return np.array(self.p.value)
 
     @property
