@@ -26,6 +26,9 @@ CUT_OFF = 0.7
 #: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
 RUBBER, DIAMOND = 1e6, 1.2e12
 
+#: Coefficients of friction above this are those of few pairs: clean metals in vacuum, soft rubber.
+HIGH_FRICTION = 2.0
+
 #: Contact radius over radius of curvature at which a paraboloid differs from a sphere by 1 %.
 STEEP = 0.2
 
@@ -40,7 +43,7 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : largest mean pressure; the material's hardness or None
         [force / length^2]
-    contact_modulus : [force / length^2]
+    contact_modulus : [force / length^2];  friction : its coefficient or None
     beyond_hardness : number of asperities whose mean pressure exceeds the hardness
     mismatch     : Dundurs' beta of two bodies, which the model neglects
     """
@@ -68,6 +71,7 @@ def limits(
         "hardness": hardness,
         "mismatch": scene.material.mismatch,
         "contact_modulus": scene.material.contact_modulus,
+        "friction": scene.friction,
         "beyond_hardness": int((pressures > (hardness or np.inf)).sum()),
     }
 
@@ -92,6 +96,11 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
     normal : the contact's `limits_of`
     """
     yield from unlikely_modulus(normal["contact_modulus"], units)
+    if (normal["friction"] or 0.0) > HIGH_FRICTION:
+        yield (
+            f"the coefficient of friction is {normal['friction']:g}: few pairs of bodies exceed "
+            f"{HIGH_FRICTION:g}; it is a ratio, not in per cent"
+        )
     if 0 < normal["contact"] < FEW:
         yield (
             f"asperities in contact: {normal['contact']}, fewer than {FEW}: too few for a rough "
@@ -146,6 +155,7 @@ def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
         and (touching < ARRAY or (isinstance(scene.sphere_radius, float)
              and np.abs(scene.asperities.positions).max(axis=0).min() > 1.01 * CUT_OFF * smooth))
         and scene.material.hardness is None
+        and (scene.friction or 0.0) <= HIGH_FRICTION
         and not any(unlikely_modulus(scene.material.contact_modulus, scene.units))
     )  # fmt: skip
 

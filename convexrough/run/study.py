@@ -205,15 +205,21 @@ class Study(FileTable):
     def mistakes_within(self) -> Iterator[Mistake]:
         """A modulus that no solid has, where units are named."""
         material, unit = self.material, self.units.names.unit("pressure")
-        if not isinstance(material, Material) or unit is None:
+        if unit is None:
             return
-        name = "youngs_modulus" if material.contact_modulus is None else "contact_modulus"
-        value = getattr(material, name)
-        if not SOFTEST <= (pascals := value * float(unit.size)) <= HARDEST:
-            found = f"found {value:g} {unit.name}, which is {pascals:.3g} Pa"
-            solid = f"expected {SOFTEST:g} to {HARDEST:g} Pa, as solids have"
-            said = f"[material] {name}: {found}, {solid}; without [units] no unit is checked"
-            yield "material", said
+        given = {
+            "[material] contact_modulus": getattr(material, "contact_modulus", None),
+            "[material] youngs_modulus": getattr(material, "youngs_modulus", None),
+        }
+        if isinstance(material, Bodies):
+            given["[material.sphere] youngs_modulus"] = material.sphere.youngs_modulus
+            given["[material.base] youngs_modulus"] = material.base.youngs_modulus
+        for name, value in given.items():
+            if value and not SOFTEST <= (pascals := value * float(unit.size)) <= HARDEST:
+                found = f"found {value:g} {unit.name}, which is {pascals:.3g} Pa"
+                solid = f"expected {SOFTEST:g} to {HARDEST:g} Pa, as solids have"
+                said = f"{name}: {found}, {solid}; without [units] no unit is checked"
+                yield "material", said
 
 
 def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:

@@ -39,6 +39,8 @@ approach = 4e-7
 [units]
 {units}
 """
+BODIES = """sphere = {youngs_modulus = 210e9, poisson_ratio = 0.3}
+base = {youngs_modulus = 70, poisson_ratio = 0.3}"""
 STEEL, METRES = "youngs_modulus = 210e9", 'length = "m"\nforce = "N"'
 Columns = Mapping[str, Iterable[Any]]
 
@@ -530,6 +532,7 @@ def test_units_that_differ_where_the_scene_names_none(tmp_path: Path, case: Case
     [
         ("youngs_modulus = 210", METRES, "found 210 N/m², which is 210 Pa, expected"),
         ("youngs_modulus = 210e9", 'length = "mm"\nforce = "N"', "which is 2.1e+17 Pa, expected"),
+        (BODIES, METRES, "[material.base] youngs_modulus: found 70 N/m², which is 70 Pa, expected"),
         (
             "youngs_modulus = 210",
             'length = "um"\nforce = "N"\npressure = "GPa"',
@@ -545,6 +548,9 @@ def test_units_of_scenes(
     tmp_path: Path, command: Any, case: Case, modulus: str, units: str, said: str
 ) -> None:
     write_scene(tmp_path, modulus, units)
+    if modulus is BODIES:
+        path = tmp_path / "scene.toml"
+        path.write_text(path.read_text().replace("poisson_ratio = 0.3\n[asp", "[asp"))
     outcome = command("run", "scene.toml", "--no-figures")
     assert (outcome.status, outcome.out) == (2, "")
     assert said in outcome.err
@@ -568,6 +574,13 @@ def test_an_unlikely_modulus_is_told(
     assert outcome.status == 0
     assert f"{said}" in outcome.err
     assert " Pa): " in outcome.err
+
+
+def test_friction_in_per_cent_is_told(tmp_path: Path, command: Any, case: Case) -> None:
+    write_scene(tmp_path, f"{STEEL}", f"{METRES}\n[friction]\ncoefficient = 30")
+    outcome = command("run", "scene.toml", "--no-figures")
+    assert outcome.status == 0
+    assert "the coefficient of friction is 30: few pairs of bodies exceed 2; it is" in outcome.err
 
 
 def test_a_map_without_a_unit(tmp_path: Path, command: Any, case: Case) -> None:
