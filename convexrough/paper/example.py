@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import convexrough as cr
 from convexrough.paper.states import lettered
 from convexrough.run.stage import Result
-from convexrough.run.stages import Cycle, Normal, Shear
+from convexrough.run.stages import CycleStage, NormalStage, ShearStage
 from convexrough.tabular.columns import aligned
 
 APPROACH = 5e-5
@@ -34,7 +34,11 @@ def scene() -> cr.Scene:
 def results() -> list[Result]:
     """The results of pressing, shearing and cycling at the amplitudes that the paper shows."""
     parts = [0.1, 0.37, 0.5]
-    stages = (Normal(approach=APPROACH), Shear(fractions=parts), Cycle(maximum_fraction=parts))
+    stages = (
+        NormalStage(approach=APPROACH),
+        ShearStage(fractions=parts),
+        CycleStage(maximum_fraction=parts),
+    )
     contact = cr.press(scene(), approach=APPROACH)
     return [stage.compute(contact) for stage in stages]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from convexrough.friction.shear import ShearState, shear
 from convexrough.proof import Proof
 from convexrough.run.stage import Result, limit
-from convexrough.run.stages.cycle import Cycled
+from convexrough.run.stages.cycle import CycleResult
 
 #: Shear forces above this fraction of the friction limit are left out: all asperities slide there.
 BELOW_LIMIT = 1 - 1e-9
@@ -22,7 +22,7 @@ def prove_results(results: Sequence[Result]) -> Proof:
     found = [each for result in results for each in result.found]
     states = {abs(each.force): each for each in found if isinstance(each, ShearState)}
     for result in results:
-        for each in result.found if isinstance(result, Cycled) else ():
+        for each in result.found if isinstance(result, CycleResult) else ():
             amplitude = (each.maximum - each.minimum) / 2
             if amplitude not in states:
                 states[amplitude] = shear(contact, force=amplitude)

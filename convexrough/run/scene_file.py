@@ -31,7 +31,7 @@ from convexrough.tabular.units import UnitNames
 
 if TYPE_CHECKING:
     from convexrough.run.stage import Result, Stage
-    from convexrough.run.study import Lattice, Study
+    from convexrough.run.study import LatticeTable, Study
 
 
 #: Number of mistakes in a scene file that are reported one by one; further ones are counted.
@@ -257,13 +257,13 @@ def build_scene(
 
 def _material(study: Study) -> Material:
     """The material of the contact, from one table or from those of both bodies."""
-    from convexrough.run.study import Bodies
+    from convexrough.run.study import BodiesTable
 
     def of(body: Any) -> Material:
         return Material.from_youngs(body.youngs_modulus, body.poisson_ratio, body.hardness)
 
     table = study.material
-    if isinstance(table, Bodies):
+    if isinstance(table, BodiesTable):
         return Material.pair(of(table.sphere), of(table.base))
     if table.youngs_modulus is not None:
         return of(table)
@@ -271,7 +271,7 @@ def _material(study: Study) -> Material:
 
 
 def _lattice(
-    layout: Lattice, study: Study, press_on: Callable[[Asperities], Scene], layouts: Layouts
+    layout: LatticeTable, study: Study, press_on: Callable[[Asperities], Scene], layouts: Layouts
 ) -> tuple[Scene, float | None]:
     """The scene up to the distance `within`, or else with all asperities that could touch."""
     tips = layout.tip_radius

@@ -16,7 +16,7 @@ from convexrough.checks import nearest
 from convexrough.errors import InputError
 from convexrough.influence import KINDS, Kind
 from convexrough.run.stage import Stage
-from convexrough.run.stages import STAGES, Normal
+from convexrough.run.stages import STAGES, NormalStage
 from convexrough.run.values import (
     FileTable,
     Mistake,
@@ -41,11 +41,11 @@ Geometry = Annotated[Literal["summit", "closest"], expected('"summit" or "closes
 Pattern = Annotated[Literal["hexagonal", "square"], expected('"hexagonal", "square" or "file"')]
 
 
-class Sphere(FileTable):
+class SphereTable(FileTable):
     radius: Radius
 
 
-class Material(FileTable):
+class MaterialTable(FileTable):
     """The table of the material of both bodies."""
 
     alternatives = ("contact_modulus", "youngs_modulus")
@@ -55,21 +55,21 @@ class Material(FileTable):
     hardness: Positive | None = None
 
 
-class Body(FileTable):
+class BodyTable(FileTable):
     youngs_modulus: Positive
     poisson_ratio: Ratio
     hardness: Positive | None = None
 
 
-class Bodies(FileTable):
+class BodiesTable(FileTable):
     """The table of two bodies of different materials."""
 
-    elsewhere = ("two bodies", frozenset(Material.model_fields))
-    sphere: Body
-    base: Body
+    elsewhere = ("two bodies", frozenset(MaterialTable.model_fields))
+    sphere: BodyTable
+    base: BodyTable
 
 
-class Summits(FileTable):
+class SummitsTable(FileTable):
     """The table of asperities that are read from a file."""
 
     elsewhere = (
@@ -83,11 +83,11 @@ class Summits(FileTable):
     geometry: Geometry = "closest"
 
 
-class Lattice(FileTable):
+class LatticeTable(FileTable):
     """The table of asperities in a pattern."""
 
     needs: ClassVar[Mapping[str, str]] = {"height_std": "seed", "tip_radius_cv": "seed"}
-    elsewhere = ("this pattern", frozenset(Summits.model_fields))
+    elsewhere = ("this pattern", frozenset(SummitsTable.model_fields))
     pattern: Pattern
     spacing: Positive
     tip_radius: TipRadius
@@ -98,18 +98,18 @@ class Lattice(FileTable):
     geometry: Geometry = "closest"
 
 
-class Friction(FileTable):
+class FrictionTable(FileTable):
     coefficient: Positive
 
 
-class Solver(FileTable):
+class SolverTable(FileTable):
     name: Annotated[str, expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)] = "newton"
     influence: (
         Annotated[Kind, expected(f"one of: {', '.join(KINDS)}", KINDS.__contains__)] | None
     ) = None
 
 
-class Units(FileTable):
+class UnitsTable(FileTable):
     length: Text = ""
     force: Text = ""
     pressure: Text = ""
@@ -142,7 +142,7 @@ class Units(FileTable):
 
 
 def _is_bodies(table: Any) -> str:
-    both = isinstance(table, dict) and not table.keys().isdisjoint(Bodies.model_fields)
+    both = isinstance(table, dict) and not table.keys().isdisjoint(BodiesTable.model_fields)
     return "(bodies)" if both else "(one)"
 
 
@@ -152,29 +152,29 @@ def _is_file(table: Any) -> str:
 
 #: Tables that every scene file must have.
 REQUIRED: dict[str, type[FileTable]] = {
-    "sphere": Sphere,
-    "material": Material,
-    "asperities": Lattice,
-    "normal": Normal,
+    "sphere": SphereTable,
+    "material": MaterialTable,
+    "asperities": LatticeTable,
+    "normal": NormalStage,
 }
 
 
 class Study(FileTable):
     """All tables of a scene file; `_model` adds the tables of stages."""
 
-    sphere: Sphere
+    sphere: SphereTable
     material: Annotated[
-        Annotated[Material, Tag("(one)")] | Annotated[Bodies, Tag("(bodies)")],
+        Annotated[MaterialTable, Tag("(one)")] | Annotated[BodiesTable, Tag("(bodies)")],
         Discriminator(_is_bodies),
     ]
     asperities: Annotated[
-        Annotated[Lattice, Tag("(lattice)")] | Annotated[Summits, Tag("(file)")],
+        Annotated[LatticeTable, Tag("(lattice)")] | Annotated[SummitsTable, Tag("(file)")],
         Discriminator(_is_file),
     ]
-    normal: Normal
-    friction: Friction | None = None
-    solver: Solver = Solver()
-    units: Units = Units()
+    normal: NormalStage
+    friction: FrictionTable | None = None
+    solver: SolverTable = SolverTable()
+    units: UnitsTable = UnitsTable()
 
     @property
     def stages(self) -> dict[str, Stage]:
@@ -211,7 +211,7 @@ class Study(FileTable):
             "[material] contact_modulus": getattr(material, "contact_modulus", None),
             "[material] youngs_modulus": getattr(material, "youngs_modulus", None),
         }
-        if isinstance(material, Bodies):
+        if isinstance(material, BodiesTable):
             given["[material.sphere] youngs_modulus"] = material.sphere.youngs_modulus
             given["[material.base] youngs_modulus"] = material.base.youngs_modulus
         for name, value in given.items():
@@ -246,7 +246,7 @@ def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:
 @lru_cache(4)
 def _model(stages: tuple[type[Stage], ...]) -> type[Study]:
     fields: dict[str, Any] = {
-        each.name: (each | None, None) for each in stages if each is not Normal
+        each.name: (each | None, None) for each in stages if each is not NormalStage
     }
     return create_model("Study", __base__=Study, **fields)
 

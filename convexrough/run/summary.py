@@ -8,7 +8,7 @@ from typing import Any
 from convexrough.atomic import to_json as to_json
 from convexrough.plausibility import cautions
 from convexrough.run.stage import Result, Summary
-from convexrough.run.stages.normal import Pressed
+from convexrough.run.stages.normal import NormalResult
 from convexrough.version import __version__
 
 #: Version of the keys of summary.json and of the columns of tables.
@@ -35,5 +35,5 @@ def warnings(results: Iterable[Result]) -> Iterator[str]:
     """Warnings: what is not proved, and where the model does not hold."""
     for result in results:
         yield from result.doubts()
-        if isinstance(result, Pressed):
+        if isinstance(result, NormalResult):
             yield from cautions(result.known[0], result.units)

@@ -123,7 +123,7 @@ class Tables:
 
     def _study(self, number: int, last: dict[str, Any]) -> Study:
         """The tables of a scene; those of scenes that differ only in the seed are checked once."""
-        from convexrough.run.study import Lattice, validate
+        from convexrough.run.study import LatticeTable, validate
 
         point = self.grid.point(number)
         if last.get("values") != point.values:
@@ -132,7 +132,7 @@ class Tables:
                 raise SceneFileError(str(self.path), mistakes)
             last.update(values=point.values, study=study)
         known: Study = last["study"]
-        if point.seed is None or not isinstance(known.asperities, Lattice):
+        if point.seed is None or not isinstance(known.asperities, LatticeTable):
             return known
         layout = known.asperities.model_copy(update={"seed": point.seed})
         return known.model_copy(update={"asperities": layout})

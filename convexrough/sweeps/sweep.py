@@ -167,13 +167,13 @@ def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
     """The stages with these fractions of f P."""
-    from convexrough.run.stages import Cycle, Normal, Shear
+    from convexrough.run.stages import CycleStage, NormalStage, ShearStage
     from convexrough.run.study import validate_table
 
-    found: dict[str, Stage] = {"normal": Normal(approach=0.0)}
+    found: dict[str, Stage] = {"normal": NormalStage(approach=0.0)}
     mistakes: list[str] = []
     models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
-    models = ((Shear, "fractions", shear), (Cycle, "maximum_fraction", cycle))
+    models = ((ShearStage, "fractions", shear), (CycleStage, "maximum_fraction", cycle))
     for model, key, values in models:
         if len(values):
             table, wrong = validate_table(model.name, {key: [*map(float, values)]}, model)

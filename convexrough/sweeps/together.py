@@ -13,7 +13,7 @@ from convexrough.arrays import Array
 from convexrough.contact import covered
 from convexrough.plausibility import cautions, clear_of_cautions, limits
 from convexrough.rows import PressedRows, in_rows
-from convexrough.run.stages import Cycle
+from convexrough.run.stages import CycleStage
 from convexrough.scene.neighbours import crowding
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz, mindlin
@@ -83,11 +83,11 @@ def measured_together(asked: Mapping[int, Asked], columns: Sequence[Column]) -> 
     return found
 
 
-def _cycle(asked: Asked, columns: Sequence[Column]) -> Cycle | None:
+def _cycle(asked: Asked, columns: Sequence[Column]) -> CycleStage | None:
     """The stage of cycles of a scene if any of its numbers is measured, else None."""
     stage = asked.stages.get("cycle")
     wanted = any(column.stage == "cycle" for column in columns)
-    return stage if wanted and isinstance(stage, Cycle) else None
+    return stage if wanted and isinstance(stage, CycleStage) else None
 
 
 def _known(

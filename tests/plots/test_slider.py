@@ -16,7 +16,7 @@ import convexrough as cr
 from convexrough.paper import example
 from convexrough.plots import slider
 from convexrough.run.results import slider_page
-from convexrough.run.stages.normal import Normal, Pressed
+from convexrough.run.stages.normal import NormalResult, NormalStage
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 BROWSER = next((found for name in NAMES if (found := shutil.which(name))), None)
@@ -33,8 +33,8 @@ def page_of(contact: cr.Contact) -> str:
     return slider_page(pressed_result(contact))
 
 
-def pressed_result(contact: cr.Contact) -> Pressed:
-    return Normal(approach=contact.approach).compute(contact)
+def pressed_result(contact: cr.Contact) -> NormalResult:
+    return NormalStage(approach=contact.approach).compute(contact)
 
 
 def said(contact: cr.Contact) -> list[str]:

@@ -13,7 +13,7 @@ from convexrough.atomic import replacing, to_json
 from convexrough.run import results
 from convexrough.run.results import MANIFEST, results_folder, write_results
 from convexrough.run.scene_file import read_scene
-from convexrough.run.stages import Normal
+from convexrough.run.stages import NormalStage
 from convexrough.tabular.table import read_table
 from convexrough.verdict.claims import Manner, read_loads
 
@@ -262,7 +262,7 @@ def test_the_default_within_loses_no_asperity(
 
 
 def written(folder: Path, contact: cr.Contact, *, figures: bool = False) -> list[str]:
-    found = [Normal(approach=contact.approach).compute(contact)]
+    found = [NormalStage(approach=contact.approach).compute(contact)]
     paths = write_results(folder, found, figures=figures)
     assert all(path.stat().st_size > 0 for path in paths)
     assert {path.name for path in paths} == {path.name for path in folder.iterdir()}

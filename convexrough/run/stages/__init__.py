@@ -3,27 +3,37 @@
 from __future__ import annotations
 
 from convexrough.run.stage import Stage
-from convexrough.run.stages.cycle import Cycle
-from convexrough.run.stages.gradient import Gradient
-from convexrough.run.stages.history import History
-from convexrough.run.stages.normal import Normal
-from convexrough.run.stages.path import Path, Steady
-from convexrough.run.stages.shakedown import Shakedown
-from convexrough.run.stages.shear import Shear
+from convexrough.run.stages.cycle import CycleStage
+from convexrough.run.stages.gradient import GradientStage
+from convexrough.run.stages.history import HistoryStage
+from convexrough.run.stages.normal import NormalStage
+from convexrough.run.stages.path import PathStage, SteadyStage
+from convexrough.run.stages.shakedown import ShakedownStage
+from convexrough.run.stages.shear import ShearStage
 
 __all__ = [
     "STAGES",
-    "Cycle",
-    "Gradient",
-    "History",
-    "Normal",
-    "Path",
-    "Shakedown",
-    "Shear",
-    "Steady",
+    "CycleStage",
+    "GradientStage",
+    "HistoryStage",
+    "NormalStage",
+    "PathStage",
+    "ShakedownStage",
+    "ShearStage",
+    "SteadyStage",
 ]
 
 #: Tables of a scene file that compute something, by their names, in the order of results.
 STAGES: dict[str, type[Stage]] = {
-    each.name: each for each in (Normal, Shear, Cycle, History, Path, Steady, Shakedown, Gradient)
+    each.name: each
+    for each in (
+        NormalStage,
+        ShearStage,
+        CycleStage,
+        HistoryStage,
+        PathStage,
+        SteadyStage,
+        ShakedownStage,
+        GradientStage,
+    )
 }

@@ -37,7 +37,7 @@ OWN = ("force_amplitude", "displacement_amplitude", "displacement_error", "secan
        "balance_defect", "sliding", "partial", "undecided")  # fmt: skip
 
 
-class Cycle(Stage):
+class CycleStage(Stage):
     """The largest and smallest shear forces of steady cycles, as fractions of f P.
 
     minimum_fraction : one for each maximum; default: the negatives of the maxima
@@ -80,17 +80,17 @@ class Cycle(Stage):
                 what = f"[cycle] loop_asperities[{place}]"
                 raise InputError(what, found=index, expected=f"an index from 0 to {count - 1}")
 
-    def compute(self, contact: Contact) -> Cycled:
+    def compute(self, contact: Contact) -> CycleResult:
         f_p = limit(contact)
         found = cycles(contact, f_p * np.array(self.maximum_fraction), f_p * np.array(self.lowest))
-        return Cycled(self, contact, tuple(found))
+        return CycleResult(self, contact, tuple(found))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cycled(Result):
+class CycleResult(Result):
     """The result of [cycle]: the steady cycles."""
 
-    stage: Cycle
+    stage: CycleStage
     title = "steady cycles: amplitudes Qa of the force and Xa of the displacement, loss W"
     digits = 6
     printed: ClassVar[Mapping[str, str]] = {

@@ -13,8 +13,7 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.cycle import cycle
 from convexrough.friction.shear import shear
-from convexrough.gradients.gradient import Gradient as Slopes
-from convexrough.gradients.gradient import Holding
+from convexrough.gradients.gradient import Gradient, Holding
 from convexrough.run.stage import Columns, Single, Stage, Summary, limit
 from convexrough.run.values import Mistake, Share, expected
 from convexrough.tabular.columns import bound, labelled
@@ -30,7 +29,7 @@ SHARED = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load
           "maximum", "minimum", "force")  # fmt: skip
 
 
-class Gradient(Stage):
+class GradientStage(Stage):
     """The result to differentiate, and the parameters.
 
     of       : "loss" of the cycle between +-fraction f P, "displacement" under fraction f P,
@@ -65,16 +64,16 @@ class Gradient(Stage):
         if not self.sheared and self.fraction is not None:
             yield "fraction", f"found {self.fraction}, expected none with the {self.of}"
 
-    def compute(self, contact: Contact) -> Differentiated:
+    def compute(self, contact: Contact) -> GradientResult:
         """The gradient, or the reason why there is none."""
         try:
-            return Differentiated(self, contact, (self._gradient(contact),))
+            return GradientResult(self, contact, (self._gradient(contact),))
         except InputError as error:
-            return Differentiated(self, contact, (), str(self._in_the_file(error)))
+            return GradientResult(self, contact, (), str(self._in_the_file(error)))
         except SolverError as error:
-            return Differentiated(self, contact, (), str(error))
+            return GradientResult(self, contact, (), str(error))
 
-    def _gradient(self, contact: Contact) -> Slopes:
+    def _gradient(self, contact: Contact) -> Gradient:
         if not self.sheared:
             return contact.gradient(**{self.of: 1.0}, holding=self.holding)
         force = (self.fraction or 0.0) * limit(contact)
@@ -91,10 +90,10 @@ class Gradient(Stage):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Differentiated(Single):
+class GradientResult(Single):
     """The result of [gradient]: the gradient, or in `none_because` why there is none."""
 
-    stage: Gradient
+    stage: GradientStage
     none_because: str = ""
 
     def rows(self) -> list[Summary]:

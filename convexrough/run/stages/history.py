@@ -14,7 +14,7 @@ from convexrough.run.stage import Columns, Stage, Steps, limit
 from convexrough.run.values import Fractions
 
 
-class History(Stage):
+class HistoryStage(Stage):
     """Any sequence of shear forces from 0, as fractions of f P."""
 
     name = "history"
@@ -22,16 +22,16 @@ class History(Stage):
 
     fractions: Fractions
 
-    def compute(self, contact: Contact) -> Followed:
+    def compute(self, contact: Contact) -> HistoryResult:
         past = history(contact, forces=limit(contact) * np.array(self.fractions))
-        return Followed(self, contact, (past,))
+        return HistoryResult(self, contact, (past,))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Followed(Steps):
+class HistoryResult(Steps):
     """The states after each force."""
 
-    stage: History
+    stage: HistoryStage
     printed: ClassVar[Mapping[str, str]] = {
         "fraction": "Q/(fP)",
         "displacement": "displacement",

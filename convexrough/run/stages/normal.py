@@ -41,7 +41,7 @@ INFLUENCES = {
 }
 
 
-class Normal(Stage):
+class NormalStage(Stage):
     """The prescribed quantity: the approach of the two bodies [length] or the load [force]."""
 
     name = "normal"
@@ -57,12 +57,12 @@ class Normal(Stage):
     approach: Finite | None = None
     load: Positive | None = None
 
-    def compute(self, contact: Contact) -> Pressed:
-        return Pressed(self, contact, (contact,))
+    def compute(self, contact: Contact) -> NormalResult:
+        return NormalResult(self, contact, (contact,))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pressed(Single):
+class NormalResult(Single):
     """The result of [normal]: the pressed contact."""
 
     def rows(self) -> list[Summary]:

@@ -89,7 +89,7 @@ class _Points(Stage):
         return {"loads": self.reference * loads, "forces": self.reference * forces}
 
 
-class Path(_Points):
+class PathStage(_Points):
     """A path of load and shear force that starts without load."""
 
     name = "path"
@@ -98,14 +98,14 @@ class Path(_Points):
         *("front", *COUNTS),
     )
 
-    def compute(self, contact: Contact) -> Pathed:
+    def compute(self, contact: Contact) -> PathResult:
         with blamed_on(f"[{self.name}]"):
             found = load_path(contact.scene, **self.points(contact), influence=contact.influence)
-        return Pathed(self, contact, (found,))
+        return PathResult(self, contact, (found,))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pathed(Steps):
+class PathResult(Steps):
     """The states at the points of a path."""
 
     title = "load path"
@@ -144,7 +144,7 @@ class Pathed(Steps):
         return [*super().lines(), f"{INCREASE}{self.found[0].order}"]
 
 
-class Steady(_Points):
+class SteadyStage(_Points):
     """A closed path that is repeated.
 
     phases, factors : also compute the losses of the ellipse at these phases [rad], with its
@@ -158,11 +158,11 @@ class Steady(_Points):
     phases: Annotated[list[Phase], expected("a list of phases in radians", bool)] | None = None
     factors: Annotated[list[Positive], expected("a list of positive numbers", bool)] = Field([1.0])
 
-    def compute(self, contact: Contact) -> Settled:
+    def compute(self, contact: Contact) -> SteadyResult:
         scene, influence = contact.scene, contact.influence
         with blamed_on(f"[{self.name}]"):
             found = [steady(scene, **self.points(contact), influence=influence)]
-            return Settled(self, contact, (*found, *self._losses(contact)))
+            return SteadyResult(self, contact, (*found, *self._losses(contact)))
 
     def _losses(self, contact: Contact) -> Iterator[PhaseLosses]:
         if self.phases and self.ellipse is not None:
@@ -178,7 +178,7 @@ class Steady(_Points):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Settled(Single):
+class SteadyResult(Single):
     """The result of [steady]: the steady cycle, and losses at other phases if requested."""
 
     printed: ClassVar[Mapping[str, str]] = {

@@ -18,7 +18,7 @@ from convexrough.run.values import Finite, Force, Mistake, Positive, expected
 Kind = Annotated[Theory, expected('"exact", "elastic" or "vector"')]
 
 
-class Shakedown(Stage):
+class ShakedownStage(Stage):
     """Mean load and shear force, and the amplitudes that are scaled, in multiples of `reference`.
 
     kind : "exact" (default), "elastic", or "vector": then forces are pairs [x, y]
@@ -46,7 +46,7 @@ class Shakedown(Stage):
             if isinstance(force, list) != pairs:
                 yield f"force_amplitudes[{i}]", f"found {force}, expected {expected}"
 
-    def compute(self, contact: Contact) -> Limit:
+    def compute(self, contact: Contact) -> ShakedownResult:
         swings = self.load_amplitudes or [0.0] * len(self.force_amplitudes)
         with blamed_on(f"[{self.name}]"):
             found = shakedown(
@@ -58,14 +58,14 @@ class Shakedown(Stage):
                 kind=self.kind,
                 influence=contact.influence,
             )
-        return Limit(self, contact, (found,))
+        return ShakedownResult(self, contact, (found,))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Limit(Single):
+class ShakedownResult(Single):
     """The result of [shakedown]: the limit, its bounds, and the states that prove them."""
 
-    stage: Shakedown
+    stage: ShakedownStage
     digits = 12
     printed: ClassVar[Mapping[str, str]] = {
         "factor": "factor",

@@ -14,7 +14,7 @@ from convexrough.run.stage import Columns, Result, Stage, Summary, limit, repeat
 from convexrough.run.values import Shares
 
 
-class Shear(Stage):
+class ShearStage(Stage):
     """Shear forces of monotonic shear, as fractions of f P, from 0 to 1."""
 
     name = "shear"
@@ -23,17 +23,17 @@ class Shear(Stage):
 
     fractions: Shares
 
-    def compute(self, contact: Contact) -> Sheared:
+    def compute(self, contact: Contact) -> ShearResult:
         f_p = limit(contact)
         states = (shear(contact, force=part * f_p) for part in self.fractions)
-        return Sheared(self, contact, tuple(states))
+        return ShearResult(self, contact, tuple(states))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sheared(Result):
+class ShearResult(Result):
     """The result of [shear]: a friction state for each fraction."""
 
-    stage: Shear
+    stage: ShearStage
     printed: ClassVar[Mapping[str, str]] = {
         "fraction": "Q/(fP)",
         "force": "force",
