@@ -194,7 +194,7 @@ def press(
     """Press the sphere on the asperities by an approach [length] or with a load [force].
 
     solver : a solver or its name in scene files, such as "conic"; default `solvers.Newton()`
-    start  : (n,) [force] initial loads; in the convex range the solution does not depend on them
+    start  : (n,) [force] initial loads, on which no solution with a global certificate depends
     influence : compliance operator: "dense" (a matrix), "lattice" (Fourier transforms, for points
         on a lattice), "scattered" (transforms on a mesh); None for the cheapest
 

@@ -139,6 +139,12 @@ def test_loads_that_are_far_off_do_not_hold_by_default(wrong: str) -> None:
     assert cr.verify(scene, loads, **control, within=1.0).holds
 
 
+def test_a_tolerance_in_per_cent_is_refused() -> None:
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    with pytest.raises(cr.InputError, match=r"within: found 5, expected .*; 5 % is 0.05"):
+        cr.verify(paper(), contact.loads, approach=PAPER_APPROACH, within=5)
+
+
 @pytest.mark.parametrize("noise", [1e-20, -1e-20, 1e-17, -1e-17])
 def test_noise_up_to_the_floor_is_open(noise: float) -> None:
     contact = cr.press(paper(), approach=PAPER_APPROACH)

@@ -36,10 +36,10 @@ def run(
     formats: tuple[str, ...],
     dpi: int,
 ) -> int:
-    """Compute a scene file; write tables, certificate and figures.
+    """Compute the contact of a scene file; write tables, certificate and figures.
 
-    Results go to the folder SCENE-results unless --out names another. A file with a table [sweep]
-    is computed as by `convexrough sweep`.
+    Results go to the folder SCENE-results unless --out names another. If the file has a table
+    [sweep], the command does the same as `convexrough sweep`.
     """
     from convexrough import checks
     from convexrough.run.results import origin, results_folder, slider_page, write_results

@@ -67,7 +67,7 @@ class Cycle(Table, Plottable):
     slips            : [length] gross slip in each direction per cycle; nan where intermittent
     stick_radii      : [length] radius of the disc that always sticks
     slip_errors, stick_radius_errors : [length] proved bounds on their errors
-    level, force_level : [force] the load L* and the shear force f T* below which nothing slips
+    level, force_level : [force] L* and f T*, the point of the memory curve that no cycle changes
     balance_defect   : relative error of the loss by the trapezoid rule; nan if P varies
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) at the highest load P:
         Poisson's ratio nu, shear modulus G, contact radius a_H of the smooth sphere
@@ -199,8 +199,8 @@ class Cycle(Table, Plottable):
     def gradient(self, *, holding: Holding | None = None) -> Gradient:
         """Derivatives of the loss with respect to the scene, at constant shear forces.
 
-        holding : quantity kept constant, as in `Contact.gradient`. Loads that vary along the path
-            are constant, too. `Gradient` says how to keep a prescribed displacement constant
+        holding : quantity kept constant, as in `Contact.gradient`; for a load that varies, all its
+            values. `Gradient` says how to keep a prescribed displacement constant
 
         Raises InputError in gross sliding if several asperities slide last or the approach is kept
         constant: the loss has no derivative there.

@@ -14,7 +14,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.friction.shear import ShearCertificate, ShearState, against, shear
-from convexrough.normal.claims import WITHIN, Claim
+from convexrough.normal.claims import WITHIN, Claim, tolerance
 from convexrough.record import Record
 
 #: An asperity is claimed to slide if its shear force is at least 1 - CLAIMS_SLIDING times f P_i.
@@ -99,7 +99,7 @@ def verify_shear(
 
     Raises InputError as `certify_shear`.
     """
-    within = checks.positive("within", within)
+    within = tolerance("within", within)
     given = checks.array("forces", forces, length=len(contact.scene))
     state = shear(contact, force=checks.finite("force", force))
     if sliding is None:

@@ -1,9 +1,9 @@
 """The compliance operator of points on a lattice: a convolution, computed by Fourier transforms.
 
 The operator maps loads P_j to displacements sum_j A_ij P_j with A_ij = scale / r_ij. The smallest
-box of sites that holds the asperities is padded with zeros to twice its size, so that there are no
-periodic images. Heights and radii of the asperities do not matter. The rounding errors of the
-transforms are bounded in docs/theory/operators-lattice.md, "Rounding".
+box of sites that holds the asperities is padded with zeros to at most about twice its size, so that
+there are no periodic images. Heights and radii of the asperities do not matter. The rounding errors
+of the transforms are bounded in docs/theory/operators-lattice.md, "Rounding".
 """
 
 from __future__ import annotations

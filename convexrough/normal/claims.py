@@ -10,7 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
+from convexrough.errors import InputError
 from convexrough.roundoff import SAFETY
 
 #: Largest error of forces and totals by default, as a fraction of the largest force or the total.
@@ -18,6 +20,14 @@ WITHIN = 0.01
 
 #: Smallest error of a suspect, as a fraction of the largest error.
 SUSPICIOUS = 1e-3
+
+
+def tolerance(name: str, within: float) -> float:
+    """A checked `within`. Raises InputError unless it is in (0, 1]."""
+    if checks.positive(name, within) > 1.0:
+        expected = "a fraction of the largest force, at most 1; 5 % is 0.05"
+        raise InputError(name, found=within, expected=expected)
+    return within
 
 
 class Claim(ABC):

@@ -210,10 +210,12 @@ class Study(FileTable):
         given = {
             "[material] contact_modulus": getattr(material, "contact_modulus", None),
             "[material] youngs_modulus": getattr(material, "youngs_modulus", None),
+            "[material] hardness": getattr(material, "hardness", None),
         }
         if isinstance(material, BodiesTable):
-            given["[material.sphere] youngs_modulus"] = material.sphere.youngs_modulus
-            given["[material.base] youngs_modulus"] = material.base.youngs_modulus
+            for name, body in (("sphere", material.sphere), ("base", material.base)):
+                given[f"[material.{name}] youngs_modulus"] = body.youngs_modulus
+                given[f"[material.{name}] hardness"] = body.hardness
         for name, value in given.items():
             if value and not SOFTEST <= (pascals := value * float(unit.size)) <= HARDEST:
                 found = f"found {value:g} {unit.name}, which is {pascals:.3g} Pa"

@@ -69,7 +69,7 @@ class Material:
 
         Normal and tangential compliances are those of two equal bodies with
         2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, without the coupling by
-        Dundurs' beta (docs/theory/bodies.md). The hardness is that of the softer body.
+        Dundurs' beta (docs/theory/bodies.md). The hardness is the smaller of the known ones.
 
         >>> steel = cr.Material.from_youngs(210e9, 0.3)
         >>> both = cr.Material.pair(steel, base=cr.Material.from_youngs(70e9, 0.33))

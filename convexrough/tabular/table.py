@@ -17,7 +17,7 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
-from convexrough.tabular.text import bare, read_text_table, unit
+from convexrough.tabular.text import WORKBOOKS, bare, read_text_table, unit
 from convexrough.tabular.units import NAMELESS, Unit, UnitNames, known_unit
 
 #: The quantity that each column measures.
@@ -273,6 +273,7 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
             mistakes=[],
         )
     table = read_text_table(path, known)
+    separated = path.suffix.lower() not in WORKBOOKS
     width = len(table.header) if table.header else max(len(row.cells) for row in table.rows)
     mistakes = []
     for row in table.rows:
@@ -286,7 +287,7 @@ def _source(path: Path, known: Sequence[str]) -> _Source:
         columns=[[row.cells[i] for row in whole] for i in range(width)],
         rows=[f"row {row.number}" for row in whole],
         lines=[row.text for row in whole],
-        style=str(table.style) if width > 1 or table.style.decimal == "," else "",
+        style=str(table.style) if separated and (width > 1 or table.style.decimal == ",") else "",
         number=table.style.number,
         numbers=table.style.numbers,
         mistakes=mistakes,

@@ -19,7 +19,7 @@ from convexrough.scene.scene import Scene
 from convexrough.surface.grid import steps
 from convexrough.tabular.table import Reading, ReadTable, few, read_table
 from convexrough.tabular.text import bare
-from convexrough.verdict.verdict import NOISE, rounded_up
+from convexrough.verdict.verdict import rounded_up
 
 #: Largest error of positions in a file, over the smallest spacing, unless a tolerance is given:
 #: five digits are enough, and every asperity still has one nearest row.
@@ -31,6 +31,9 @@ MOST_TRIED = 1000
 #: Upper limit of the median distance of loaded nodes from their asperities, over the spacing. For
 #: random points this is about 0.4.
 BY_CHANCE = 0.25
+
+#: Negative loads up to this fraction of the largest load may be noise.
+SMALL = 1e-3
 
 #: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
@@ -139,7 +142,7 @@ def _negative(loads: Array, floor: float, mistake: Callable[[int, str], str]) ->
     if largest <= floor:
         yield "column load: no load is positive, expected compression to be: --sign -1"
         return
-    if least <= NOISE * largest:
+    if least <= SMALL * largest:
         hint = f"; --floor {rounded_up(least)} counts noise as 0"
     for i in bad:
         found = f": found {float(loads[i])!r}, expected a number that is not negative{hint}"

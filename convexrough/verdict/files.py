@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks
 from convexrough.contact import Contact, solve
 from convexrough.errors import TableError, blamed_on
 from convexrough.friction.verdict import claims_sliding, verify_shear
-from convexrough.normal.claims import WITHIN
+from convexrough.normal.claims import WITHIN, tolerance
 from convexrough.normal.problem import NormalProblem
 from convexrough.verdict.claims import Claimed, Manner, read_loads, read_shear_forces
 from convexrough.verdict.report import Verified
@@ -35,7 +34,7 @@ def verify_files(
     within : largest error, as a fraction of the largest load or shear force
     shear, force : a file of shear forces and their total [force]; both or neither
     """
-    checks.positive("--within", within)
+    tolerance("--within", within)
     given = read_loads(loads, problem.scene, how)
     forces = read_shear_forces(shear, problem.scene, how) if shear is not None else None
     with blamed_on(loads):

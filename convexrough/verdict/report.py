@@ -218,7 +218,8 @@ def _total(claim: Claim, unit: str) -> str:
     given = f"{claim.total_given:.10g} {unit}".rstrip()
     if claim.total_prescribed is None:
         return f"{given} (none prescribed)"
-    if claim.total_holds:
+    apart = abs(claim.total_given - claim.total_prescribed)
+    if apart <= PERCENT / 100 * abs(claim.total_prescribed):
         return f"{given} (as prescribed)"
     expected = f"{claim.total_prescribed:.10g} {unit}".rstrip()
     ratio = claim.total_given / claim.total_prescribed if claim.total_prescribed else math.inf

@@ -24,7 +24,7 @@ from convexrough.contact import Contact, solve
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.coupling import Kind
 from convexrough.normal.certificate import Certificate, certify_on
-from convexrough.normal.claims import WITHIN, Claim
+from convexrough.normal.claims import WITHIN, Claim, tolerance
 from convexrough.normal.problem import NormalProblem
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
@@ -203,7 +203,7 @@ def verify_on(
 ) -> Verdict:
     """The verdict of `verify`, for a problem that is already assembled."""
     floor = checks.non_negative("floor", floor)
-    within = checks.positive("within", within)
+    within = tolerance("within", within)
     given = checks.array("loads", loads, length=len(problem.scene))
     if (given < -floor).any():
         first = int(np.argmax(given < -floor))

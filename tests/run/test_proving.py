@@ -51,6 +51,10 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
     again = command("verify", "first.toml", loads, "--proof")
     assert again.status == 2
     assert "proof.json: exists already" in again.err
+    (tmp_path / "wrong.csv").write_text("load\n" + "1e-3\n" * 61)
+    wrong = command("verify", "first.toml", "wrong.csv", "--proof", "--force")
+    assert wrong.status == 3
+    assert not (tmp_path / "proof.json").exists()  # an earlier proof does not stand beside it
 
 
 def test_what_cannot_be_proved_is_said(command: Any, tmp_path: Path) -> None:

@@ -106,8 +106,10 @@ def test_workers_are_killed_at_any_moment(
 
     def kill(news: str) -> None:
         nonlocal left
-        children = psutil.Process().children()
-        workers = [each for each in children if "spawn_main" in " ".join(each.cmdline())]
+        workers = []
+        for each in psutil.Process().children():
+            with suppress(psutil.NoSuchProcess):  # it may just have ended
+                workers += [each] if "spawn_main" in " ".join(each.cmdline()) else []
         if left and workers and "of 64 scenes" in news:
             chance.choice(workers).kill()
             left -= 1

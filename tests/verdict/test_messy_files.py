@@ -532,6 +532,7 @@ def test_units_that_differ_where_the_scene_names_none(tmp_path: Path, case: Case
     [
         ("youngs_modulus = 210", METRES, "found 210 N/m², which is 210 Pa, expected"),
         ("youngs_modulus = 210e9", 'length = "mm"\nforce = "N"', "which is 2.1e+17 Pa, expected"),
+        (f"{STEEL}\nhardness = 2e15", METRES, "[material] hardness: found 2e+15 N/m², which is 2e"),
         (BODIES, METRES, "[material.base] youngs_modulus: found 70 N/m², which is 70 Pa, expected"),
         (
             "youngs_modulus = 210",
@@ -561,6 +562,7 @@ def test_the_modulus_is_said(tmp_path: Path, command: Any, case: Case) -> None:
     write_scene(tmp_path, "youngs_modulus = 210", units)
     outcome = command("run", "scene.toml", "--no-figures")
     assert "contact modulus   115.3846154 mN/um²  (1.154e+11 Pa)" in outcome.out
+    assert " mN/um²  (no hardness given: yield is not checked)" in outcome.out
     assert "load" in outcome.out
     assert " mN\n" in outcome.out
 

@@ -183,7 +183,8 @@ def _neglected(normal: Summary) -> str:
 
 def _described_pressure(normal: Summary, units: UnitNames) -> str:
     """The largest mean pressure, and whether yield is checked."""
-    known = f"at most {normal['mean_pressure']:.4g} {unit_of('mean_pressure', units)}".rstrip()
+    unit = units.unit("pressure")
+    known = f"at most {normal['mean_pressure']:.4g} {unit.name if unit else ''}".rstrip()
     return known if normal["hardness"] else f"{known}  (no hardness given: yield is not checked)"
 
 
