@@ -40,6 +40,7 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     extent       : largest distance of a point of contact from the axis, over the base's radius
     array_extent : largest |x| or |y| of a summit, over the half width of the smooth base's contact
         under the same load along this axis, the smaller of both; None without such a contact
+    all_touch    : true if every asperity of the scene touches
     steepness    : largest ratio of contact radius to tip radius
     mean_pressure, hardness : largest mean pressure; the material's hardness or None
         [force / length^2]
@@ -66,6 +67,7 @@ def limits(
         "covered": covered,
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
         "array_extent": _array_extent(scene, float(loads.sum())),
+        "all_touch": bool(touching.all()),
         "steepness": float((radii / scene.asperities.tip_radii).max()),
         "mean_pressure": float(pressures.max()),
         "hardness": hardness,
@@ -101,7 +103,9 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             f"the coefficient of friction is {normal['friction']:g}: few pairs of bodies exceed "
             f"{HIGH_FRICTION:g}; it is a ratio, not in per cent"
         )
-    if 0 < normal["contact"] < FEW:
+    if normal["contact"] == 0:
+        yield "no asperity carries a load: check the sign and the unit of the approach"
+    elif normal["contact"] < FEW:
         yield (
             f"asperities in contact: {normal['contact']}, fewer than {FEW}: too few for a rough "
             "surface; check the units of the spacing and of the approach or load"
@@ -111,11 +115,17 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             f"contact extends to {normal['extent']:.3g} of the base's radius from the axis: from "
             f"{STEEP:g} on, the paraboloid of the model differs from a sphere by more than 1 %"
         )
-    if normal["contact"] >= ARRAY and (normal["array_extent"] or 1.0) < CUT_OFF:
+    cut_off = normal["contact"] >= ARRAY and normal["array_extent"] is not None
+    if cut_off and normal["array_extent"] < CUT_OFF:
         yield (
             f"contact reaches the rim of the array, which ends at {normal['array_extent']:.3g} of "
             "the contact radius of the smooth base: the loads depend on where it ends; check the "
             "unit of the base's radius, or use a larger array"
+        )
+    elif cut_off and normal["all_touch"]:
+        yield (
+            "every asperity touches, also at the rim of the array: others beyond it would carry "
+            "load, too; use a larger array"
         )
     if normal["steepness"] > STEEP:
         yield (
@@ -149,7 +159,7 @@ def clear_of_cautions(scene: Scene, loads: Array, radii: Array) -> bool:
     return bool(
         scene.lattice is not None
         and 2 * a < 0.99 * scene.lattice.spacing
-        and touching >= FEW
+        and FEW <= touching < len(loads)
         and a < 0.99 * STEEP * float(tips.min())
         and all(far + a < 0.99 * STEEP * R for R, _ in scene.curved)
         and (touching < ARRAY or (isinstance(scene.sphere_radius, float)

@@ -133,3 +133,21 @@ def test_the_estimate_is_what_pressing_finds(spacing: float) -> None:
     change = np.abs(other.loads[heavy] / contact.loads[heavy] - 1).max()
     assert limits_of(contact)["closest_change"] == pytest.approx(change, rel=0.02)
     assert limits_of(other)["closest_change"] is None
+
+
+def test_an_array_that_ends_inside_the_contact_is_told() -> None:
+    """Every asperity touches; on a flat base that is meant."""
+    wide = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    material = cr.Material(1.0, 0.3)
+    for base, approach, told in (
+        (1.0, 9e-5, "every asperity touches, also at the rim of the array"),
+        (1.0, 5e-5, ""),
+        (np.inf, 1e-6, ""),
+        (1.0, -1e-6, "no asperity carries a load: check the sign and the unit of the approach"),
+    ):
+        contact = cr.press(cr.Scene(base, wide, material), approach=approach)
+        assert (
+            any(each.startswith(told) for each in contact.warnings)
+            if told
+            else (not contact.warnings)
+        )

@@ -145,7 +145,12 @@ def test_what_is_not_proved_is_said(here: Executor) -> None:
     graze["normal"] = {}
     table = cr.sweep(graze, executor=here)
     assert numbers(table, "status", "message") == [
-        ["undecided", "certified"], ["not certified: undecided asperities: 1", ""]
+        ["undecided", "certified"],
+        [
+            "not certified: undecided asperities: 1; "
+            "no asperity carries a load: check the sign and the unit of the approach",
+            "",
+        ],
     ]  # fmt: skip
 
 
