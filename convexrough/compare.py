@@ -244,7 +244,7 @@ def _load_code_of(solver: solvers.Solver) -> None:
     """Make a solver import what it needs, so that the measured time contains no imports."""
     two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
     small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
-    with suppress(Exception):  # the scene itself raises it again
+    with suppress(Exception):  # `_enter` meets it again, and records or raises it
         press(small, approach=1e-2, solver=solver)
 
 

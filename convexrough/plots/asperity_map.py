@@ -28,7 +28,7 @@ from convexrough.plots.style import (
     round_ticks,
 )
 
-#: From these numbers on, discs are pixels inside a vector file, and a mosaic replaces them.
+#: Numbers from which discs are pixels inside a vector file, and from which a mosaic replaces them.
 DENSE, CROWDED = 200, 3000
 
 #: Width of a mosaic in pixels.

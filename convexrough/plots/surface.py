@@ -103,6 +103,10 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
     # A logarithmic axis cannot show 0.
     _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")
     axes.set_yscale("log")
+    lowest, highest = axes.get_ylim()
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if highest < 300 * lowest else (1,)))
+    axes.yaxis.set_major_formatter("{x:,g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
     _name_prunings(axes, curve)
     label(axes, "pruning  [% of $Sz$]", "number")
 
