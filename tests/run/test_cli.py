@@ -245,6 +245,7 @@ measure = ["load"]
 """
 
 
+@pytest.mark.usefixtures("no_processes")
 def test_a_file_with_a_sweep_is_swept(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(scene_text(more=SWEEP))
     ran = command("run", "a.toml", "--json")
