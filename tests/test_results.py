@@ -278,6 +278,7 @@ PUBLIC = [name for name in cr.__all__ if hasattr(getattr(cr, name), "__module__"
 MODULES = sorted(
     {getattr(cr, name).__module__ for name in PUBLIC} - {"convexrough.errors"}
     | {getattr(cr.surface, name).__module__ for name in cr.surface.__all__}
+    | {"convexrough.gallery.cases", "convexrough.gallery.any_size"}
 )
 
 

@@ -1,7 +1,6 @@
 """What downstream tests call: it must pass what is right, and say what is wrong."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -118,20 +117,6 @@ def test_answers_to_different_problems(contact: cr.Contact) -> None:
     worst = int(re.search(r"asperities (\d+): ", message)[1])  # type: ignore[index]
     assert apart[worst] >= apart.max() * (1 - 1e-12)  # of a ring alike, any
     assert f"asperities {worst}: {contact.loads[worst]:.6g} +- " in message
-
-
-def test_statuses_that_exclude_each_other(contact: cr.Contact) -> None:
-    statuses = np.array(contact.status)
-    statuses[3] = "open"
-    forged = replace(contact, certificate=replace(contact.certificate, status=statuses))
-    message = failure(assert_agree, contact, forged)
-    assert message == (
-        "first (newton) and second (newton): statuses of asperities 3: contact and open"
-    )
-    statuses[3] = "undecided"
-    assert_agree(
-        contact, replace(contact, certificate=replace(contact.certificate, status=statuses))
-    )
 
 
 def test_wrong_use(contact: cr.Contact) -> None:

@@ -177,34 +177,6 @@ def follow(shown: Opened, index: int) -> None:
     shown.page.locator("#follow").select_option(label=label)
 
 
-@in_browser
-def test_in_metres_the_list_has_room_for_both_coordinates(browser: Browser, tmp_path: Path) -> None:
-    tiny = cr.Asperities.hexagonal(spacing=25e-6, tip_radius=2e-4, within=1.02e-4)
-    scene = cr.Scene(0.01, tiny, cr.Material(1e11, 0.3), 0.5, "summit", ("m", "N"))
-    text = page_of(cr.press(scene, approach=5e-7))
-    (tmp_path / "slider.html").write_text(text, encoding="utf-8")
-    shown = Opened(browser, tmp_path / "slider.html")
-    chooser = shown.page.locator("#follow")
-    labels = chooser.locator("option").all_inner_texts()
-    assert "1: (2.5\xa0×\xa010⁻⁵, 0) m" in labels
-    room = chooser.evaluate("""list => {
-        const pen = document.createElement("canvas").getContext("2d");
-        pen.font = getComputedStyle(list).font;
-        const widths = [...list.options].map(each => pen.measureText(each.text).width);
-        return [Math.max(...widths) + 30, list.clientWidth];
-    }""")
-    assert room[0] < room[1]
-    shown.close()
-
-
-@in_browser
-@pytest.mark.parametrize("width", [1300, 1000, 400])
-def test_lines_of_the_certificate_are_not_clipped(opened: Opened, width: int) -> None:
-    opened.page.set_viewport_size({"width": width, "height": 900})
-    overflow = "text => text.scrollWidth - text.clientWidth"
-    assert opened.page.locator("#certificate").evaluate(overflow) <= 0
-
-
 def near(values: Any) -> Any:
     """A point of a loop is v_k - 2 v_i, each of five digits: off by 3 x 5e-5 at most."""
     return pytest.approx(values, rel=0.0, abs=1.5e-4 * np.abs(values).max())

@@ -267,15 +267,6 @@ def test_a_tilt_that_leaves_no_summit_is_named(command: Any, surface: cr.surface
         assert (found.status, "variance" in found.err) == (0, False)
 
 
-@pytest.mark.usefixtures("surface")
-def test_figures_in_the_formats_asked_for(command: Any) -> None:
-    assert command("summits", "scan.npz", "--formats", "pdf,png", "--dpi", "50").status == 0
-    assert {each.suffix for each in Path().glob("summits-*")} == {".pdf", ".png"}
-    assert Path("summits-map.pdf").read_bytes().startswith(b"%PDF")
-    width = int.from_bytes(Path("summits-map.png").read_bytes()[16:20], "big")
-    assert width < 300  # 4.4 inches
-
-
 def test_a_map_in_micrometres_called_millimetres(command: Any, surface: cr.surface.Surface) -> None:
     """Its slopes are right; only the base shows the mistake."""
     np.save("map.npy", surface.heights)
@@ -285,12 +276,3 @@ def test_a_map_in_micrometres_called_millimetres(command: Any, surface: cr.surfa
         said = command("summits", "map.npy", "--scene", "mm.toml", *options).err
         assert ("the map is 256 mm wide, and the base 20 mm: check the units" in said) == wrong
         assert ("asperities in contact: 1, fewer than 5" in said) == wrong
-
-
-@pytest.mark.usefixtures("surface")
-def test_mistakes_of_the_scene_are_named(command: Any) -> None:
-    scene = Path("scene.toml")
-    scene.write_text(scene.read_text().replace("radius = 10000.0", "radius = -1.0"))
-    outcome = command("summits", "scan.npz", "--scene", "scene.toml")
-    assert outcome.status == 2
-    assert outcome.err.startswith("convexrough: error: scene.toml: [sphere] radius: found -1")

@@ -78,21 +78,6 @@ def test_no_map(heights: object, message: str) -> None:
         cr.surface.Surface(heights, 1.0)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("pixel", "message"),
-    [
-        (0.0, "positive"),
-        ((1.0, -1.0), "positive"),
-        ((1.0, 20.0), "found 1 by 20, expected sides at most 1 to 10"),
-        ((1.0, 1.0, 1.0), "found 3 numbers"),
-        ("1", "positive number"),
-    ],
-)
-def test_no_pixel(pixel: object, message: str) -> None:
-    with pytest.raises(cr.InputError, match=message):
-        cr.surface.Surface(NOISE, pixel)  # type: ignore[arg-type]
-
-
 def test_nothing_but_trend() -> None:
     x, y = grid()
     with pytest.raises(cr.InputError, match="found nothing but a plane, expected a rough surface"):
