@@ -151,7 +151,7 @@ def program(
 
 
 def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Program:
-    """The program of a problem, given the loads (n,) of its solution in the problem's units."""
+    """The program of a problem, given the loads (n,) of its solution in scaled units."""
     if form not in FORMS:
         expected = f"a form of program; {checks.nearest(str(form), FORMS)}"
         raise InputError("form", found=repr(form), expected=expected)
