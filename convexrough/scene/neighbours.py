@@ -1,4 +1,4 @@
-"""Nearest neighbours of points, by a k-d tree."""
+"""Nearest neighbours of points."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from convexrough.errors import InputError
 #: Number of asperities per batch in `crowding`; each batch may reduce the pairs of the next. A
 #: heuristic, for speed.
 BATCH = 256
+
+#: Number of points up to which all distances are computed. It affects speed only.
+FEW = 400
 
 
 def separations(points: Array, point_error: float = 0.0) -> Array:
@@ -69,6 +72,10 @@ def refuse_coincident(points: Array) -> None:
 
 def nearest_distances(points: Array) -> Array:
     """(n,) [length] distance of each point to its nearest neighbour."""
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+    if len(points) <= FEW:
+        apart = np.hypot(*(points.T[:, None] - points.T[:, :, None]))
+        np.fill_diagonal(apart, np.inf)
+        return np.asarray(apart.min(axis=0))
+    from scipy.spatial import cKDTree  # takes as long to import as a small scene to compute
 
     return np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]

@@ -18,6 +18,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager, suppress
+from functools import partial
 from itertools import islice
 from types import ModuleType
 from typing import Any
@@ -165,13 +166,14 @@ def dask(address: str) -> Iterator[Executor]:
         from distributed import Client
     except ImportError as error:
         raise ExtraError("dask") from error
+    own = partial(Client, set_as_default=False)  # one that fails would stay the user's default
     try:
         if address == "local":
-            client = Client(n_workers=cores(), threads_per_worker=1, dashboard_address=None)
+            client = own(n_workers=cores(), threads_per_worker=1, dashboard_address=None)
         elif address.endswith(".json"):
-            client = Client(scheduler_file=address)
+            client = own(scheduler_file=address)
         else:
-            client = Client(address)
+            client = own(address)
     except (OSError, ValueError, TimeoutError) as error:
         expected = 'a scheduler of Dask that answers, its file, or "local"'
         raise InputError("scheduler", found=f"{address} ({error})", expected=expected) from error

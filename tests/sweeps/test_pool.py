@@ -184,6 +184,8 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
 
 
 def test_a_scheduler_that_does_not_answer() -> None:
+    """It is refused, and does not stay the client of all later work with Dask, which would wait."""
+    distributed = pytest.importorskip("distributed")
     config = pytest.importorskip("dask").config
     with (
         config.set({"distributed.comm.timeouts.connect": "1s"}),
@@ -193,6 +195,8 @@ def test_a_scheduler_that_does_not_answer() -> None:
         pass
     with pytest.raises(cr.InputError, match="scheduler: found nonsense"), dask("nonsense"):
         pass
+    with pytest.raises(ValueError, match="No client"):
+        distributed.default_client()
 
 
 @pytest.mark.sample(1)
