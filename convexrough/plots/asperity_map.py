@@ -28,7 +28,7 @@ from convexrough.plots.style import (
     round_ticks,
 )
 
-#: From DENSE discs on, vector files contain them as pixels; from CROWDED on, a mosaic replaces them.
+#: From DENSE discs on, vector files contain pixels; from CROWDED on, a mosaic replaces the discs.
 DENSE, CROWDED = 200, 3000
 
 #: Width of a mosaic in pixels.

@@ -91,7 +91,7 @@ class Program(Record):
         return self.energy_unit * (sign * objective + self.constant)
 
     def save(self, path: Path | str) -> None:
-        """Write the program to a file in the format of its ending.
+        """Write the program to a file, in the format of the file's ending.
 
         cones, dual : .cbf, .json (Clarabel) or .npz (sparse matrices)
         bristles    : .mps or .npz (qpsolvers, dense)

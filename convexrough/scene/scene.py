@@ -1,4 +1,4 @@
-"""The scene: a sphere or another base, asperities and materials, without loads and solutions."""
+"""The scene: a sphere or another base, asperities and material, without loads and solutions."""
 
 from __future__ import annotations
 
@@ -98,7 +98,8 @@ class Scene(Record):
     def contact_points(self) -> Array:
         """(n, 2) [length] the point at which each asperity first touches.
 
-        It is the summit r_i, or r_i R / (R + rho_i) along each axis in the geometry "closest".
+        It is the summit r_i, or in the geometry "closest" r_i R / (R + rho_i) along each axis, with
+        the radius R of the base and the tip radius rho_i.
         """
         if self.geometry == "summit" or not self.curved:
             return self.asperities.positions
@@ -108,14 +109,14 @@ class Scene(Record):
         return frozen(points)
 
     def far_radii(self, radius: float) -> Array:
-        """(n,) [length] R, or R + rho_i in the geometry "closest", for a radius R of the base."""
+        """(n,) [length] R, or in the geometry "closest" R + rho_i, for a radius R of the base."""
         if self.geometry == "summit":
             return even(radius, len(self))
         return frozen(radius + self.asperities.tip_radii)
 
     @cached_property
     def contact_tails(self) -> Array | None:
-        """(n, 2) [length] rounding errors of `contact_points`, to 2^-96 of these; None if exact."""
+        """(n, 2) [length] rounding errors of `contact_points`, to 2^-96; None if all are 0."""
         points = self.asperities.positions
         if self.contact_points is points:
             return None
@@ -147,10 +148,10 @@ class Scene(Record):
 
     @property
     def drops(self) -> Array:
-        """(n,) [length] drop of the base below its height on the axis.
+        """(n,) [length] distance of the undeformed base from its tangent plane on the axis.
 
-        It is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in the geometry "closest". For a base with
-        two radii it is the sum of such terms in x and y.
+        It is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in the geometry "closest", at the distance
+        r_i from the axis. For a base with two radii it is the sum of such terms in x and y.
         """
         squares, drops = self.asperities.positions**2, np.zeros(len(self))
         for R, axes in self.curved:
@@ -159,7 +160,7 @@ class Scene(Record):
 
     @property
     def offsets(self) -> Array:
-        """(n,) [length] offsets d_i = z_i - drop_i, the approach of each asperity less D0."""
+        """(n,) [length] offsets d_i = z_i - drop_i, with heights z_i: D0 + d_i is prescribed."""
         return frozen(self.asperities.heights - self.drops)
 
     @property
@@ -168,7 +169,7 @@ class Scene(Record):
         return frozen(6 * 2.0**-53 * (np.abs(self.asperities.heights) + self.drops))
 
     def reach(self, approach: float) -> float:
-        """[length] distance from the axis beyond which no such asperity can touch.
+        """[length] distance from the axis beyond which none of these asperities can touch.
 
         It is computed for the largest height and tip radius; inf on a flat base or a cylinder.
         """
@@ -191,7 +192,8 @@ def reach(
 ) -> float:
     """[length] distance r at which D0 + z = r^2 / (2 R)  (closest: r^2 / (2 (R + rho))).
 
-    If the base has two radii, R is the larger one.
+    D0 is the approach, z the height, R the radius of the base (the larger of two), rho the tip
+    radius.
     """
     radius = max(base.along(sphere_radius)) + (tip_radius if geometry == "closest" else 0.0)
     depth = approach + height
