@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def claim_options(command: Command) -> Command:
-    """Options for the questions of `verify` and for reading files."""
+    """Add the options for the questions of `verify` and for reading files."""
     called = "Header or number (from 1) of the column with load, x, y, ..."
     for option in (
         click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML."),
@@ -210,7 +210,7 @@ def _written(folder: Path, summary: dict[str, Any], found: Verified) -> list[Pat
 
 
 def _proof(file: SceneFile, found: Verified, scene: Path) -> Proof:
-    """The proof of the claimed loads."""
+    """The proof of the claimed loads and shear forces."""
     from convexrough.proof import prove
 
     verdict = found.verdict

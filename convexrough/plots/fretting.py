@@ -1,4 +1,4 @@
-"""Fretting of each asperity: slip, energy and tractions, as maps."""
+"""Maps of fretting: slip, energy and tractions of each asperity."""
 
 from __future__ import annotations
 

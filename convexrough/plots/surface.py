@@ -1,4 +1,4 @@
-"""Figures of a measured surface: its map with the summits, their histograms, and how to prune."""
+"""Figures of a measured surface: map with summits, histograms, and results against pruning."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def surface_figures(
 
     "map"         : heights, summits, and the contacts of a pressed surface
     "histograms"  : histograms of summits, with the curves that spectral moments predict
-    "provability" : contacts, crowding and model error by pruning, if `curve` is given
+    "provability" : contacts, crowding and model error against pruning, if `curve` is given
 
     maxima  : all summits of this surface;  summits : those left by pruning
     contact : the contact of the summits left by pruning
@@ -73,7 +73,7 @@ def surface_figures(
 
 
 def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
-    """The image of the heights in greys, drawn with labelled axes."""
+    """Draw the heights in greys, with labelled axes; return the image."""
     width, height = surface.size
     whole = (-width / 2, width / 2, -height / 2, height / 2)
     image = axes.imshow(surface.heights, origin="lower", extent=whole, cmap="gray",
@@ -112,7 +112,7 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
 
 
 def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
-    """Contacts, crowding and model error by pruning, shaded where they are unreliable.
+    """Contacts, crowding and model error against pruning, shaded where they are unreliable.
 
     chosen : the pruning that a dotted line marks
     """
@@ -189,7 +189,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
 
 
 def _draw_contacts(axes: Axes, contact: Contact) -> float:
-    """Half the width of the contacts, drawn with the smooth contact and the most crowded pair.
+    """Draw contacts, smooth contact and most crowded pair; return half the width of the contacts.
 
     Discs have their true size, or a smallest visible one.
     """
@@ -208,7 +208,7 @@ def _draw_contacts(axes: Axes, contact: Contact) -> float:
 
 
 def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
-    """The histograms of heights, tip radii and eccentricities, of all maxima and of those left."""
+    """Histograms of heights, tip radii and eccentricities, of all maxima and of those left."""
     figure = Figure(figsize=(DOUBLE, 2.7), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     moments, level = surface.moments, summits.origin.level
@@ -251,7 +251,7 @@ def _draw_both(axes: Axes, edges: Array, maxima: Array, summits: Array) -> None:
 
 
 def _bins(values: Array) -> Array:
-    """The edges of bins for all values; bins around the value if all are equal."""
+    """Edges of bins for all values; if all are equal, of bins around the value."""
     low, high = float(values.min()), float(values.max())
     size = max(abs(low), abs(high)) or 1.0
     room = high - low if high - low > 1e-9 * size else size

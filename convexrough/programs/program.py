@@ -91,7 +91,7 @@ class Program(Record):
         return self.energy_unit * (sign * objective + self.constant)
 
     def save(self, path: Path | str) -> None:
-        """Write the program to a file in the format of its ending.
+        """Write the program to a file, in the format of the file's ending.
 
         cones, dual : .cbf, .json (Clarabel) or .npz (sparse matrices)
         bristles    : .mps or .npz (qpsolvers, dense)
@@ -151,7 +151,7 @@ def program(
 
 
 def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Program:
-    """The program of a problem, given the loads (n,) of its solution in the problem's units."""
+    """The program of a problem, given the loads (n,) of its solution in scaled units."""
     if form not in FORMS:
         expected = f"a form of program; {checks.nearest(str(form), FORMS)}"
         raise InputError("form", found=repr(form), expected=expected)

@@ -13,7 +13,7 @@ from convexrough.errors import InputError
 Trend = Literal["plane", "sphere"]
 TRENDS: tuple[Trend, ...] = ("plane", "sphere")
 
-#: Largest number of Gauss-Newton steps to the best sphere, and the relative step that ends them.
+#: Largest number of Gauss-Newton steps to the best sphere, and the relative size of the last one.
 STEPS, ENOUGH = 50, 1e-12
 
 
@@ -53,7 +53,7 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
     with the curvature k / sqrt(1 + b^2 + c^2 - 2 a k), positive for a bowl. So
     z = 2 q / (1 + sqrt(1 - 2 k q)) with q = a + b x + c y + k (x^2 + y^2) / 2, and the derivatives
     of z by a, b, c, k are their factors over 1 - k z. The Gauss-Newton method starts at the best
-    paraboloid; for a plane one step is exact. Lengths are over half the map's size.
+    paraboloid. Lengths are over half the map's size.
 
     Raises InputError if no sphere fits.
     """

@@ -1,11 +1,10 @@
-"""The hills of a map: the positions and prominences of its maxima.
+"""The hills of a map: the positions and prominences of the maxima.
 
 The *prominence* of a maximum is its height above the highest pass on any way to a taller maximum.
 Wolf pruning (ISO 25178-2, ISO 16610-85) merges the hill with the least height above its highest
 saddle into the hill beyond this saddle, and repeats this until all heights exceed a threshold. The
 hill beyond the saddle is always taller, as the saddle bounds it, too. So a hill is merged exactly
-if its prominence is below the threshold. Prominences do not depend on the threshold, and one sort
-of the passes gives all of them.
+if its prominence is below the threshold, and one sort of the passes gives all prominences.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ class Hills(NamedTuple):
 def hills(heights: Array) -> Hills:
     """The pixels that are higher than all eight neighbours, and their prominences.
 
-    Pixels of equal height are ordered by position. So all but one maxima of a plateau have the
+    Pixels of equal height are ordered by position. All but one maxima of a plateau then have the
     prominence 0; these are left out.
     """
     order = np.argsort(heights, axis=None, kind="stable")

@@ -13,13 +13,13 @@ from convexrough.arrays import Array, Indices
 
 
 class Tips(NamedTuple):
-    """Paraboloids fitted about maxima. Only entries with `whole` true have a meaning.
+    """Paraboloids fitted about maxima. Only entries with `whole` True have a meaning.
 
     offsets    : (n, 2) [length] x and y of the top, relative to the pixel of the maximum
     heights    : (n,) [length] heights of the tops
     curvatures : (n, 2) [1/length] principal curvatures, the larger first
     deviations : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
-    whole      : (n,) true if curved downwards in every direction, with the top among the pixels
+    whole      : (n,) True if curved downwards in every direction, with the top among the pixels
     """
 
     offsets: Array
@@ -75,7 +75,7 @@ def elliptic_load(ratio: Array) -> Array:
         k1 / k2 = (E (a/b)^2 - K) / (K - E).
 
     The indentation is F2 times that of the sphere under the same load (Johnson 1985, eqs 4.26 to
-    4.28), and loads grow as indentation^(3/2).
+    4.28), and loads grow as indentation^(3/2), so the result is F2^(-3/2).
     """
     flattened = np.array(np.maximum(ratio, 1.0), dtype=np.float64)
     round_enough = flattened < 1 + 1e-7  # the error is below the square of 1e-7

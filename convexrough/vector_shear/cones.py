@@ -1,12 +1,13 @@
 """The friction problem with the full tangential kernel as one second-order cone program.
 
-M = B + shift is the kernel with a diagonal that makes it positive semidefinite, S the share of the
-shift in the local stiffness. A variable m_i >= |q_i| bounds the size of each force, and
-m_i / P_i = 1 - t_i^3. The local energy of m less shift m^2 / 2 is P_i threshold_i times
+The forces q, loads P, thresholds k, total T and kernel B are those of `problem`. M = B + shift is
+the kernel with a diagonal that makes it positive semidefinite, and S the ratio of the shift to the
+local stiffness. A variable m_i >= |q_i| bounds the size of each force, and m_i / P_i = 1 - t_i^3.
+The local energy of m less shift m^2 / 2 is P_i k_i times
 
     (3/5) t^5 - (S/3) t^6 - (1 - 2S/3) t^3 + 2/5 - S/3,
 
-which does not fall as m grows if S <= 1. So the sum of these energies and of the convex
+which does not decrease as m grows if S <= 1. So the sum of these energies and of the convex
 (1/2) q'Mq may be minimised over m_i >= |q_i| and sum q = T. The cones of `convexrough.convex.cones`
 represent the powers of t exactly, with four cones per asperity if all S_i <= 21/25, with five if
 S_i <= 1. The multiplier of the total is the rigid displacement; that of |q_i| <= m_i is the sum of
@@ -87,26 +88,26 @@ FIVE = _Lift(
 #: x y >= w^2 with x, y >= 0 is the second-order cone  x + y >= || (x - y, 2 w) ||.
 _SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 
-#: Below this fraction of gross sliding the state is proportional to T within the solver's accuracy:
-#: the program is solved at this fraction, and the result scaled. A heuristic.
+#: Below this fraction of gross sliding the state is proportional to T to the solver's accuracy, so
+#: the program is solved at this fraction and the result scaled. A heuristic.
 ELASTIC = 1e-9
 
-#: Accepted residual, including slips, over the accepted relative gap. A heuristic: at the default
-#: gap of 1e-8 energies determine forces to its square root, 1e-4, the accepted residual.
+#: Largest accepted residual over the largest accepted `duality_gap`. A heuristic: an energy with an
+#: error of 1e-8, the default, determines forces to the square root, 1e-4.
 SLIPS = 1e4
 
-#: Largest part of the way to the boundary of the cones in a step of Clarabel. Short steps are an
-#: order more accurate; a few problems need long ones. Heuristics, tried one after the other.
+#: Limits on Clarabel's steps, as parts of the way to the boundary of the cones, in order of trial.
+#: Short steps give a tenth of the error; a few problems need long ones. Heuristics.
 STEPS = (0.9, 0.99)
 
 
 @dataclass(frozen=True)
 class FrictionConic:
-    """Settings of the cone program for `shear_vector`, through Clarabel.
+    """A solver of `shear_vector` by a cone program, through Clarabel.
 
-    tolerance : tolerance of Clarabel for duality gap and feasibility. Its status is not used
-    accepted  : largest relative `duality_gap` of the result; its `residual` may be 1e4 times this.
-        Otherwise `solve` raises SolverError
+    tolerance : tolerance of Clarabel for duality gap and feasibility
+    accepted  : largest relative `duality_gap` of the result; `residual` may be 1e4 times as large.
+        Otherwise `solve` raises SolverError, whatever Clarabel reports
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load, solver=cr.FrictionConic())
     >>> state.residual < 1e-5
@@ -118,7 +119,7 @@ class FrictionConic:
     name: str = field(default="conic", init=False)
 
     def solve(self, problem: VectorProblem, total: Array) -> VectorState:
-        """The state of a total increment (2,), |T| < sum P (own units)."""
+        """The state under a total (2,), |T| < sum P, in scaled units."""
         scale = min(float(np.hypot(*total)) / (ELASTIC * problem.loads.sum()), 1.0)
         program = FrictionProgram.assemble(problem, total / scale)
         data, solver = program.apply(), f"friction ({self.name})"
@@ -173,7 +174,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
 
     @property
     def force(self) -> float:
-        """The unit of the total."""
+        """The unit of the total in the program."""
         return float(np.hypot(*self.total))
 
     def apply(self) -> ConeProgram:
@@ -182,7 +183,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return ConeProgram(*self._objective(), self._constraints(rows), constant, equalities=2)
 
     def _objective(self) -> tuple[csc_matrix, Array]:
-        """The quadratic and linear part: (1/2) q'Mq, and the local energies."""
+        """The quadratic and linear parts of (1/2) q'Mq plus the local energies."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
@@ -215,7 +216,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return constraints
 
     def _rows(self) -> Array:
-        """(n, rows, k) the rows of the cones of every asperity,  m / P >= |(x, y)|  first.
+        """(n, rows, k) the rows of the cones of every asperity, m / P >= |(x, y)| first.
 
         Each row is divided by the power of epsilon of its order.
         """
@@ -229,10 +230,10 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return np.concatenate((friction, rows), axis=1)
 
     def invert(self, raw: RawAnswer) -> VectorState:
-        """Forces, rigid displacement and slips from the solver's result and its multipliers.
+        """Forces, rigid displacement and slips, from the solver's variables and multipliers.
 
-        An interior point has |q_i| < P_i and a slip > 0 at every asperity. The asperity slides if
-        the slip exceeds the difference of its deflection from the threshold.
+        An interior-point method returns |q_i| < P_i and a slip > 0 everywhere. An asperity slides
+        if the slip exceeds the difference of its deflection from the threshold.
         """
         problem = self.problem
         n, P, thresholds = len(problem), problem.loads, problem.thresholds

@@ -84,7 +84,7 @@ def _columns(claim: Claim) -> dict[str, NDArray[Any]]:
 
 
 def describe_verdict(found: Verified) -> list[str]:
-    """Aligned lines: of each claim the wrong set, undecided, off, and the total, in this order."""
+    """Aligned lines on each claim: what is wrong, undecided, or inaccurate, and the total."""
     lines = [*found.notes, *describe_scene(found.verdict.scene)]
     for claim in found.claims:
         others = ": --json and --out have all"
@@ -116,7 +116,7 @@ def _size(claim: Claim) -> str:
 
 
 def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
-    """Aligned lines of one claim; `others` says where to find the rows that a table leaves out."""
+    """Aligned lines on one claim; `others` says where to find the rows that a table leaves out."""
 
     def table(which: Indices) -> list[str]:
         lines = _table(claim, scene, which[:MOST_LISTED])
@@ -141,7 +141,7 @@ def describe_claim(claim: Claim, scene: Scene, others: str = "") -> list[str]:
 
 
 def reason(claim: Claim) -> str:
-    """One line: the reasons why a claim does not hold; "" if it holds."""
+    """The reasons why a claim does not hold, on one line; "" if it holds."""
     counts = {"wrong statuses": len(claim.wrongly_claimed), "undecided": len(claim.undecided)}
     counts[f"{claim.one}s not within the tolerance"] = len(claim.off)
     parts = [f"{what} ({count:,})" for what, count in counts.items() if count]
@@ -151,7 +151,7 @@ def reason(claim: Claim) -> str:
 
 
 def junit(found: Verified | ConvexroughError) -> bytes:
-    """A JUnit test suite with a case for each check; or with the error in place of the cases."""
+    """A JUnit test suite with a case for each check, or with only the error."""
     suite = ElementTree.Element("testsuite", name="convexrough verify")
     if isinstance(found, Verified):
         kind, cases = "failure", list(_cases(found))
