@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from figure_checks import fits, texts
-from matplotlib.collections import EllipseCollection
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel
 
@@ -84,22 +83,6 @@ def test_fit_to_print(contact: cr.Contact) -> None:
         for axes in figure.axes[:2] if contact.loads.any() else ():
             assert axes.get_xlabel()
             assert axes.get_ylabel()
-
-
-@pytest.mark.sample(3)
-def test_a_disc_for_every_touching_asperity(contact: cr.Contact) -> None:
-    chart, *_ = press_figures(contact)["pressure"].axes
-    discs: list[Any] = [c for c in chart.collections if isinstance(c, EllipseCollection)]
-    touching = contact.loads > 0
-    if not 0 < touching.sum() < 3000:
-        assert not discs
-        return
-    a_H = (3 * contact.load * contact.scene.sphere_radius) ** (1 / 3)
-    a_H /= (4 * contact.scene.material.contact_modulus) ** (1 / 3)
-    outer = discs[0]
-    assert_allclose(outer.get_offsets(), contact.scene.contact_points[touching] / a_H, rtol=1e-12)
-    assert_allclose(outer.get_widths(), 2 * contact.contact_radii[touching] / a_H, rtol=1e-12)
-    assert all((inner.get_widths() < outer.get_widths()).all() for inner in discs[1:])
 
 
 def test_the_colours_and_the_profile_show_the_pressure() -> None:

@@ -111,14 +111,6 @@ def test_run_writes_the_page(command: Any, tmp_path: Path) -> None:
     assert "slider.html" in json.loads((tmp_path / "a-results/files.json").read_text())["files"]
 
 
-def test_without_friction_there_is_no_page_and_no_work(command: Any, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(scene_text())
-    ran = command("run", "a.toml", "--html")
-    assert ran.status == 2
-    assert "a.toml: friction" in ran.err
-    assert not (tmp_path / "a-results").exists()
-
-
 # In a browser.
 
 
@@ -234,15 +226,3 @@ def test_the_keyboard_moves_the_force(opened: Opened, contact: cr.Contact) -> No
     assert opened.text("said") == "0 of 37 slide, 37 stick in part"
     said = opened.page.locator("#force").get_attribute("aria-valuetext")
     assert said == "Q/(fP) = 0: 0 of 37 slide, 37 stick in part"
-
-
-@in_browser
-def test_an_asperity_is_followed_by_mouse_and_keyboard(opened: Opened, contact: cr.Contact) -> None:
-    opened.page.locator("#map circle.stick").first.click()
-    assert opened.page.locator("h2 .who").inner_text() == "0"
-    assert_shown(opened, contact, 0.5, 0)
-    opened.page.locator("#follow").focus()
-    opened.page.keyboard.press("End")
-    assert opened.page.locator("h2 .who").inner_text() == "36"
-    follow(opened, 7)
-    assert_shown(opened, contact, 0.5, 7)

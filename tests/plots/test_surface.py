@@ -65,13 +65,3 @@ def test_the_curve_is_drawn_where_it_is() -> None:
     assert_allclose(lower.lines[0].get_ydata(), 100 * curve.model_error)
     title = upper.get_title(loc="left")
     assert title.startswith(f"advised pruning: at least {100 * curve.trusted_from:.3g} %")
-
-
-def test_one_summit() -> None:
-    y, x = np.mgrid[:9, :9] - 4.0
-    one = cr.surface.Surface(-(x**2) - y**2, 1.0)
-    summits = one.summits()
-    assert len(summits) == 1
-    curve = cr.surface.provability(summits, lambda left: press(left, 1e-3), levels=[0.1])
-    for figure in surface_figures(one, summits, summits, curve, press(summits, 1e-3)).values():
-        fits(figure)

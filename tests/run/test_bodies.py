@@ -61,9 +61,6 @@ def test_a_base_without_an_end_needs_an_extent(tmp_path: Path, radius: str, norm
 
 
 WRONG = [
-    ({"radius": "-inf"}, "[sphere] radius: found -inf, expected a positive number, or inf where"),
-    ({"radius": "nan"}, "[sphere] radius: found nan, expected a positive number, or inf where"),
-    ({"radius": "[1.0, 2.0, 3.0]"}, "[sphere] radius: found [1.0, 2.0, 3.0], expected two radii"),
     ({"radius": "[1.0, -2.0]"}, "[sphere] radius[1]: found -2.0, expected a positive number, or"),
     ({"radius": "1e99"}, "[sphere] radius: found 1e+99, expected a size from"),
     (
