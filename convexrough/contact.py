@@ -246,7 +246,6 @@ def levels_of(contact: Contact) -> Levels:
 
 
 def _proved_again(contact: Contact) -> tuple[NormalProblem, Trial, Proved | Obstacle]:
-    """The problem of a contact, its refined loads, and what is proved from them."""
     load = contact.prescribed_load
     approach = contact.approach if load is None else None
     problem = NormalProblem.assemble(

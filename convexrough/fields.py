@@ -172,10 +172,7 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
 def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
-    """sum_i profile(|r - r_i|, i) over the discs that contain r, found by k-d trees.
-
-    Discs are searched in groups with radii that differ by less than a factor 2.
-    """
+    """sum_i profile(|r - r_i|, i) over the discs that contain r, by trees of similar radii."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     places = _places(points)
@@ -211,7 +208,6 @@ def _sum_everywhere(
 
 
 def _places(points: ArrayLike) -> Array:
-    """The points as float64, shape (..., 2), all finite."""
     expected = "finite numbers of shape (..., 2): x and y of each point"
     try:
         places = np.asarray(points, dtype=np.float64)

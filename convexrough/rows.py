@@ -206,7 +206,6 @@ def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
 
 
 def _reach(problem: NormalProblem, loads: Array) -> Array:
-    """Squared contact radii [length^2] of smooth spheres under these loads."""
     scene, force = problem.scene, loads * problem.units.force
     a = hertz.contact_radius(force, scene.material.contact_modulus, scene.mean_radius)
     return np.asarray(a**2)

@@ -185,7 +185,6 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
 def _timed(
     row: Row, prepare: Callable[[], Any], work: Callable[[Any], Any], patience: float
 ) -> tuple[Row, Any]:
-    """The row with time and memory, and the first result; None where the work raises an error."""
     memory = MemoryRise()
     try:
         found = work(prepare())

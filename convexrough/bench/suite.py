@@ -109,11 +109,7 @@ def run(*, quick: bool) -> Bench:
 
 
 def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]:
-    """The rows of all attempts on one scene.
-
-    The default solver and those that seem to be faster are timed again, alternately. Each keeps the
-    least time, so that a short load on the machine does not change the order.
-    """
+    """The rows of all attempts on one scene; apparently faster ones are timed again."""
     LOGGER.info(f"{family}, about {size:,}: reference")
     each = scene(family, REFINEMENTS[size])
     problem = NormalProblem.assemble(each, approach=APPROACH)

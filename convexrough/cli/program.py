@@ -47,8 +47,8 @@ COMPLETE = "_CONVEXROUGH_COMPLETE"
 def program() -> None:
     """Compute rough frictional contact, with a proof of which asperities touch.
 
-    Exit status: 0 done, everything proved; 1 standard output closed or full; 2 wrong input; 3 done,
-    not everything proved; 4 a solver failed; 130 interrupted.
+    Exit status: 0 done, everything proved; 1 output closed or full, or a proof refused; 2 wrong
+    input; 3 done, not everything proved; 4 a solver failed; 130 interrupted.
     """
 
 
@@ -84,7 +84,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _status(arguments: Sequence[str] | None) -> int:
-    """The exit status of a command, or of a shell's request for completions."""
     if arguments is None and (asked := os.environ.get(COMPLETE)):
         return shell_complete(program, {}, "convexrough", COMPLETE, asked)
     given = sys.argv[1:] if arguments is None else list(arguments)

@@ -45,7 +45,6 @@ NO_OTHERS, UNKNOWN = OtherSolutions(False, np.inf, True), OtherSolutions(True, 0
 
 
 def _radii(problem: NormalProblem, loads: Array) -> Array:
-    """(n,) [length] contact radii under loads, rounded up."""
     radii: Array = np.pi / 2.0 * problem.influence.scale / problem.stiffness(loads) * (1 + SAFETY)
     return radii
 

@@ -391,7 +391,6 @@ def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple
 
 
 def _exact_coefficients(tips: Array, *constants: Any) -> Ball:
-    """The local coefficients k of tip radii (n,)."""
     curvature, cubed, _ = _constants(*constants)
     return ((1.0 / Ball.exact(tips) + curvature) * cubed).cbrt()
 

@@ -210,7 +210,6 @@ class _Missing(NamedTuple):
         return cls(*(np.where(known, part * each, np.inf) for each in (loads, coupled, rest)))
 
     def errors(self, within: Any, stiffness: Array) -> Array:
-        """(n,) bounds on the errors of the loads."""
         return np.asarray(within / np.sqrt(stiffness) * (1 + SAFETY) + self.loads)
 
 

@@ -256,7 +256,6 @@ def build_scene(
 
 
 def _material(study: Study) -> Material:
-    """The material of the contact, from one table or from the tables of both bodies."""
     from convexrough.run.study import BodiesTable
 
     def of(body: Any) -> Material:

@@ -104,10 +104,7 @@ def _nearest_sites(points: Array, basis: Array) -> Sites:
 
 
 def _shortest(points: Array) -> Array | None:
-    """The two shortest vectors (2, 2) between points near the origin; None if all are on a line.
-
-    On a lattice without too many missing points this is the reduced basis (Lagrange and Gauss).
-    """
+    """The reduced basis (2, 2), from points near the origin; None if these are on a line."""
     squares = (points**2).sum(axis=1)
     few = min(len(points), 64)
     nearby = points[np.argpartition(squares, few - 1)[:few]]

@@ -210,11 +210,7 @@ def judged(
 def _pressed_on(
     problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
 ) -> Array:
-    """(m,) the `ratios` of TooDenseError for members on a cut face, 0 for others.
-
-    For each member the smaller of two relative distances counts, as one of them is 0 at the
-    solution: that of the indentation above the end of the box, and that of the load below it.
-    """
+    """(m,) the `ratios` of TooDenseError for members that a cut face stops, 0 for others."""
     k = problem.coefficients[boxes.members]
     wanted = indentation[boxes.members] / hertz.indentation(boxes.loads, k)
     room = 1.0 - loads[boxes.members] / boxes.loads

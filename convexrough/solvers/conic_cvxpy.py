@@ -236,8 +236,6 @@ _LIFT = ("y1", "y2", "y3", "y4", "y5", "z")
 
 
 def _cones(cp: Any, y1: Any, y2: Any, y3: Any, y4: Any, y5: Any, z: Any, *, five: bool) -> Any:
-    """The cones of (1) and (2) of docs/theory/exact-cones.md: x y >= w^2 with x, y >= 0."""
-
     def rotated(x: Any, y: Any, w: Any) -> Any:
         return cp.SOC(x + y, cp.vstack([x - y, 2 * w]), axis=0)
 

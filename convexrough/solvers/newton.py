@@ -70,7 +70,6 @@ class Newton:
         return replace(answer, refine=not self.tolerance > 0)
 
     def _found(self, problem: NormalProblem, start: Array | None) -> tuple[Array, float, int]:
-        """The loads (n,), the approach and the number of steps."""
         indentation = _start(problem, start)
         highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
@@ -141,6 +140,5 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
 
 
 def _everywhere(problem: NormalProblem, near: Indices, state: PressingState) -> tuple[Array, Array]:
-    """Loads and gaps of all candidates; those that are not near carry no load."""
     loads = among_zeros(state.forces, near, len(problem))
     return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)

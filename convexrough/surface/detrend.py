@@ -86,6 +86,5 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
 
 
 def _least_squares(factors: list[Array], misfit: Array) -> Array:
-    """The least-squares coefficients of the factors, from the normal equations."""
     normal = [[float(np.vdot(one, other)) for other in factors] for one in factors]
     return np.asarray(np.linalg.solve(normal, [float(np.vdot(each, misfit)) for each in factors]))

@@ -201,12 +201,7 @@ def _headed(
 def _listed(
     header: list[str], line: TextRow, rows: list[TextRow], style: Style
 ) -> tuple[list[str], list[TextRow]]:
-    """The header and rows of a finite-element listing, in which `line`, the header, is repeated.
-
-    If there are more names than numbers below, two spaces separate names. Titles are left out: they
-    stand directly below the first header or above another one, begin with no number, and have
-    another number of cells. So are lines at the end that begin with text, such as totals.
-    """
+    """The header and rows of a finite-element listing that repeats `line`, and has titles."""
     first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), 0)
     width = len(rows[first].cells) if rows else 0
     apart = re.split(r"\s{2,}", line.text.strip())

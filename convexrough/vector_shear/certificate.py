@@ -85,7 +85,6 @@ def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> 
 
 
 def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """The bounds by steps 1 to 6."""
     sure, softness = problem.sure, problem.softness
     reach = problem.reach
     limits, thresholds = problem.load_balls, problem.threshold_balls
@@ -228,7 +227,6 @@ def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Arr
 
 
 def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
-    """The better of two proofs, for each bound."""
     return VectorBounds(
         found.proved or other.proved,
         np.fmin(found.increments, other.increments),

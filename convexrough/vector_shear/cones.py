@@ -199,7 +199,6 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return sparse.csc_matrix(sparse.block_diag((upper, nothing))), linear
 
     def _constraints(self, rows: Array) -> csc_matrix:
-        """Rows of sum q = T over |T|, and then of the cones of every asperity."""
         from scipy import sparse
 
         n, _, variables = rows.shape
@@ -216,10 +215,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return constraints
 
     def _rows(self) -> Array:
-        """(n, rows, k) the rows of the cones of every asperity, m / P >= |(x, y)| first.
-
-        Each row is divided by the power of epsilon of its order.
-        """
+        """(n, rows, k) rows of the cones over epsilon^order, with m / P >= |(x, y)| first."""
         lift, small = self.lift, self.small[:, None]
         leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
         powers = np.maximum(lift.orders - leading, 0.0)

@@ -125,10 +125,7 @@ class _Friction:
         return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
 
     def noise(self, state: _Iterate) -> float:
-        """A lower bound on the rounding error of F, which ends the steps on symmetric layouts.
-
-        There the part of F across X can halve at every step until it underflows.
-        """
+        """A lower bound on the rounding of F, which ends steps on symmetric layouts."""
         return ROUNDOFF * state.scale
 
     def advice(self, state: _Iterate) -> str:
@@ -184,11 +181,7 @@ def _roots(problem: VectorProblem, eta: Array) -> Array:
 
 
 def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | None:
-    """eta + s, with the vector s for which the forces add up to the total; None if not found.
-
-    s minimises a convex function with the gradient sum q(eta + s) - T, by Newton's method with
-    steps halved while they overshoot.
-    """
+    """eta + s, with the vector s for which forces add up to T; None if it is not found."""
     shift = np.zeros(2)
     excess = problem.local_forces(eta).sum(axis=0) - total
     size = float(np.hypot(*total))

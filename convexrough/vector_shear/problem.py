@@ -80,7 +80,6 @@ class VectorProblem(Loaded):
 
     @classmethod
     def _assemble(cls, contact: Contact) -> Self:
-        """The problem of a contact. Raises InputError if B does not fit in memory."""
         checks.fits_in_memory("loaded asperities", len(contact.loads.nonzero()[0]), 160, power=2)
         loaded = Loaded.of(contact)
         n = len(loaded)

@@ -82,7 +82,6 @@ class GradientStage(Stage):
         return cycle(contact, maximum=force).gradient(holding=self.holding)
 
     def _in_the_file(self, error: InputError) -> InputError:
-        """The error, with the name of a force replaced by the key of the scene file."""
         if error.what not in ("force", "maximum"):
             return error
         found = f"{self.fraction:g}, a force of {error.found}"
