@@ -1,9 +1,8 @@
 """Comparison of all formulations and solvers on one scene: agreement, certificate and time.
 
-One code certifies all results, independently of the solver. A certificate of global scope proves
-that the solution is the only one. If another certified result differs from it by more than
-the bounds, the mathematics or the code of the package has a mistake. Two certificates of local
-scope may differ by more than their bounds: each box may contain a solution of its own.
+One code certifies all results, independently of the solver. If a certified result contradicts one
+of global scope, the mathematics or the code of the package has a mistake. Two certificates of local
+scope may differ: each box may contain a solution of its own.
 """
 
 from __future__ import annotations

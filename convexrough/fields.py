@@ -50,7 +50,7 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
     """(...) [length] sum of both surfaces' normal displacements, relative to the distant bodies.
 
-    It is the sum of the fields of all asperities, with Hertz pressures and not point forces.
+    Each asperity contributes the field of its Hertz pressure.
     """
     touching = np.flatnonzero(contact.loads)
     centres = contact.scene.contact_points[touching]
@@ -129,7 +129,6 @@ def cell_areas(points: Array) -> Array:
     points : (n, 2) [length]
 
     Each Delaunay triangle adds (edge)^2 cot(opposite angle) / 8 to both ends of each of its edges.
-    It takes about 2 s for 1e5 points.
     """
     from scipy.spatial import Delaunay, QhullError  # takes 0.1 s to import
 

@@ -1,7 +1,7 @@
 """Press and cycle scenes with equal numbers of asperities together, as rows of a stack.
 
-Scenes with the same positions and tip radii are a family: they share one matrix, so that one
-product of matrices serves all of them. Scenes that are not proved in this way are left out.
+Scenes with the same positions and tip radii are a family, which shares one matrix. Scenes that are
+not proved in this way are left out.
 """
 
 from __future__ import annotations

@@ -61,12 +61,9 @@ def approach_bound(
     offsets: Array,
     load: float | Array,
 ) -> Any:
-    """Upper bound on the approach D0 at every solution of total load L.
+    """Upper bound on the approach at every solution of total load L.
 
-    Equation (2) of docs/theory/certificate.md: with q = weights / sum(weights), alpha_i = q_i k_i
-    and c = A q, for every lambda >= max c,
-
-        D0 <= lambda L + (4/27) sum alpha_i^3 / (lambda - c_i)^2 - d'q.
+    It is (2) of docs/theory/certificate.md, with q = weights / sum(weights), alpha = q k, c = A q.
 
     weights      : (n,) approximate loads, not negative, not all 0
     displacement : (n,) A times weights, or more
@@ -158,12 +155,12 @@ def all_that_could_touch(
 ) -> tuple[Scene, float]:
     """The scene with all asperities that could touch under a load, and a bound on the approach.
 
-    scene_within : returns the scene within a distance from the axis [length]; a greater distance
-        only adds asperities
+    scene_within : returns the scene within a distance from the axis [length]
     farthest     : returns the largest distance of asperities that can touch at an approach [length]
 
-    The bound of a wide scene also holds for a narrower one that keeps all asperities of the
-    approximate loads, because lambda is at least the displacement at every asperity.
+    The bound of a wide scene also holds for a narrower one with all asperities of the approximate
+    loads, as lambda of (2) of docs/theory/certificate.md is at least the displacement at every
+    asperity.
     """
     axis = scene_within(0.0)
     modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))

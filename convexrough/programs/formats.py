@@ -1,8 +1,4 @@
-"""File formats of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF and MPS.
-
-CBF has its own writer here: among the Python packages that write it, MOSEK and COPT are commercial,
-and PICOS (2.6) fails on every problem.
-"""
+"""File formats of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF and MPS."""
 
 from __future__ import annotations
 

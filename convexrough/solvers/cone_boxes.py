@@ -1,10 +1,9 @@
 """The choice of boxes and the check of answers, for all solvers of the cone program.
 
-The cone program (docs/theory/exact-cones.md) is exact on boxes 0 <= P_i <= B_i of loads whose
-convexity numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most 21/25 (four cones) or 1 (five),
-with `shells` and coefficients k of the problem. A box that contains the a priori bound is used if
-it is small enough, and cut otherwise. If the solution reaches a cut face, five cones are tried; if
-it does so again, the scene is refused ("Which box").
+docs/theory/exact-cones.md, "Which box" and "What comes back". The program is exact on boxes
+0 <= P_i <= B_i of loads whose convexity numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most
+21/25 (four cones) or 1 (five), with `shells` and coefficients k of the problem. If the solution
+reaches a cut face, five cones are tried; if it does so again, the scene is refused.
 """
 
 from __future__ import annotations

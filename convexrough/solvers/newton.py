@@ -1,15 +1,9 @@
-"""Newton's method for the normal problem.
+"""Newton's method for the normal problem: docs/theory/newton.md.
 
 The unknown delta is the indentation of a touching asperity, and minus the gap of an open one. With
-P_i = (max(delta_i, 0) / k_i)^(3/2) the whole contact law is the square system
-
-    F(delta) = delta + A P(delta) - D = 0,
-
-which `convex.newton` solves (docs/theory/newton.md, with k, A and D = D0 + d of `NormalProblem`).
-Where the energy Phi is convex, every step reduces Phi(P(delta)).
-
-For many asperities the iteration includes only those near the contact. When it has ended, the gaps
-of the others are computed; if one of them is negative, the iteration goes on with more asperities.
+P_i = (max(delta_i, 0) / k_i)^(3/2) the contact law is  F = delta + A P - D = 0,  with k, A and
+D = D0 + d of `NormalProblem`. For many asperities the iteration includes only those near the
+contact, until the others are found to be open.
 """
 
 from __future__ import annotations

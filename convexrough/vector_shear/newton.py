@@ -1,16 +1,13 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
-The unknown eta_i is the sum of deflection and slip of asperity i. The shear force
-q_i = P_i force(|eta_i| / threshold_i) is parallel to eta_i, and `convex.newton` solves
+docs/theory/vector-friction.md, "Newton's method", in scaled units: the unknown eta_i is the sum of
+deflection and slip of asperity i, and `convex.newton` solves
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T.
 
-Asperities with |eta_i| > threshold_i slide. With dq_i/deta_i = W_i W_i' (of rank 1 where sliding:
-the force can still turn) a step solves
+With dq_i/deta_i = W_i W_i' a step solves
 
     (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y.
-
-The matrix is symmetric, and positive definite if the energy is convex.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 `shear` uses the approximation of Ciavarella and Jaeger. Here tangential point forces move the
 surface by Cerruti's tensor, so forces and slips are vectors, which turn a little from the direction
-of the shear force. The state minimises a convex energy (docs/theory/vector-friction.md).
+of the shear force (docs/theory/vector-friction.md).
 """
 
 from __future__ import annotations
