@@ -214,7 +214,7 @@ def curvatures(value: Any) -> list[Fraction]:
     radii = as_list(value, 2) if isinstance(value, list) else [value, value]
     found = [Fraction(0) if text == "inf" else number(text) for text in radii]
     if any(text != "inf" and radius <= 0 for text, radius in zip(radii, found, strict=True)):
-        raise Refused("a radius of the base is not positive")
+        raise Refused("a radius of the sphere is not positive")
     return [1 / radius if radius else radius for radius in found]
 
 

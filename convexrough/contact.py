@@ -359,7 +359,7 @@ def closest_changes(contact: Contact) -> Array:
     """(n,) [force] first-order load changes on a change to the "closest" geometry.
 
     They are 0 if the scene has this geometry. There an asperity of tip radius rho, at a distance r
-    from the axis of a base of radius R, meets the base at r R / (R + rho). So its offset is greater
+    from the axis of a sphere of radius R, meets it at r R / (R + rho). So its offset is greater
     by r^2 rho / (2 R (R + rho)), and compliances are greater by a fraction of about rho / R. At the
     same approach, with the compliance operator A,
 

@@ -37,9 +37,9 @@ def limits_of(contact: Contact) -> dict[str, Any]:
     """Measures of the validity of the model, by name; those without a unit are ratios or counts.
 
     contact      : number of asperities that touch;  covered, crowding : as in `Contact`
-    extent       : largest distance of a point of contact from the axis, over the base's radius
+    extent       : largest distance of a point of contact from the axis, over the sphere's radius
     array_extent : for each of the axes x and y, the largest distance of a summit from the centre,
-        over the half width of the smooth base's contact under the same load; the smaller of the two
+        over the half width of the contact of a smooth sphere at this load; the smaller of the two
         ratios, or None without such a contact
     all_touch    : True if every asperity of the scene touches
     steepness    : largest ratio of contact radius to tip radius
@@ -113,15 +113,15 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         )
     if normal["extent"] > STEEP:
         yield (
-            f"contact extends to {normal['extent']:.3g} of the base's radius from the axis: from "
+            f"contact extends to {normal['extent']:.3g} of the sphere's radius from the axis: from "
             f"{STEEP:g} on, the paraboloid of the model differs from a sphere by more than 1 %"
         )
     cut_off = normal["contact"] >= ARRAY and normal["array_extent"] is not None
     if cut_off and normal["array_extent"] < CUT_OFF:
         yield (
             f"contact reaches the rim of the array, which ends at {normal['array_extent']:.3g} of "
-            "the contact radius of the smooth base: the loads depend on where it ends; check the "
-            "unit of the base's radius, or use a larger array"
+            "the contact radius of a smooth sphere: the loads depend on where it ends; check the "
+            "unit of the sphere's radius, or use a larger array"
         )
     elif cut_off and normal["all_touch"]:
         yield (

@@ -132,7 +132,7 @@ def write_results(
 def slider_page(pressed: Result) -> str:
     """An HTML page with a slider for the shear force; this call computes the states on it.
 
-    Raises InputError if the scene has no friction, or another base than a sphere.
+    Raises InputError if the scene has no friction, or another shape than a sphere.
     """
     from convexrough.plots.slider import Slides, slider_html  # matplotlib: only when it draws
 

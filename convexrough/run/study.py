@@ -232,7 +232,7 @@ def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:
     if math.inf in (radius if isinstance(radius, list) else [radius]):
         yield (
             "asperities",
-            ("[asperities] within: missing, needed with a flat base or a cylinder (infinite)"),
+            ("[asperities] within: missing, needed with a flat or a cylinder (infinite)"),
         )
     elif (
         isinstance(lattice.get("tip_radius"), list)

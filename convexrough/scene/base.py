@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 from convexrough import checks
 from convexrough.errors import InputError
 
-#: R of a sphere or flat, or (Rx, Ry) of another base.
+#: R of a sphere or flat, or (Rx, Ry) of another shape.
 Radius: TypeAlias = float | tuple[float, float]
 
 
@@ -47,16 +47,16 @@ def curved(radius: Radius) -> list[tuple[float, slice]]:
 def named(radius: Radius) -> str:
     """The name of the shape."""
     if not curved(radius):
-        return "a flat base"
+        return "a flat"
     if not isinstance(radius, tuple):
         return "a sphere"
     return "a cylinder" if math.inf in radius else "an ellipsoid"
 
 
 def sphere_radius(radius: Radius, what: str) -> float:
-    """The radius of a sphere. Raises InputError for other bases."""
+    """The radius of a sphere. Raises InputError for other shapes."""
     if isinstance(radius, tuple) or not curved(radius):
-        raise InputError(what, found=named(radius), expected="a scene whose base is a sphere")
+        raise InputError(what, found=named(radius), expected="a sphere")
     return radius
 
 

@@ -1,4 +1,4 @@
-"""The scene: a sphere or another base, asperities and material, without loads and solutions."""
+"""The scene: a sphere or another shape, asperities and material, without loads and solutions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Geometry = Literal["summit", "closest"]
 class Scene(Record):
     """A sphere, the asperities on which it is pressed, and the material of both.
 
-    sphere_radius : [length] R of a sphere; inf for a flat base; a pair (Rx, Ry) for an ellipsoid
+    sphere_radius : [length] R of a sphere; inf for a flat; a pair (Rx, Ry) for an ellipsoid
         with axes along x and y, one of them inf for a cylinder
     friction      : Coulomb's coefficient f; required only for shear
     geometry      : position of each contact: "closest" (where the two undeformed paraboloids are
@@ -70,18 +70,18 @@ class Scene(Record):
 
     @property
     def curved(self) -> list[tuple[float, slice]]:
-        """Each finite radius [length] of the base, with the axes (0 is x, 1 is y) that have it."""
+        """Each finite radius [length], with the axes (0 is x, 1 is y) that have it."""
         return base.curved(self.sphere_radius)
 
     @property
     def curvature(self) -> float:
-        """[1 / length] curvature of the base: 1/R, or the mean (1/Rx + 1/Ry) / 2."""
+        """[1 / length] curvature of the sphere: 1/R, or the mean (1/Rx + 1/Ry) / 2."""
         Rx, Ry = base.along(self.sphere_radius)
         return (1.0 / Rx + 1.0 / Ry) / 2.0
 
     @property
     def mean_radius(self) -> float:
-        """[length] radius of the sphere with the mean curvature of the base; inf if it is flat."""
+        """[length] radius of a sphere with the same `curvature`; inf for a flat."""
         R = self.sphere_radius
         return 1.0 / self.curvature if isinstance(R, tuple) else R
 
@@ -109,7 +109,7 @@ class Scene(Record):
         return frozen(points)
 
     def far_radii(self, radius: float) -> Array:
-        """(n,) [length] R, or in the geometry "closest" R + rho_i, for a radius R of the base."""
+        """(n,) [length] R, or in the geometry "closest" R + rho_i, for a radius R of the sphere."""
         if self.geometry == "summit":
             return even(radius, len(self))
         return frozen(radius + self.asperities.tip_radii)
@@ -151,7 +151,7 @@ class Scene(Record):
         """(n,) [length] distance of the undeformed base from its tangent plane on the axis.
 
         It is r_i^2 / (2 R), or r_i^2 / (2 (R + rho_i)) in the geometry "closest", at the distance
-        r_i from the axis. For a base with two radii it is the sum of such terms in x and y.
+        r_i from the axis. With two radii it is the sum of such terms in x and y.
         """
         squares, drops = self.asperities.positions**2, np.zeros(len(self))
         for R, axes in self.curved:
@@ -171,7 +171,7 @@ class Scene(Record):
     def reach(self, approach: float) -> float:
         """[length] distance from the axis beyond which none of these asperities can touch.
 
-        It is computed for the largest height and tip radius; inf on a flat base or a cylinder.
+        It is computed for the largest height and tip radius; inf on a flat or a cylinder.
         """
         return reach(
             approach,

@@ -30,14 +30,14 @@ def smooth(scene: Scene, *, load: float) -> SmoothSphere:
 
     load : [force] normal load P
 
-    Raises InputError for a flat base or a cylinder, which have no smooth contact of finite size.
+    Raises InputError for a flat or a cylinder, which have no smooth contact of finite size.
 
     >>> print(f"{cr.smooth(scene, load=contact.load).approach:.4g}")  # the rough one's is 5e-5
     4.184e-05
     """
     checks.instance("scene", scene, Scene)
     if (found := smooth_reference(scene, checks.positive("load", load))) is None:
-        expected = "a sphere or an ellipsoid: other bases have no smooth reference"
+        expected = "a sphere or an ellipsoid: other shapes have no smooth reference"
         raise InputError("scene", found=base.named(scene.sphere_radius), expected=expected)
     return found
 

@@ -278,7 +278,7 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
         width, diameter = max(surface.size), 2 * min(along(contact.scene.sphere_radius))
         if width > diameter:
             yield (
-                f"the map is {width:.4g} {surface.unit} wide, and the base {diameter:.4g} "
+                f"the map is {width:.4g} {surface.unit} wide, and the sphere {diameter:.4g} "
                 f"{surface.unit}: check the units of the map (--unit, --pixel) and of the radius"
             )
     if scanned.whole is not None:

@@ -174,7 +174,7 @@ class CycleResult(Result):
         return self.printed if self.smooth else over
 
     def lines(self) -> list[str]:
-        said = "no W/W0: a flat base or a cylinder has no smooth reference"
+        said = "no W/W0: a flat or a cylinder has no smooth reference"
         return [*super().lines(), *([] if self.smooth else [said])]
 
     def figures(self) -> Mapping[str, Any]:
