@@ -56,7 +56,7 @@ class Record:
     def __setstate__(self, state: dict[str, Any]) -> None:
         for value in state.values():
             if isinstance(value, np.ndarray):
-                value.flags.writeable = False  # a pickle does not store this
+                value.flags.writeable = False  # pickles do not store this flag
         self.__dict__.update(state)
 
     def _fields(self) -> Any:

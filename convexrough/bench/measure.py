@@ -140,7 +140,7 @@ def measure_attempt(
         return row
     problem, solution = found
     loads = np.zeros(len(scene))
-    loads[problem.candidates] = solution.loads * problem.units.force  # a power of two
+    loads[problem.candidates] = solution.loads * problem.units.force  # exact, by a power of two
     return replace(
         row,
         touching=int(np.count_nonzero(loads)),

@@ -36,7 +36,7 @@ def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, softness = indentation - highest, 1.0 / coefficients
-    most = hertz.indentation(load, largest(coefficients))  # if one asperity bears the whole load
+    most = hertz.indentation(load, largest(coefficients))  # of one asperity under the whole load
     shift = np.minimum(most, np.maximum(highest, 1e-9 * most))
     for steps in range(200):
         ratio = np.maximum(indentation + shift, 0.0) * softness
@@ -75,7 +75,7 @@ def approach_bound(
     cubes = (q * coefficients) ** 3
     highest, wanted = largest(c), 27.0 * load / 8.0
     if q.ndim == 1:
-        active, cubes = c[cubes > 0], cubes[cubes > 0]  # others do not matter
+        active, cubes = c[cubes > 0], cubes[cubes > 0]  # only these matter
     else:
         active = np.where(cubes > 0, c, -np.inf)
     # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L. Newton's method from the
@@ -87,7 +87,7 @@ def approach_bound(
         parts = cubes * (nearer * nearer * nearer)
         excess, slope = summed(parts), summed(parts * nearer)
         step = (np.cbrt(excess / wanted) - 1.0) * excess / slope
-        height = height + np.fmax(step, 0.0)  # nan in float64: high enough
+        height = height + np.fmax(step, 0.0)  # a step of nan means that it is high enough
         if not (step > 1e-3 * (height - least)).any():
             break  # any height gives a bound; this one is close to the best
     height = np.maximum(height, highest)
@@ -114,7 +114,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     couplings: list[tuple[Indices | slice, Coupling]]
     if few:
         couplings = [(which, sources)]
-    elif sources.name == "lattice":  # one box for all
+    elif sources.name == "lattice":  # one box of sites for all
         couplings = [(slice(None), sources.onto(scene.contact_points))]
     else:
         couplings = [(touching, sources), (others, sources.onto(scene.contact_points[others]))]

@@ -187,7 +187,7 @@ class NormalProblem:
         if self.influence.stored and float(np.abs(change.high).max()) > small:
             return self.product(others)
         moved, off = self.influence.apply(change.high), self.influence.rounding(change.high)
-        most = self.row_norm * float(np.linalg.norm(change.high))  # of A |change|, by Cauchy
+        most = self.row_norm * float(np.linalg.norm(change.high))  # bounds A |change|
         error = (off.relative + 2 * ROUNDOFF) * most + off.each
         return product + Ball.around(moved, error * (1 + SAFETY))
 

@@ -163,7 +163,7 @@ class ConeSolver(ABC):
 def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> Solution:
     """The checked solution with one form of the cones."""
     most = float(boxes.loads.sum())
-    if problem.load is not None and most <= problem.load:  # no state in the boxes carries as much
+    if problem.load is not None and most <= problem.load:  # the boxes end below the load
         pressed = np.cbrt(problem.load / most) * np.where(boxes.cut, boxes.S, 0.0)
         raise boxes.too_dense(problem, solver.name, pressed)
     return judged(solver, problem, boxes, solver.answer(problem, boxes))

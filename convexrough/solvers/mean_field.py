@@ -72,7 +72,7 @@ def _mean_field(problem: NormalProblem) -> Array:
         defect = w - K @ P
         system = np.eye(count) + K * c
         if problem.load is not None:
-            # one more unknown, the change of the approach, and one more equation, the load
+            # The change of the approach is one more unknown, the load one more equation.
             system = np.block([[system, -(K @ c)[:, None]], [-c[None, :], c.sum()]])
             missing = problem.load - float(P.sum())
             step = np.linalg.solve(system, np.append(-defect, missing))

@@ -70,7 +70,7 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     highest_first = np.lexsort((-rank, second, first))
     first, second, rank = first[highest_first], second[highest_first], rank[highest_first]
     new = np.append(True, (np.diff(first) != 0) | (np.diff(second) != 0))[: len(first)]
-    weights = (ranks.size - rank[new]).astype(np.float64)  # at least 1: none counts as missing
+    weights = (ranks.size - rank[new]).astype(np.float64)  # at least 1, as 0 means no edge
     graph = coo_array((weights, (first[new], second[new])), shape=(count, count))
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
 
