@@ -115,21 +115,6 @@ def test_cautions_are_messages_of_certified_scenes(tmp_path: Path) -> None:
     assert line.startswith("2 certified scenes of 2 have warnings, the first scene 0: ")
 
 
-def test_what_rows_do_not_know_is_measured_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
-    one_by_one = batch.measured
-
-    def counted(*given: Any) -> Any:
-        asked.append(1)
-        return one_by_one(*given)
-
-    monkeypatch.setattr(batch, "measured", counted)
-    rows({}, ["load", "loss"])
-    assert len(asked) == 0
-    rows({}, ["load", "duality_gap"])
-    assert len(asked) == 2
-
-
 def test_where_rows_fail_each_scene_is_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     def failing(*_: Any) -> Any:
         raise np.linalg.LinAlgError

@@ -3,9 +3,7 @@
 import gzip
 import io
 import json
-import re
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -455,17 +453,6 @@ def test_units_of_summits_convert_when_asked(tmp_path: Path, case: Case) -> None
         cr.read_scene(tmp_path / "scene.toml")
 
 
-def test_units_of_summits_in_a_sweep(tmp_path: Path, case: Case) -> None:
-    (tmp_path / "summits.csv").write_text(lines({**UM, "height [nm]": 1e9 * HEIGHTS}))
-    write_scene(tmp_path, units=METRES + "\nconvert = true")
-    text = (tmp_path / "scene.toml").read_text()
-    sweep = '[sweep]\nmeasure = ["load"]\n[sweep.over]\n"normal.approach" = [2e-7, 4e-7]\n'
-    (tmp_path / "sweep.toml").write_text(text + sweep)
-    with ThreadPoolExecutor(1) as here:
-        table = cr.sweep(tmp_path / "sweep.toml", executor=here)
-    np.testing.assert_allclose(table.read()["load"][1], case.contact.load, rtol=1e-12)
-
-
 @pytest.mark.parametrize("named", ['height = "z"', 'z = "height"'])
 def test_summits_by_other_names(tmp_path: Path, case: Case, named: str) -> None:
     columns = {"x": PLACES[:, 0], "y": PLACES[:, 1], "z": HEIGHTS}
@@ -583,17 +570,6 @@ def test_findings_as_junit(tmp_path: Path, command: Any, case: Case) -> None:
     said = str(suite[0][0].text)
     assert f"rows: found {len(case.loads) - 1}" in said
     assert said in outcome.err
-
-
-def test_what_is_proved_is_said(tmp_path: Path, command: Any, case: Case) -> None:
-    name = text()(tmp_path, {"load": case.loads * (1 + 1e-3)})
-    outcome = command("verify", "scene.toml", name)
-    assert outcome.status == 0
-    (line,) = (line for line in outcome.out.splitlines() if line.startswith("result  "))
-    assert re.fullmatch(
-        r"result {12}contact set proved; loads correct to 0\.\d+ % of the largest", line
-    )
-    assert "geometry          closest" in outcome.out
 
 
 def test_bytes_of_every_kind_end_in_a_reason(tmp_path: Path, command: Any, case: Case) -> None:
