@@ -295,7 +295,7 @@ class Levels:
         return self.at(self.top.load - drop)
 
     def at(self, load: Ball) -> Level:
-        """The level at a total load. Raises ProofError if the ball of the load contains 0."""
+        """The level at a total load. Raises ProofError if an inexact load may be 0 or less."""
         key = _key(load)
         if key not in self._known:
             self._known[key] = self._level(load)

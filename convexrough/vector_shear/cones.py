@@ -135,8 +135,7 @@ class FrictionConic:
 class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     """The cone program, scaled so that its numbers are about 1.
 
-    The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., and then those of the cones,
-    asperity by asperity.
+    The variables are q / (epsilon P) (x_1, y_1, x_2, ...), then those of the cones by asperity.
 
     total  : (2,) T;  lift : the cones;  small : (n,) epsilon;  energy : the unit of energy
     """
