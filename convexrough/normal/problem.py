@@ -337,7 +337,7 @@ class NormalProblem:
         return shifted_to_load(indentation, self.coefficients, load)
 
     def convexity_number(self, loads: Array) -> float:
-        """theta of (3) of docs/theory/convexity.md; Phi is convex up to these loads if it is below 1."""
+        """theta of (3), docs/theory/convexity.md: below 1 Phi is convex up to these loads."""
         return float(self.convexity_at(self.stiffness(loads)))
 
     def convexity_at(self, stiffness: Array) -> Any:
