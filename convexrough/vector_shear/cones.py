@@ -169,7 +169,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return ConeProgram(*self._objective(), self._constraints(rows), constant, equalities=2)
 
     def _objective(self) -> tuple[csc_matrix, Array]:
-        """The quadratic and linear parts of (1/2) q'Mq plus the local energies."""
+        """The quadratic and linear parts: (1/2) q'(B + shift)q, and the local energies."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
