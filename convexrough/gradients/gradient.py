@@ -112,7 +112,7 @@ class Gradient(Table, Plottable):
     heights, tip_radii : (n,) derivatives by heights and tip radii, in the scene's order; 0 for
         screened asperities, and for open ones unless the number contains their gap
     positions       : (n, 2) derivatives by x and y, with zeros as in `heights`
-    sphere_radius   : None unless the base is a sphere
+    sphere_radius   : None for shapes other than a sphere
     contact_modulus : at constant Poisson's ratio
     poisson_ratio   : at constant contact modulus E*
     load, approach  : derivative by the quantity `holding`; the other is None
@@ -221,7 +221,7 @@ class Gradient(Table, Plottable):
         """The gradient of `Cycle.loss_normalised` = W / W0, from the gradient of a cycle's loss W.
 
         At constant approach the load P in W0 varies. Raises InputError for gradients of other
-        numbers, and for a base of which no smooth solution is known.
+        numbers, and for shapes of which no smooth solution is known.
         """
         if self.maximum is None:
             expected = "the gradient of the loss of a cycle"
@@ -229,7 +229,7 @@ class Gradient(Table, Plottable):
         number, scene = self.number, self.contact.scene
         reference = smooth_reference(scene, self.contact.load)
         if reference is None:
-            expected = "a base with a smooth reference: a sphere or an ellipsoid"
+            expected = "a sphere or an ellipsoid"
             raise InputError("normalised", found=named(scene.sphere_radius), expected=expected)
         R = Ball.exact(scene.mean_radius)
         E = Ball.exact(scene.material.contact_modulus)
