@@ -193,7 +193,7 @@ def added(texts: Any) -> Fraction:
 
 
 def digest(scene: Any, prescribed: Any) -> str:
-    """SHA-256 of both as one JSON object with sorted keys and without spaces."""
+    """SHA-256 of scene and prescribed quantity, as JSON with sorted keys and without spaces."""
     given = {"prescribed": prescribed, "scene": scene}
     text = json.dumps(given, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
