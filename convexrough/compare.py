@@ -1,9 +1,8 @@
 """Comparison of all formulations and solvers on one scene: agreement, certificate and time.
 
-One code certifies all results, independently of the solver. A certificate of global scope proves
-that the solution is the only one. If another certified result differs from it by more than
-the bounds, the mathematics or the code of the package has a mistake. Two certificates of local
-scope may differ by more than their bounds: each box may contain a solution of its own.
+One code certifies all results, independently of the solver. If a certified result contradicts one
+of global scope, the mathematics or the code of the package has a mistake. Two certificates of local
+scope may differ: each box may contain a solution of its own.
 """
 
 from __future__ import annotations
@@ -216,7 +215,7 @@ def _enter(
         if solver == _REFERENCE:
             raise
         return Entry(solver.name, "refused", str(error))
-    except Exception as error:  # of a solver from elsewhere; the others still answer
+    except Exception as error:  # a user's solver may raise anything
         if type(solver).__module__.startswith("convexrough."):
             raise
         return Entry(solver.name, "failed", f"{type(error).__name__}: {error}")
@@ -244,7 +243,7 @@ def _load_code_of(solver: solvers.Solver) -> None:
     """Make a solver import what it needs, so that measured times contain no imports."""
     two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
     small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
-    with suppress(Exception):  # `_enter` meets it again, and records or raises it
+    with suppress(Exception):  # `_enter` handles the same error later
         press(small, approach=1e-2, solver=solver)
 
 

@@ -50,7 +50,7 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
     """(...) [length] sum of both surfaces' normal displacements, relative to the distant bodies.
 
-    It is the sum of the fields of all asperities, with Hertz pressures and not point forces.
+    Each asperity contributes the field of its Hertz pressure.
     """
     touching = np.flatnonzero(contact.loads)
     centres = contact.scene.contact_points[touching]
@@ -129,7 +129,6 @@ def cell_areas(points: Array) -> Array:
     points : (n, 2) [length]
 
     Each Delaunay triangle adds (edge)^2 cot(opposite angle) / 8 to both ends of each of its edges.
-    It takes about 2 s for 1e5 points.
     """
     from scipy.spatial import Delaunay, QhullError  # takes 0.1 s to import
 
@@ -138,7 +137,7 @@ def cell_areas(points: Array) -> Array:
         return unknown
     try:
         mesh = Delaunay(points)
-    except QhullError:  # all on one line
+    except QhullError:  # all points are on one line
         return unknown
     areas: Array = np.zeros(len(points))
     for turn in range(3):
@@ -172,10 +171,7 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
 def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
-    """sum_i profile(|r - r_i|, i) over the discs that contain r, found by k-d trees.
-
-    Discs are searched in groups with radii that differ by less than a factor 2.
-    """
+    """sum_i profile(|r - r_i|, i) over the discs that contain r, by trees of similar radii."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     places = _places(points)
@@ -211,7 +207,6 @@ def _sum_everywhere(
 
 
 def _places(points: ArrayLike) -> Array:
-    """The points as float64, shape (..., 2), all finite."""
     expected = "finite numbers of shape (..., 2): x and y of each point"
     try:
         places = np.asarray(points, dtype=np.float64)

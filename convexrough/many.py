@@ -1,7 +1,7 @@
-"""Press many scenes at once, and compute a cycle of each.
+"""Press many scenes with equal numbers of asperities at once, and compute a cycle of each.
 
-All scenes have the same number of asperities. Those with the same positions and tip radii share one
-matrix. Scenes whose solution is not proved in this way are pressed one by one.
+Scenes with the same positions and tip radii share one matrix. Scenes whose solution is not proved
+in this way are pressed one by one.
 """
 
 from __future__ import annotations

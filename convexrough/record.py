@@ -56,14 +56,13 @@ class Record:
     def __setstate__(self, state: dict[str, Any]) -> None:
         for value in state.values():
             if isinstance(value, np.ndarray):
-                value.flags.writeable = False  # a pickle does not store this
+                value.flags.writeable = False  # pickles do not store this flag
         self.__dict__.update(state)
 
     def _fields(self) -> Any:
         return fields(self)  # type: ignore[arg-type]
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        """The name and the text of each line."""
         for name in (*self._shown, *(each.name for each in self._fields() if each.repr)):
             if text := in_text(getattr(self, name)):  # empty values are left out
                 yield name, text
@@ -72,7 +71,6 @@ class Record:
             yield "units", units
 
     def _headline(self) -> str:
-        """The record in one line."""
         parts = [str(getattr(self, name)) for name in ("scope", "solver") if hasattr(self, name)]
         if hasattr(self, "status"):
             parts.append(in_text(self.status))
@@ -184,7 +182,6 @@ def _of_array(values: NDArray[Any]) -> str:
 
 
 def _counted(statuses: NDArray[np.str_]) -> Iterator[str]:
-    """The number of each status, in the order of first occurrence."""
     while len(statuses):
         same = statuses == statuses[0]
         yield f"{np.count_nonzero(same):,} {statuses[0]}"

@@ -156,7 +156,6 @@ def _check_proof(certificate: Certificate, whose: str = "") -> None:
 
 
 def _check(claim: Claim, scene: Scene) -> None:
-    """Raise AssertionError with the report of `verify` unless the claim holds."""
     __tracebackhide__ = True
     if not claim.holds:
         hints = claim.hints() if isinstance(claim, Verdict) else ()

@@ -140,7 +140,7 @@ def measure_attempt(
         return row
     problem, solution = found
     loads = np.zeros(len(scene))
-    loads[problem.candidates] = solution.loads * problem.units.force  # a power of two
+    loads[problem.candidates] = solution.loads * problem.units.force  # exact, by a power of two
     return replace(
         row,
         touching=int(np.count_nonzero(loads)),
@@ -185,7 +185,6 @@ def measure_sweep(size: int, scenes: int, workers: int) -> Row:
 def _timed(
     row: Row, prepare: Callable[[], Any], work: Callable[[Any], Any], patience: float
 ) -> tuple[Row, Any]:
-    """The row with time and memory, and the first result; None where the work raises an error."""
     memory = MemoryRise()
     try:
         found = work(prepare())

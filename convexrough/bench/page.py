@@ -80,7 +80,6 @@ def size_table(bench: Bench) -> list[list[str]]:
 
 
 def _messages(bench: Bench) -> list[str]:
-    """Sentences: the conclusions, the time of a scene in sweeps, and the reasons of failures."""
     lines = bench.verdicts()
     for row in bench.rows:
         if row.task == "sweep":
@@ -116,7 +115,6 @@ def _drawn(bench: Bench) -> dict[str, Figure]:
 
 
 def _renew(page: Path, bench: Bench) -> list[Path]:
-    """Write the figures, then the page that shows them; return the paths."""
     before, after = split_page(page)
     folder, written = page.parent / "figures", []
     with file_errors(folder, "be made"):

@@ -80,7 +80,6 @@ def run(
 
 
 def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: bool) -> int:
-    """Compute the file as `convexrough sweep` does; return the exit status."""
     from convexrough.cli.sweep import sweep as command
 
     if given:

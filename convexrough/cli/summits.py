@@ -36,7 +36,7 @@ def map_options(command: Command) -> Command:
                      show_default=True, help="Form to remove before finding summits."),
         click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if different."),
         click.option("--unit", metavar="UNIT", help="Unit of pixels and heights: µm, mm, ..."),
-        click.option("--pixel", metavar="X[,Y]", help="Size of a pixel, if the file has none."),
+        click.option("--pixel", metavar="X[,Y]", help="Size of a pixel, if the file states none."),
     ):  # fmt: skip
         command = option(command)
     return command

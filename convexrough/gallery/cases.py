@@ -207,11 +207,7 @@ def _cases() -> dict[str, Any]:
 
 
 def _reversals(kind: str) -> list[float]:
-    """Shear forces as multiples of the last one, which is the largest.
-
-    "random" : up to 0.9 of it, some repeated, some 0
-    "nested" : each range lies inside the one before, so that all are remembered until the last
-    """
+    """Shear forces over the last, largest one; if "nested", each range is inside the one before."""
     if kind == "nested":
         turns = [(-0.9 if k % 2 else 0.9) * (1 - k / REVERSALS) for k in range(REVERSALS)]
         return [*turns, 1.0]

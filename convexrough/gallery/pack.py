@@ -63,11 +63,7 @@ def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
 
 
 def _hardness(problem: NormalProblem, own: Array) -> About:
-    """Numbers that say how hard a case is.
-
-    condition : of the energy's Hessian over the touching ones, scaled to a diagonal of 1
-    spread    : smallest over largest load
-    """
+    """The condition number of the scaled Hessian, and the smallest over the largest load."""
     eigenvalues = scaled_eigenvalues(problem, own)
     positive = eigenvalues[0] > 0
     return {
@@ -79,7 +75,6 @@ def _hardness(problem: NormalProblem, own: Array) -> About:
 
 
 def _proved(case: HardCase, loads: Array) -> About:
-    """What the certificate proves about the answer rounded to float64."""
     proof = certify(case.scene, loads, **case.control)
     bound = float(proof.load_errors.max())
     return {

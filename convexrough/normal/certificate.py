@@ -187,7 +187,7 @@ def certificate_of(
     if isinstance(found, Obstacle):
         return _unproved(problem, start, indentation, found)
     given = loads[problem.candidates]
-    if here and np.array_equal(given / force, found.loads.value):  # proved from these loads
+    if here and np.array_equal(given / force, found.loads.value):  # the proof is for these loads
         off = found.loads.error
         moved = off + np.abs(start.loads.low)
         errors, shift = found.indentation.error, float(found.approach.error)
@@ -279,10 +279,7 @@ def _screened(problem: NormalProblem, start: Trial) -> _Screened:
 def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
-    """Bound on the energy, in scaled units, of loads on asperities that cannot touch.
-
-    Loads s on these add  sum (3/5) k s^(5/3) + g's + s'A s / 2,  with their gaps g >= 0.
-    """
+    """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2: loads s where contact is impossible."""
     screened = loads.copy()
     screened[problem.candidates] = 0.0
     which = np.flatnonzero(screened)
@@ -305,7 +302,6 @@ def _screened_energy(
 def _unproved(
     problem: NormalProblem, start: Trial, indentation: Array, obstacle: Obstacle
 ) -> Certificate:
-    """A certificate of scope "none", with the obstacle."""
     n, length = len(indentation), problem.units.length
     return Certificate(
         scope="none",

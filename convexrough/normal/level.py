@@ -350,7 +350,6 @@ def _key(load: Ball) -> tuple[float, float, float]:
 
 
 def _together(problem: NormalProblem, box: Box, loads: Ball) -> list[Level | None]:
-    """The levels at these loads; None where the solution is not proved in the box."""
     scene, exact, m, total = problem.scene, problem.exact, len(loads), loads[:, None]
     rows = Stack([(slice(0, m), problem)], exact, problem.shells, total, None)
     force, modulus = total.value * problem.units.force, scene.material.contact_modulus

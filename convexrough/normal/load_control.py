@@ -36,7 +36,7 @@ def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, softness = indentation - highest, 1.0 / coefficients
-    most = hertz.indentation(load, largest(coefficients))  # if one asperity bears the whole load
+    most = hertz.indentation(load, largest(coefficients))  # of one asperity under the whole load
     shift = np.minimum(most, np.maximum(highest, 1e-9 * most))
     for steps in range(200):
         ratio = np.maximum(indentation + shift, 0.0) * softness
@@ -61,12 +61,9 @@ def approach_bound(
     offsets: Array,
     load: float | Array,
 ) -> Any:
-    """Upper bound on the approach D0 at every solution of total load L.
+    """Upper bound on the approach at every solution of total load L.
 
-    Equation (2) of docs/theory/certificate.md: with q = weights / sum(weights), alpha_i = q_i k_i
-    and c = A q, for every lambda >= max c,
-
-        D0 <= lambda L + (4/27) sum alpha_i^3 / (lambda - c_i)^2 - d'q.
+    It is (2) of docs/theory/certificate.md, with q = weights / sum(weights), alpha = q k, c = A q.
 
     weights      : (n,) approximate loads, not negative, not all 0
     displacement : (n,) A times weights, or more
@@ -78,7 +75,7 @@ def approach_bound(
     cubes = (q * coefficients) ** 3
     highest, wanted = largest(c), 27.0 * load / 8.0
     if q.ndim == 1:
-        active, cubes = c[cubes > 0], cubes[cubes > 0]  # others do not matter
+        active, cubes = c[cubes > 0], cubes[cubes > 0]  # only these matter
     else:
         active = np.where(cubes > 0, c, -np.inf)
     # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L. Newton's method from the
@@ -90,7 +87,7 @@ def approach_bound(
         parts = cubes * (nearer * nearer * nearer)
         excess, slope = summed(parts), summed(parts * nearer)
         step = (np.cbrt(excess / wanted) - 1.0) * excess / slope
-        height = height + np.fmax(step, 0.0)  # nan in float64: high enough
+        height = height + np.fmax(step, 0.0)  # a step of nan means that it is high enough
         if not (step > 1e-3 * (height - least)).any():
             break  # any height gives a bound; this one is close to the best
     height = np.maximum(height, highest)
@@ -117,7 +114,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     couplings: list[tuple[Indices | slice, Coupling]]
     if few:
         couplings = [(which, sources)]
-    elif sources.name == "lattice":  # one box for all
+    elif sources.name == "lattice":  # one box of sites for all
         couplings = [(slice(None), sources.onto(scene.contact_points))]
     else:
         couplings = [(touching, sources), (others, sources.onto(scene.contact_points[others]))]
@@ -158,12 +155,12 @@ def all_that_could_touch(
 ) -> tuple[Scene, float]:
     """The scene with all asperities that could touch under a load, and a bound on the approach.
 
-    scene_within : returns the scene within a distance from the axis [length]; a greater distance
-        only adds asperities
+    scene_within : returns the scene within a distance from the axis [length]
     farthest     : returns the largest distance of asperities that can touch at an approach [length]
 
-    The bound of a wide scene also holds for a narrower one that keeps all asperities of the
-    approximate loads, because lambda is at least the displacement at every asperity.
+    The bound of a wide scene also holds for a narrower one with all asperities of the approximate
+    loads, as lambda of (2) of docs/theory/certificate.md is at least the displacement at every
+    asperity.
     """
     axis = scene_within(0.0)
     modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))

@@ -1,9 +1,4 @@
-"""Bounds that every other solution satisfies: docs/theory/crowded.md, "Other solutions".
-
-Two solutions have contact radii a and b. With m = (2/3) (a^2 + a b + b^2) / (a + b) and
-t_i = (2 / pi) m_i, they are equal if t_i + t_j <= r_ij for the distances r_ij of all pairs, or if
-A plus the diagonal 1 / (pi E* t_i) is proved semidefinite in another way.
-"""
+"""Bounds that every other solution satisfies: docs/theory/crowded.md, "Other solutions" and (1)."""
 
 from __future__ import annotations
 
@@ -16,7 +11,7 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import SAFETY
 
 #: If contact radii are at most this fraction of the distance to the nearest neighbour, every other
-#: solution covers a summit: the root x of m(x, 1) = pi / 4, rounded down.
+#: solution covers a summit: the root a of m = pi / 4 for b = 1 in (1), rounded down.
 ROOMY = 0.52
 
 
@@ -45,13 +40,12 @@ NO_OTHERS, UNKNOWN = OtherSolutions(False, np.inf, True), OtherSolutions(True, 0
 
 
 def _radii(problem: NormalProblem, loads: Array) -> Array:
-    """(n,) [length] contact radii under loads, rounded up."""
     radii: Array = np.pi / 2.0 * problem.influence.scale / problem.stiffness(loads) * (1 + SAFETY)
     return radii
 
 
 def _mean(a: Array, b: Array) -> Array:
-    """m for contact radii a and b; it increases with both."""
+    """The mean m of (1) for contact radii a and b; it increases with both."""
     total = a + b
     product = np.divide(a * b, total, out=np.zeros_like(total), where=total > 0)
     return np.asarray(2.0 / 3.0 * (total - product) * (1 + SAFETY))

@@ -105,7 +105,7 @@ def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:
 
     tree = cKDTree(points)
     usual = WIDE * float(np.median(radii)) if len(radii) else 0.0
-    wide = np.flatnonzero(radii > usual)  # few: searched one by one
+    wide = np.flatnonzero(radii > usual)  # searched one by one
     reach = radii[wide] + float(radii.max(initial=0.0))
     counts = tree.query_ball_point(points[wide], reach, return_length=True)
     many = tree.count_neighbors(tree, 2.0 * usual) + int(np.sum(counts))

@@ -187,7 +187,7 @@ class NormalProblem:
         if self.influence.stored and float(np.abs(change.high).max()) > small:
             return self.product(others)
         moved, off = self.influence.apply(change.high), self.influence.rounding(change.high)
-        most = self.row_norm * float(np.linalg.norm(change.high))  # of A |change|, by Cauchy
+        most = self.row_norm * float(np.linalg.norm(change.high))  # bounds A |change|
         error = (off.relative + 2 * ROUNDOFF) * most + off.each
         return product + Ball.around(moved, error * (1 + SAFETY))
 
@@ -391,7 +391,6 @@ def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple
 
 
 def _exact_coefficients(tips: Array, *constants: Any) -> Ball:
-    """The local coefficients k of tip radii (n,)."""
     curvature, cubed, _ = _constants(*constants)
     return ((1.0 / Ball.exact(tips) + curvature) * cubed).cbrt()
 

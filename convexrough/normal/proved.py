@@ -1,10 +1,9 @@
 """The proof that a solution exists near given loads, and bounds on the distance to it.
 
-The theorem of docs/theory/one-theorem.md is applied on a box of loads on which the energy is convex
-(`boxes`), and again on a smaller box that the first result proves to hold the solution. From this
-follow bounds on the approach and the indentations, and better ones on the loads. Symbols are those
-of docs/theory/certificate.md: loads P, approach D0, compliance operator A, local Hessian H; a star
-marks the solution.
+docs/theory/certificate.md and one-theorem.md: the theorem on a box of loads on which the energy is
+convex (`boxes`), and again on a smaller box that the first result proves to hold the solution.
+P are the loads, D0 the approach, A the compliance operator, H the local Hessian; a star marks the
+solution.
 """
 
 from __future__ import annotations
@@ -184,12 +183,10 @@ class Known(NamedTuple):
 
 
 class _Missing(NamedTuple):
-    """The part of the prescribed total that the loads P lack: (1 + t) P have this total.
+    """The effect of a difference between prescribed total and sum: docs/theory/one-theorem.md.
 
-    The factor 1 + t adds (2/3) t k P^(2/3) + t A P to D0 + d in the contact law. The
-    approach takes up a constant part, and the rest enters the residuals.
-
-    loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals
+    loads, coupled, residual : (n,) bounds on |t| P, |t| A P and the change of the residuals, where
+        (1 + t) P have the prescribed total
     """
 
     loads: Array
@@ -210,7 +207,6 @@ class _Missing(NamedTuple):
         return cls(*(np.where(known, part * each, np.inf) for each in (loads, coupled, rest)))
 
     def errors(self, within: Any, stiffness: Array) -> Array:
-        """(n,) bounds on the errors of the loads."""
         return np.asarray(within / np.sqrt(stiffness) * (1 + SAFETY) + self.loads)
 
 

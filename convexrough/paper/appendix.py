@@ -1,9 +1,9 @@
 """The source paper's appendix [A1]-[A15], for comparison: slips from the surface displacements.
 
-Forces and stick discs are those of `shear` (Ciavarella and Jaeger). The surface displacement u at
-the centre of an asperity is the sum of [A3] and [A4] over all asperities. The mean of u over the
-asperities that do not slide ("adhered") approximates the displacement of distant points. The slip
-of a sliding asperity is the difference of this mean and u.
+Forces and stick discs are those of `shear`. The surface displacement u at the centre of an asperity
+is the sum of [A3] and [A4] over all asperities. The mean of u over the asperities that do not slide
+("adhered") approximates the displacement of distant points. The slip of a sliding asperity is the
+difference of this mean and u.
 
 In theory u is the same at all adhered asperities. The computed values differ slightly, because
 [A3] and [A4] spread each force over a disc and `shear` uses point forces, and, unless Poisson's

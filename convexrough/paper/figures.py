@@ -163,7 +163,6 @@ def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: Measure) 
 
 
 def _section_figure(state: ShearState, scale: Scale, unit: Measure) -> Figure:
-    """The figure of f p and q along y = 0, of the asperities and of the smooth sphere."""
     contact, sphere = state.contact, smooth(state.contact.scene, load=state.contact.load)
     figure = Figure(figsize=(DOUBLE, 2.9), layout="constrained")
     axes = figure.subplots()

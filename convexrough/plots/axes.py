@@ -127,7 +127,6 @@ def _draw_path(path: LoadPath, axes: Axes) -> None:
 
 
 def _draw_times(comparison: Comparison | PathComparison, axes: Axes) -> None:
-    """Draw the time [s] of each solver, or the reason why it has no answer."""
     rows = [_took(entry) for entry in comparison.entries]
     for place, (_, seconds, outcome) in enumerate(rows):
         if seconds is None:

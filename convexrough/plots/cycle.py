@@ -193,7 +193,6 @@ def ring_colour(order: int, count: int) -> Any:
 
 
 def _range(cycle: Cycle, scale: Scale) -> str:
-    """The range of a cycle, in fractions of f P."""
     high, low = cycle.maximum / scale.limit, cycle.minimum / scale.limit
     if high == -low:
         return f"±{high:.4g}"

@@ -97,7 +97,6 @@ def draw_pressure(axes: Axes, scale: Scale) -> tuple[ScalarMappable, Window]:
 
 
 def _draw_section(axes: Axes, scale: Scale, window: Window) -> None:
-    """Draw the pressure along y = 0, of the asperities and of the smooth sphere."""
     contact, (left, right, *_) = scale.contact, window.sides
     edge = max(-left, right) * scale.length.size
     x = abscissae(contact.scene.contact_points, contact.contact_radii, edge)
@@ -111,7 +110,6 @@ def _draw_section(axes: Axes, scale: Scale, window: Window) -> None:
 
 
 def _draw_peaks(axes: Axes, scale: Scale) -> None:
-    """Draw the peak pressures of all asperities against the distance from the centre."""
     touching = scale.contact.loads > 0
     r = distances(scale)[touching]
     peaks = scale.pressure.of(fields.peak_pressures(scale.contact)[touching])
@@ -158,7 +156,7 @@ def _loads_figure(scale: Scale) -> Figure:
     axes = figure.subplots()
     touching = contact.loads > 0
     unsure = contact.status == "undecided"
-    if contact.certificate.scope == "none":  # every asperity is: show those with a load
+    if contact.certificate.scope == "none":  # mark asperities with a load
         unsure &= touching
     r, share = distances(scale), 100.0 * contact.loads / contact.load
     _draw_smooth_share(axes, scale)
@@ -178,14 +176,11 @@ def _loads_figure(scale: Scale) -> Figure:
 
 
 def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
-    """Draw 100 p(r) A / P of the smooth sphere, with the median cell area A of touching asperities.
-
-    Nothing is drawn if fewer than seven of these have a whole cell, or the base is not a sphere.
-    """
+    """Draw 100 p(r) A / P of the smooth sphere, with the median A of at least seven whole cells."""
     if len(set(scale.axes)) != 1:
         return
     points = scale.contact.scene.contact_points
-    sample = np.argsort(np.hypot(*points.T))[:5000]  # of very many, those nearest to the axis
+    sample = np.argsort(np.hypot(*points.T))[:5000]  # at most 5000, nearest the axis
     areas = fields.cell_areas(points[sample])
     whole = np.isfinite(areas) & (scale.contact.loads[sample] > 0)
     if whole.sum() < 7:

@@ -118,7 +118,6 @@ def _some(which: Indices, most: int) -> Indices:
 
 
 def _states(fractions: Array, steady: list[Cycle], X0: float, limit: float) -> dict[str, Any]:
-    """Data of the whole contact and of the smooth sphere under the same load, at each force."""
     moved = np.array([each.displacement_amplitude for each in steady])
     stuck = np.cbrt(1.0 - fractions)
     return {
@@ -150,13 +149,12 @@ def _stick(
 
 
 def _shares(contact: Contact, loading: LoadPath, which: Indices) -> Array:
-    """(m, k) shear forces over friction limits, Q_i / (f P_i)."""
+    """(m, k) shear forces over friction limits."""
     limits = checks.friction(contact.scene.friction) * contact.loads[which]
     return np.asarray(loading.asperity_forces[:, which] / limits)
 
 
 def _followed(contact: Contact, loading: LoadPath, which: Indices, X0: float) -> dict[str, Any]:
-    """Curves and proofs of the asperities with curves."""
     x, y = contact.scene.asperities.positions[which].T
     certificate = contact.certificate
     return {

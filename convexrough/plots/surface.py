@@ -85,7 +85,6 @@ def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
 
 
 def _label_places(axes: Axes, surface: Surface) -> None:
-    """Label the axes of a map, in a unit that suits its visible part."""
     most = axes.get_xlim()[1]
     label(axes, _count(axes.xaxis, "$x$", surface.unit, most),
           _count(axes.yaxis, "$y$", surface.unit, most))  # fmt: skip
@@ -166,7 +165,6 @@ def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str) -> 
 
 
 def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
-    """The figure of the whole map, or of the part with the contacts if there are any."""
     figure = Figure(figsize=(SINGLE + 0.9, 4.1), layout="constrained")
     axes = figure.subplots()
     image = draw_surface(axes, surface)
@@ -189,10 +187,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
 
 
 def _draw_contacts(axes: Axes, contact: Contact) -> float:
-    """Draw contacts, smooth contact and most crowded pair; return half the width of the contacts.
-
-    Discs have their true size, or a smallest visible one.
-    """
+    """Draw contacts, smooth contact and most crowded pair; return half the contacts' width."""
     points, radii = contact.scene.contact_points, contact.contact_radii
     touching, scale = contact.loads > 0, Scale(contact)
     reach = np.abs(points - scale.centre).max(axis=1) + radii
@@ -208,7 +203,6 @@ def _draw_contacts(axes: Axes, contact: Contact) -> float:
 
 
 def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
-    """Histograms of heights, tip radii and eccentricities, of all maxima and of those left."""
     figure = Figure(figsize=(DOUBLE, 2.7), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     moments, level = surface.moments, summits.origin.level
@@ -266,7 +260,7 @@ def _count(axis: Axis, name: str, unit: str, size: float) -> str:
     length = measure(size, unit)
 
     def said(value: float, _: float) -> str:
-        shown = 0.0 if abs(value) < 1e-9 * size else length.of(value)  # 0 with its rounding
+        shown = 0.0 if abs(value) < 1e-9 * size else length.of(value)  # remove rounding errors of 0
         return f"{shown:.9g}".replace("-", "\N{MINUS SIGN}")
 
     axis.set_major_formatter(said)

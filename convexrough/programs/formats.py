@@ -1,8 +1,4 @@
-"""File formats of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF and MPS.
-
-CBF has its own writer here: among the Python packages that write it, MOSEK and COPT are commercial,
-and PICOS (2.6) fails on every problem.
-"""
+"""File formats of other libraries: qpsolvers' .npz, Clarabel's JSON, CBF and MPS."""
 
 from __future__ import annotations
 
@@ -31,7 +27,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
     upper = program.quadratic.toarray()
     rows = program.constraints.toarray()
     equal = program.lower == program.upper
-    none = np.array(None)  # as Problem.save writes what is not there
+    none = np.array(None)  # what Problem.save writes for missing data
     file = io.BytesIO()
     np.savez_compressed(
         file,

@@ -207,7 +207,6 @@ def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
 
 
 def _objective(program: ConeProgram, boxes: ConeBoxes, own: Array) -> float:
-    """The minimum of the objective, evaluated at the solution of the contact problem."""
     p = own[boxes.members]
     t = np.cbrt(p / boxes.loads)
     powers = [t, t**2, t**3, t**4, t**5, t**5 - t**6]

@@ -68,7 +68,6 @@ def results_folder(folder: Path, *, force: bool, **said: Any) -> Iterator[Path]:
 
 
 def _moved(new: Path, folder: Path) -> None:
-    """Rename the new folder, or move its files into a folder that exists."""
     if not folder.is_dir():
         os.replace(new, folder)
         return
@@ -81,7 +80,6 @@ def _moved(new: Path, folder: Path) -> None:
 
 
 def _earlier(folder: Path) -> list[str]:
-    """The files of an earlier run; empty if their list cannot be read."""
     try:
         files = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["files"]
         return [MANIFEST, *map(str, files)]
@@ -168,7 +166,7 @@ def write_figures(
             with replacing(path) as temporary:
                 save(figure, temporary, kind, dpi)
             written.append(path)
-            figure.set_layout_engine("none")  # laid out once: the second file takes half the time
+            figure.set_layout_engine("none")  # saves the layout of later files
     return written
 
 

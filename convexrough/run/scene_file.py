@@ -256,7 +256,6 @@ def build_scene(
 
 
 def _material(study: Study) -> Material:
-    """The material of the contact, from one table or from the tables of both bodies."""
     from convexrough.run.study import BodiesTable
 
     def of(body: Any) -> Material:
@@ -307,7 +306,7 @@ def _blamed_on(path: Path, table: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if error.where:  # in another file, already named
+        if error.where:  # the error names another file
             raise
         what = f"[{table}] {error.what}"
         where = str(path)

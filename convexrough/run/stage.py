@@ -78,9 +78,9 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """If `name` is a status, the number of asperities with it; else an attribute of `found`.
+    """The number of asperities with the status `name`, else the attribute `name` of `found`.
 
-    If `found` has no such attribute, it is that of its certificate.
+    An attribute that `found` lacks is taken from its certificate.
     """
     if name in STATUSES:
         return (found.status == name).sum(axis=-1)

@@ -278,7 +278,6 @@ def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list
 
 
 def _said(model: type[Study], error: Any) -> str:
-    """The message of a mistake on one line, with the name of the table."""
     table, *inner = error["loc"]
     if error["type"] == "missing" and not inner:
         keys = ", ".join(REQUIRED[str(table)].model_fields)

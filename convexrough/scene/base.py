@@ -61,5 +61,4 @@ def sphere_radius(radius: Radius, what: str) -> float:
 
 
 def _length(what: str, value: Any) -> float:
-    """A radius, checked to be positive; it may be inf."""
     return math.inf if value == math.inf else checks.positive(what, value)

@@ -13,7 +13,7 @@ from convexrough.arrays import Array
 from convexrough.cached import Cached
 from convexrough.checks import SMALLEST
 
-Sites = NDArray[Any]  # of whole numbers
+Sites = NDArray[Any]  # whole numbers
 
 #: Largest difference of points from the sites of a lattice, over the largest coordinate: a little
 #: more than the rounding of coordinates.
@@ -74,7 +74,7 @@ class Lattice(Cached):
         if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):
             return None
         sites = _nearest_sites(points - anchor, basis)
-        # Fit origin and basis to all points, relative to their middle: this decouples both.
+        # Fit origin and basis to all points. Relative to the middle of the points both decouple.
         middle = np.rint(sites.mean(axis=0))
         away = np.column_stack((np.ones(len(points)), sites - middle))
         fitted = np.zeros((3, 2))
@@ -104,14 +104,11 @@ def _nearest_sites(points: Array, basis: Array) -> Sites:
 
 
 def _shortest(points: Array) -> Array | None:
-    """The two shortest vectors (2, 2) between points near the origin; None if all are on a line.
-
-    On a lattice without too many missing points this is the reduced basis (Lagrange and Gauss).
-    """
+    """The reduced basis (2, 2), from points near the origin; None if these are on a line."""
     squares = (points**2).sum(axis=1)
     few = min(len(points), 64)
     nearby = points[np.argpartition(squares, few - 1)[:few]]
-    unit = 2.0 ** np.floor(np.log2(max(float(np.abs(nearby).max()), 1e-300)))  # squares of squares
+    unit = 2.0 ** np.floor(np.log2(max(float(np.abs(nearby).max()), 1e-300)))  # limits powers
     points = (nearby[:, None] - nearby).reshape(-1, 2) / unit
     squares = (points**2).sum(axis=1)
     near = np.argsort(squares)

@@ -1,10 +1,9 @@
 """The choice of boxes and the check of answers, for all solvers of the cone program.
 
-The cone program (docs/theory/exact-cones.md) is exact on boxes 0 <= P_i <= B_i of loads whose
-convexity numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most 21/25 (four cones) or 1 (five),
-with `shells` and coefficients k of the problem. A box that contains the a priori bound is used if
-it is small enough, and cut otherwise. If the solution reaches a cut face, five cones are tried; if
-it does so again, the scene is refused ("Which box").
+docs/theory/exact-cones.md, "Which box" and "What comes back". The program is exact on boxes
+0 <= P_i <= B_i of loads whose convexity numbers S_i = (3/2) shell_i B_i^(1/3) / k_i are at most
+21/25 (four cones) or 1 (five), with `shells` and coefficients k of the problem. If the solution
+reaches a cut face, five cones are tried; if it does so again, the scene is refused.
 """
 
 from __future__ import annotations
@@ -164,7 +163,7 @@ class ConeSolver(ABC):
 def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> Solution:
     """The checked solution with one form of the cones."""
     most = float(boxes.loads.sum())
-    if problem.load is not None and most <= problem.load:  # no state in the boxes carries as much
+    if problem.load is not None and most <= problem.load:  # the boxes end below the load
         pressed = np.cbrt(problem.load / most) * np.where(boxes.cut, boxes.S, 0.0)
         raise boxes.too_dense(problem, solver.name, pressed)
     return judged(solver, problem, boxes, solver.answer(problem, boxes))
@@ -210,11 +209,7 @@ def judged(
 def _pressed_on(
     problem: NormalProblem, boxes: ConeBoxes, loads: Array, indentation: Array
 ) -> Array:
-    """(m,) the `ratios` of TooDenseError for members on a cut face, 0 for others.
-
-    For each member the smaller of two relative distances counts, as one of them is 0 at the
-    solution: that of the indentation above the end of the box, and that of the load below it.
-    """
+    """(m,) the `ratios` of TooDenseError for members that a cut face stops, 0 for others."""
     k = problem.coefficients[boxes.members]
     wanted = indentation[boxes.members] / hertz.indentation(boxes.loads, k)
     room = 1.0 - loads[boxes.members] / boxes.loads

@@ -1,13 +1,8 @@
 """The contact law as one second-order cone program, solved with Clarabel.
 
-    minimise    sum e_i [(3/5 - S_i/3) y5_i + (S_i/3) z_i] + (1/2) p'M p - D'p
-    subject to  p = B y3,  four or five cones per asperity,  and sum p = load if prescribed.
-
-The variables are the loads p and, for each asperity, y1 to y5 and z, which stand for powers of t in
-p = B t^3. The loads lie in boxes 0 <= p <= B with convexity numbers S_i. D = D0 + d is the approach
-plus the offsets (under a prescribed load D0 is an upper bound on the approach), e = k B^(5/3) with
-the coefficients k of the local law, and M = A + diag(shells) is positive semidefinite, with the
-compliance operator A. The solution satisfies the contact law (docs/theory/exact-cones.md).
+It is (1) of docs/theory/exact-cones.md: D = D0 + d is the approach (under a prescribed load an
+upper bound on it) plus the offsets, and M = A + diag(shells). The solution satisfies the contact
+law.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Initial indentations of many asperities, from the mean displacement of rings about the axis.
+"""Initial indentations of many asperities: docs/theory/newton.md, "The start".
 
-The asperities are sorted into rings, and the load of a ring is assumed to be spread evenly over it
-(Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153, for any heights and radii). With the loads P(w)
-at ring displacements w, and the displacements K by unit loads, Newton's method solves  w = K P(w).
+With the loads P(w) at displacements w of rings about the axis, and the displacements K by unit
+loads spread evenly over the rings, Newton's method solves  w = K P(w)  (Greenwood and Tripp, J.
+Appl. Mech. 34 (1967) 153, for any heights and radii).
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def _mean_field(problem: NormalProblem) -> Array:
         defect = w - K @ P
         system = np.eye(count) + K * c
         if problem.load is not None:
-            # one more unknown, the change of the approach, and one more equation, the load
+            # The change of the approach is one more unknown, the load one more equation.
             system = np.block([[system, -(K @ c)[:, None]], [-c[None, :], c.sum()]])
             missing = problem.load - float(P.sum())
             step = np.linalg.solve(system, np.append(-defect, missing))

@@ -1,15 +1,9 @@
-"""Newton's method for the normal problem.
+"""Newton's method for the normal problem: docs/theory/newton.md.
 
 The unknown delta is the indentation of a touching asperity, and minus the gap of an open one. With
-P_i = (max(delta_i, 0) / k_i)^(3/2) the whole contact law is the square system
-
-    F(delta) = delta + A P(delta) - D = 0,
-
-which `convex.newton` solves (docs/theory/newton.md, with k, A and D = D0 + d of `NormalProblem`).
-Where the energy Phi is convex, every step reduces Phi(P(delta)).
-
-For many asperities the iteration includes only those near the contact. When it has ended, the gaps
-of the others are computed; if one of them is negative, the iteration goes on with more asperities.
+P_i = (max(delta_i, 0) / k_i)^(3/2) the contact law is  F = delta + A P - D = 0,  with k, A and
+D = D0 + d of `NormalProblem`. For many asperities the iteration includes only those near the
+contact, until the others are found to be open.
 """
 
 from __future__ import annotations
@@ -62,7 +56,7 @@ class Newton:
     ) -> Solution:
         """The loads of the candidates in scaled units, from any start >= 0."""
         loads, approach, iterations = self._found(problem, start)
-        if self._refines(problem):  # the iteration stops early: this step refines
+        if self._refines(problem):  # the iteration has stopped early
             trial = refined_loads(problem, loads).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
@@ -70,7 +64,6 @@ class Newton:
         return replace(answer, refine=not self.tolerance > 0)
 
     def _found(self, problem: NormalProblem, start: Array | None) -> tuple[Array, float, int]:
-        """The loads (n,), the approach and the number of steps."""
         indentation = _start(problem, start)
         highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
         near = np.arange(len(problem))
@@ -80,7 +73,7 @@ class Newton:
         iterations = 0
         while True:
             begin = indentation[near]
-            del indentation  # to save memory: vectors take half of it
+            del indentation  # saves memory
             state, steps = self._iterate(problem, near, begin)
             iterations += steps
             if len(near) == len(problem):
@@ -141,6 +134,5 @@ def _start(problem: NormalProblem, loads: Array | None) -> Array:
 
 
 def _everywhere(problem: NormalProblem, near: Indices, state: PressingState) -> tuple[Array, Array]:
-    """Loads and gaps of all candidates; those that are not near carry no load."""
     loads = among_zeros(state.forces, near, len(problem))
     return loads, problem.gap(loads, problem.influence.apply(loads), state.approach)

@@ -26,10 +26,9 @@ def start_indentation(problem: NormalProblem) -> Array:
 
 
 def _on_hertz_pressure(problem: NormalProblem) -> Array:
-    """Indentations D - A P for loads P = x^3 s proportional to the smooth sphere's pressure.
+    """D - A P for loads P = x^3 s, s = (1 - r^2 / a^2)^(1/2): like Hertz's pressure.
 
-    s = (1 - r^2 / a^2)^(1/2). x follows from a prescribed load, or minimises the energy at a
-    prescribed approach:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
+    x follows from a prescribed load, or minimises the energy:  x^2 sum k s^(5/3) + x^3 s'A s = D's.
     """
     squares = problem.scene.asperities.distances[problem.candidates] ** 2
     inside = np.maximum(1.0 - squares / (WIDER * _smooth_radius(problem) ** 2), 0.0)
@@ -43,7 +42,7 @@ def _on_hertz_pressure(problem: NormalProblem) -> Array:
         return prescribed - problem.load / total * displacement
     local, coupled = float(s @ (problem.coefficients * np.cbrt(inside))), float(s @ displacement)
     x = math.sqrt(work / local)
-    for _ in range(8):  # from the right of the root of a convex function
+    for _ in range(8):  # Newton's method from the right of the root
         x -= (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
     return np.asarray(prescribed - x**3 * displacement)
 

@@ -1,14 +1,6 @@
-"""A smooth ellipsoid on a half-space: Hertz's ellipse of contact, by integrals R_D and R_F.
+"""A smooth ellipsoid on a half-space: docs/theory/bodies.md, with Carlson's integrals.
 
-The pressure p0 sqrt(1 - x^2/a^2 - y^2/b^2) moves the surface under it by p0 a b / (2 E*) times the
-integral over w > 0 of (1 - x^2/(a^2 + w) - y^2/(b^2 + w)) / sqrt((a^2 + w)(b^2 + w) w). This must
-equal delta - x^2/(2 Rx) - y^2/(2 Ry), with the approach delta and the radii Rx, Ry. With
-p0 a b = 3 P / (2 pi) for the load P it does if
-
-    1/Rx = (P / (pi E*)) R_D(0, b^2, a^2),     1/Ry = (P / (pi E*)) R_D(0, a^2, b^2),
-    delta = (3 P / (2 pi E*)) R_F(0, a^2, b^2).
-
-Source: Johnson, Contact Mechanics (1985), 3.5 and 4.2; Carlson's integrals: DLMF 19.16.
+Source: Johnson, Contact Mechanics (1985), 3.5 and 4.2; the integrals R_D and R_F: DLMF 19.16.
 """
 
 from __future__ import annotations

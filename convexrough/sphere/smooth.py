@@ -160,7 +160,7 @@ class SmoothSphere(Record):
 
     @property
     def _largest_displacement(self) -> float:
-        """[length] c_t f delta = 3 (2 - nu) f P / (8 G a_H), the displacement at Q = f P."""
+        """[length] 3 (2 - nu) f P / (8 G a_H), the displacement at Q = f P."""
         ratio = mindlin.ratio(self.scene.material.poisson_ratio)
         return float(ratio * self._friction * self.approach)
 

@@ -193,7 +193,6 @@ def describe_surface(scanned: Scanned) -> list[str]:
 
 
 def _describe_statistics(scanned: Scanned) -> list[str]:
-    """The statistics of the summits, and of a Gaussian surface with the same moments."""
     maxima, left = scanned.maxima.statistics, scanned.summits.statistics
     moments, unit = scanned.surface.moments, scanned.surface.unit
     units = (f" [1/{unit}²]", f" [1/{unit}]", f" [{unit}]", f" [{unit}]") if unit else [""] * 4
@@ -226,7 +225,6 @@ def _describe_curve(curve: Provability, unit: str, more: str) -> list[str]:
 
 
 def _describe_crowded(contact: Contact) -> list[str]:
-    """The overlapping pairs of summits, and the summits with large model errors."""
     pairs, values = crowded(contact)
     lines = []
     if len(pairs):

@@ -52,7 +52,6 @@ def draw_quantiles(
 
 
 def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Columns]]:
-    """The name and the rows of each band."""
     if others:
         rows = np.array([columns[key] for key in others]).T
         different = np.unique(rows, axis=0)

@@ -35,7 +35,6 @@ def _are_seeds(seeds: int | list[int]) -> bool:
 
 
 def _is_law(table: dict[Law, list[float]]) -> bool:
-    """True if the table has one law with two valid numbers."""
     if len(table) != 1 or not all(len(pair) == 2 for pair in table.values()):
         return False
     [(law, (first, second))] = table.items()
@@ -134,7 +133,7 @@ def plan_of(
     keys, mistakes = validate_table("sweep", table, Keys)
     mistakes += _nothing_random(_dict(table), tables)
     if keys is None or mistakes:
-        varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # values still missing
+        varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # checked later
         others = validate({name: it for name, it in tables.items() if name not in varied})[1]
         rest = [each for each in others if "missing table" not in each]
         raise SceneFileError(str(path), [*mistakes, *rest])
@@ -183,7 +182,6 @@ def _of_values(grid: Grid) -> tuple[Study | None, list[str]]:
 
 
 def _summit_files(grid: Grid) -> set[str]:
-    """The paths of all files of asperities."""
     key = "asperities.path"
     swept = [values for each, values in (*grid.together, *grid.over) if each == key]
     paths = swept[0] if swept else [grid.tables.get("asperities", {}).get("path")]

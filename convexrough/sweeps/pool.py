@@ -84,7 +84,6 @@ def _together(
 
 
 def _lost() -> tuple[type[BaseException], ...]:
-    """The exceptions that mean that a worker died."""
     distributed = sys.modules.get("distributed")
     return (BrokenExecutor, *((distributed.KilledWorker,) if distributed else ()))
 
@@ -121,10 +120,7 @@ class Processes(Executor):
 
 
 def _end_with(pipe: Any) -> None:
-    """Make this process end with its parent process, and ignore interrupts.
-
-    pipe : one end of a pipe; only the parent has the other end
-    """
+    """End this process when its parent, with the other end of the pipe, ends."""
 
     def watch() -> None:
         with suppress(EOFError, OSError):
@@ -137,10 +133,7 @@ def _end_with(pipe: Any) -> None:
 
 @contextmanager
 def _sheltered() -> Iterator[None]:
-    """Inside this context new processes do not run the user's script, and ignore interrupts.
-
-    A terminal interrupts child processes, too; they inherit the signals blocked here.
-    """
+    """Inside this context new processes do not run the user's script, and ignore interrupts."""
     script = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     masks = hasattr(signal, "pthread_sigmask")  # not everywhere

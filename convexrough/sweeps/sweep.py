@@ -168,7 +168,6 @@ def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
 
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
-    """The stages of cycles and shear forces at these fractions of f P."""
     from convexrough.run.stages import CycleStage, NormalStage, ShearStage
     from convexrough.run.study import validate_table
 

@@ -210,7 +210,6 @@ class SweepTable(Record):
         return {head: np.array([row[i] for row in rows]) for i, head in enumerate(heads, 1)}
 
     def _said(self, name: str) -> str:
-        """The label of a column, with its unit."""
         table, _, key = name.rpartition(".") if name in self.swept else ("", "", name)
         label = (f"{table}: {key}" if table else key).replace("_", " ")
         unit = self.manifest["units"].get(name, "")

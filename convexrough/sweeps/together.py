@@ -78,13 +78,12 @@ def measured_together(asked: Mapping[int, Asked], columns: Sequence[Column]) -> 
                 mine = [some[k] for k in rows.places.tolist()]
                 for k, known in _known(rows, mine, columns).items():
                     found[numbers[rows.places[k]]] = known
-        except FAILURES:  # some scene caused it; each is then measured alone
+        except FAILURES:  # one scene failed: each is measured alone
             continue
     return found
 
 
 def _cycle(asked: Asked, columns: Sequence[Column]) -> CycleStage | None:
-    """The cycles of a scene if any number of them is measured, else None."""
     stage = asked.stages.get("cycle")
     wanted = any(column.stage == "cycle" for column in columns)
     return stage if wanted and isinstance(stage, CycleStage) else None
@@ -93,7 +92,6 @@ def _cycle(asked: Asked, columns: Sequence[Column]) -> CycleStage | None:
 def _known(
     rows: PressedRows, asked: Sequence[Asked], columns: Sequence[Column]
 ) -> dict[int, Measured]:
-    """The numbers of the certified rows, by their positions."""
     contacts = rows.contacts()
     good = ~(contacts["status"] == "undecided").any(axis=1)
     normal = {name: number(contacts) for name, number in NORMAL.items()}
@@ -130,7 +128,6 @@ def _known(
 
 
 def _cautions(scene: Scene, loads: Array) -> str:
-    """The `cautions` of `Measured`, from loads (n,)."""
     radii = hertz.contact_radius(loads, scene.material.contact_modulus, scene.relative_radii)
     if clear_of_cautions(scene, loads, radii):
         return ""

@@ -206,7 +206,6 @@ def read_table(
 def _factors(
     names: Sequence[str], units: Mapping[str, str], how: Reading
 ) -> tuple[dict[str, float], list[str]]:
-    """Factors that convert columns to the scene's units, and mistakes in units and factors."""
     factors, mistakes = {name: how.scales[name] for name in names if name in how.scales}, []
     first: dict[str, tuple[str, Unit]] = {}
     for name in names:
@@ -258,7 +257,6 @@ def _whole(source: _Source, place: int) -> NDArray[np.intp] | None:
 
 
 def _source(path: Path, known: Sequence[str]) -> _Source:
-    """All cells of a file of text or arrays."""
     if path.suffix.lower() in ARRAYS:
         arrays = read_arrays(path, known)
         count = len(next(iter(arrays.values()), []))
@@ -307,7 +305,6 @@ def _places(
     how: Reading,
     unnamed: Sequence[Sequence[str]],
 ) -> tuple[dict[str, int], list[str]]:
-    """The index of each wanted column that the file has, and mistakes in the names."""
     columns = how.columns
     names = source.header
     if names is None:

@@ -1,30 +1,9 @@
 r"""Proved bounds on the errors of a vector friction state from any source.
 
-Forces q and displacements are in scaled units. Stars mark the solution for the true loads P, known
-as balls. With the sliding threshold k_i, the rigid displacement X and the kernel B, each asperity i
-that is proved to touch obeys
-
-    eta_i = X - (B q)_i,    q_i = q(eta_i),    sum q = T,
-
-where q(eta) is parallel to eta, with the length P [1 - (1 - |eta|/k)^(3/2)], or P beyond k. It is
-the gradient of a convex function of eta. All other asperities together carry at most `stray`.
-
-1. Trial. Any eta and the forces q(eta) obey the local law with the true loads exactly. Not zero are
-   the imbalance v_i = eta_i + (B q(eta))_i - X and m = |sum q(eta) - T|.
-2. Total. Let lambda(r) be a lower bound on the slope of s -> sum q(eta + s) for |s| <= r
-   (`_shift`). If r lambda(r) >= m, then some s with |s| <= r makes sum q(eta + s) = T: on the
-   circle |s| = r the convex function less T.s increases outwards, so its minimum lies inside.
-3. Residual. For q' = q(eta + s) and the displacement X + s the residual is
-   e_i = |v_i + (B (q' - q))_i| plus the effect of `stray`. Where an asperity slides, |q'_i| = P_i.
-4. Theorem (docs/theory/one-theorem.md):  || q* - q' ||_H <= || e ||_{H^-1} / mu  with
-   h_i = 2 k_i / (3 P_i), H = diag(h) and the margin mu of `VectorProblem.margin`.
-5. Displacement. eta*_i = eta_i + w_i + (X* - X) with w_i = -v_i - (B (q* - q))_i.
-   So step 2, with sums that include w, bounds |X* - X|.
-6. Statuses. Asperity i is proved to slide if |eta*_i| > k_i within the bounds, and not to slide if
-   |eta*_i| < k_i or |q*_i| < P_i.
-
-The energy E is convex, so E(q) - E(q*) <= sum e_i |q_i - q*_i| + X.(sum q - T) for any forces q.
-docs/theory/vector-friction.md derives lambda of step 2, and a second proof near gross sliding.
+docs/theory/vector-friction.md, "What is proved of a state" and "Close to gross sliding", derives
+the steps 1 to 6 that comments name. Forces q, the displacement eta that each asperity takes up, the
+total T and the rigid displacement X are in scaled units. P are the loads, k the sliding thresholds,
+B the kernel; a star marks the solution for the true loads, which are known as balls.
 """
 
 from __future__ import annotations
@@ -85,7 +64,6 @@ def certify_vectors(problem: VectorProblem, state: VectorState, total: Ball) -> 
 
 
 def _by_convexity(problem: VectorProblem, state: VectorState, total: Ball) -> VectorBounds:
-    """The bounds by steps 1 to 6."""
     sure, softness = problem.sure, problem.softness
     reach = problem.reach
     limits, thresholds = problem.load_balls, problem.threshold_balls
@@ -166,13 +144,7 @@ def _steepest(problem: VectorProblem, size: Array) -> Array:
 
 
 def _shift(problem: VectorProblem, eta: Array, turned: Array, missing: float) -> float:
-    """The r of step 2 if each eta_i may change by up to turned_i; infinite if none is found.
-
-    Along a unit vector z the slope of q_i is at least radial + d sin^2 of the angle between z and
-    eta_i, with d = across - radial at the longest eta_i. Let `least` be the smallest sum of d sin^2
-    over all z, and theta_i bounds on the errors of the sines. By Minkowski's inequality
-    lambda >= sum radial + [least^(1/2) - (sum d theta^2)^(1/2)]^2.
-    """
+    """The r of step 2 if each eta_i may change by up to turned_i; infinite if none is found."""
     size = np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:
         return np.inf
@@ -228,7 +200,6 @@ def _excess(problem: VectorProblem, state: VectorState, total: Ball, errors: Arr
 
 
 def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
-    """The better of two proofs, for each bound."""
     return VectorBounds(
         found.proved or other.proved,
         np.fmin(found.increments, other.increments),

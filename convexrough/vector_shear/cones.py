@@ -1,23 +1,10 @@
 """The friction problem with the full tangential kernel as one second-order cone program.
 
-The forces q, loads P, thresholds k, total T and kernel B are those of `problem`. M = B + shift is
-the kernel with a diagonal that makes it positive semidefinite, and S the ratio of the shift to the
-local stiffness. A variable m_i >= |q_i| bounds the size of each force, and m_i / P_i = 1 - t_i^3.
-The local energy of m less shift m^2 / 2 is P_i k_i times
-
-    (3/5) t^5 - (S/3) t^6 - (1 - 2S/3) t^3 + 2/5 - S/3,
-
-which does not decrease as m grows if S <= 1. So the sum of these energies and of the convex
-(1/2) q'Mq may be minimised over m_i >= |q_i| and sum q = T. The cones of `convexrough.convex.cones`
-represent the powers of t exactly, with four cones per asperity if all S_i <= 21/25, with five if
-S_i <= 1. The multiplier of the total is the rigid displacement; that of |q_i| <= m_i is the sum of
-the slip and of the slope of the local energy.
-
-Under a small force every t is near 1, and variables for powers of t would lose all digits. So the
-cones use u = 1 - t. Each cone says that a 2 x 2 moment matrix, in the basis 1, t or 1, t^2, is
-semidefinite; the basis 1, u or 1, 1 - t^2 gives an equivalent cone. The solver's variables are
-those of order u^k over epsilon_i^k, and q over epsilon_i P_i, where epsilon_i is the elastic
-estimate of |q_i| / P_i, at most 1. So the numbers are about 1 under any force.
+docs/theory/vector-friction.md, "Cones", derives it, with t from |q| / P = 1 - t^3, u = 1 - t, the
+share S of the shift in the local stiffness, and epsilon, the elastic estimate of |q| / P. The
+solver's variables are those of order u^k over epsilon^k, and q over epsilon P. The multiplier of
+the total is the rigid displacement; that of |q_i| <= P_i (1 - t^3) is the sum of the slip and of
+the slope of the local energy.
 """
 
 from __future__ import annotations
@@ -199,7 +186,6 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return sparse.csc_matrix(sparse.block_diag((upper, nothing))), linear
 
     def _constraints(self, rows: Array) -> csc_matrix:
-        """Rows of sum q = T over |T|, and then of the cones of every asperity."""
         from scipy import sparse
 
         n, _, variables = rows.shape
@@ -216,10 +202,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return constraints
 
     def _rows(self) -> Array:
-        """(n, rows, k) the rows of the cones of every asperity, m / P >= |(x, y)| first.
-
-        Each row is divided by the power of epsilon of its order.
-        """
+        """(n, rows, k) rows of the cones over epsilon^order, with m / P >= |(x, y)| first."""
         lift, small = self.lift, self.small[:, None]
         leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
         powers = np.maximum(lift.orders - leading, 0.0)

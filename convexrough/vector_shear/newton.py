@@ -1,16 +1,13 @@
 """Newton's method for the friction problem with the full tangential kernel.
 
-The unknown eta_i is the sum of deflection and slip of asperity i. The shear force
-q_i = P_i force(|eta_i| / threshold_i) is parallel to eta_i, and `convex.newton` solves
+docs/theory/vector-friction.md, "Newton's method", in scaled units: the unknown eta_i is the sum of
+deflection and slip of asperity i, and `convex.newton` solves
 
     F = eta + B q(eta) - X = 0,    sum q(eta) = T.
 
-Asperities with |eta_i| > threshold_i slide. With dq_i/deta_i = W_i W_i' (of rank 1 where sliding:
-the force can still turn) a step solves
+With dq_i/deta_i = W_i W_i' a step solves
 
     (I + W'B W) y = W'(dX - F),   sum W y = 0,   d(eta) = dX - F - B W y.
-
-The matrix is symmetric, and positive definite if the energy is convex.
 """
 
 from __future__ import annotations
@@ -125,10 +122,7 @@ class _Friction:
         return SAFETY * state.energy + 1e-14 * float(np.hypot(*self.total)) * state.scale
 
     def noise(self, state: _Iterate) -> float:
-        """A lower bound on the rounding error of F, which ends the steps on symmetric layouts.
-
-        There the part of F across X can halve at every step until it underflows.
-        """
+        """A lower bound on the rounding of F, which ends steps on symmetric layouts."""
         return ROUNDOFF * state.scale
 
     def advice(self, state: _Iterate) -> str:
@@ -184,11 +178,7 @@ def _roots(problem: VectorProblem, eta: Array) -> Array:
 
 
 def _onto_total(problem: VectorProblem, eta: Array, total: Array) -> Array | None:
-    """eta + s, with the vector s for which the forces add up to the total; None if not found.
-
-    s minimises a convex function with the gradient sum q(eta + s) - T, by Newton's method with
-    steps halved while they overshoot.
-    """
+    """eta + s, with the vector s for which forces add up to T; None if it is not found."""
     shift = np.zeros(2)
     excess = problem.local_forces(eta).sum(axis=0) - total
     size = float(np.hypot(*total))

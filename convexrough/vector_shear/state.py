@@ -2,7 +2,7 @@
 
 `shear` uses the approximation of Ciavarella and Jaeger. Here tangential point forces move the
 surface by Cerruti's tensor, so forces and slips are vectors, which turn a little from the direction
-of the shear force. The state minimises a convex energy (docs/theory/vector-friction.md).
+of the shear force (docs/theory/vector-friction.md).
 """
 
 from __future__ import annotations
@@ -165,7 +165,6 @@ def _solved(solver: FrictionSolver, problem: VectorProblem, total: Array) -> Vec
 
 
 def _vector(force: ArrayLike) -> Array:
-    """(2,) the force, from a number along x or a pair."""
     if np.ndim(force) == 0:
         return np.array([checks.array("force", force, length=1)[0], 0.0])
     pair = checks.array("force", force)
@@ -176,10 +175,9 @@ def _vector(force: ArrayLike) -> Array:
 
 
 def _gross(problem: VectorProblem, total: Array) -> VectorState:
-    """The state at |T| = sum P: all forces and slips are along T.
+    """The state at |T| = sum P, where all forces and slips are along T.
 
-    This needs displacements B q with the same component across T at all asperities. Otherwise the
-    forces only tend to this state as X grows without bound.
+    If displacements B q across T differ, the forces only tend to it as X grows without bound.
     """
     along_total = total / np.hypot(*total)
     across_total = np.array([-along_total[1], along_total[0]])
@@ -216,8 +214,6 @@ def _disagreement(problem: VectorProblem, state: VectorState, height: Fraction) 
 def _certificate(
     contact: Contact, problem: VectorProblem, state: VectorState, bounds: VectorBounds
 ) -> ShearCertificate:
-    """The certificate in the scene's units, from the bounds on a state."""
-
     def in_scene(errors: Array, values: Array, unit: float) -> Array:
         size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)
         return problem.to_scene((errors * (1 + SAFETY) + ROUNDED * size) * unit)
@@ -250,7 +246,6 @@ def _certificate(
 
 
 def _unmoved(contact: Contact, solver: str) -> VectorShearState:
-    """The state of a contact without load."""
     n = len(contact.scene)
     zero, none, pairs = frozen(np.zeros(n)), frozen(np.zeros(2)), frozen(np.zeros((n, 2)))
     certificate = shear(contact, force=0.0).certificate

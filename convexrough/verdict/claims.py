@@ -155,10 +155,7 @@ def _spread(values: NDArray[Any], owners: Indices, rest: str, count: int) -> NDA
 
 
 def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
-    """The areas of nodes, or the one area of the points of a regular grid.
-
-    A hexagonal grid has every second point of a rectangular one.
-    """
+    """The areas of nodes, or the one area of a regular grid."""
     if "area" in columns:
         return columns["area"]
     try:
@@ -171,7 +168,6 @@ def _areas(path: Path, columns: dict[str, NDArray[Any]]) -> Any:
 
 
 def _explained(table: ReadTable) -> Iterator[str]:
-    """Lines that say how many rows the file has, and how each column is read."""
     yield f"rows: {len(table.rows):,}{f', {table.style}' if table.style else ''}"
     for name, called in table.called.items():
         unit = f" in {table.units[name]}" if name in table.units else ""
@@ -200,7 +196,6 @@ class _Placing:
         self.points = np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
 
     def owners(self) -> Indices:
-        """The asperity of each row, if rows are asperities."""
         count, rows = len(self.scene), len(self.table.rows)
         found = np.arange(rows) if self.points is None else self._matched(self.points)
         by = "positions"

@@ -50,7 +50,6 @@ def verify_files(
 
 
 def _claimed_to_slide(path: Path, forces: Claimed, contact: Contact) -> NDArray[np.bool_] | None:
-    """(n,) True where the file claims sliding; None if it has no statuses."""
     if forces.status is None:
         return None
     said = np.char.lower(np.char.strip(forces.status))

@@ -99,7 +99,6 @@ def describe_scene(scene: Scene) -> list[str]:
 
 
 def _proved(claim: Claim) -> str:
-    """One line that says what is proved of a claim."""
     if len(claim.wrongly_claimed):
         return f"{claim.proved} wrong"
     if len(claim.undecided):
@@ -171,7 +170,6 @@ def junit(found: Verified | ConvexroughError) -> bytes:
 
 
 def _cases(found: Verified) -> Iterator[tuple[str, str]]:
-    """Pairs of a question and its failure message, "" if there is no failure."""
     for claim in found.claims:
         wrong = {what: which for what, which in claim.wrong.items() if len(which)}
         asked = {
@@ -192,7 +190,6 @@ def _named(scene: Scene, which: Indices) -> str:
 
 
 def _table(claim: Claim, scene: Scene, which: Indices) -> list[str]:
-    """The lines of a table of asperities; empty if there are none."""
     if len(which) == 0:
         return []
     length, force = scene.units

@@ -1,10 +1,8 @@
 """`verify`: compare claimed loads with what is proved about the solution.
 
-Loads make three claims: the asperities with a load above the floor touch, the others do not, and
-the loads are correct. `certify` bounds the errors of the loads; this module compares the claimed
-set with the proved statuses. Where the loads are too inaccurate to prove every status, Newton's
-method continues from them to a solution, and the certificate of that solution shows which
-asperities are wrong. `friction.verdict` does the same for shear forces.
+Where the loads are too inaccurate to prove every status, Newton's method continues from them to a
+solution, and the certificate of that solution shows which asperities are wrong. `friction.verdict`
+does the same for shear forces.
 """
 
 from __future__ import annotations
@@ -223,4 +221,4 @@ def verify_on(
             return replace(verdict, solution=solve(problem, start=start))
         except SolverError:
             continue
-    return verdict  # with the certificate of the loads alone
+    return verdict  # statuses then follow only from the certificate of the loads

@@ -172,7 +172,6 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
 
 
 def _neglected(normal: Summary) -> str:
-    """The effect of different materials that the model neglects, with its size."""
     if not (beta := normal["mismatch"]):
         return ""
     return (
@@ -182,14 +181,12 @@ def _neglected(normal: Summary) -> str:
 
 
 def _described_pressure(normal: Summary, units: UnitNames) -> str:
-    """The largest mean pressure, and whether yield is checked."""
     unit = units.unit("pressure")
     known = f"at most {normal['mean_pressure']:.4g} {unit.name if unit else ''}".rstrip()
     return known if normal["hardness"] else f"{known}  (no hardness given: yield is not checked)"
 
 
 def _described_geometry(normal: Summary) -> str:
-    """The geometry, and where it matters the difference from the other one."""
     change, name = normal["closest_change"] or 0.0, str(normal["geometry"])
     if change <= DIFFERENT:
         return name
