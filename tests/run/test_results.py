@@ -98,7 +98,7 @@ def test_contact_beyond_the_sphere(command: Any, tmp_path: Path) -> None:
     blunt = HEXAGONAL.replace("0.0025", "0.4").replace("0.02", "0.01")
     outcome = warned(command, tmp_path, scene_text(blunt, "approach = 0.9"))
     assert (
-        "1.09 of the base's radius from the axis: from 0.2 on, the paraboloid of the model"
+        "1.09 of the sphere's radius from the axis: from 0.2 on, the paraboloid of the model"
         in outcome.err
     )
     assert "of the tip radius: from 0.2 on, the paraboloid of the model" in outcome.err
