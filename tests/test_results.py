@@ -281,6 +281,8 @@ MODULES = sorted(
 )
 
 
+@pytest.mark.usefixtures("no_processes")
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("module", MODULES)
 def test_examples_in_docstrings(module: str, tmp_path: Path) -> None:
     scene = dataclasses.replace(paper(), friction=0.5)

@@ -25,7 +25,7 @@ from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 
 Sizes = tuple[tuple[Family, int], ...]
 
-#: How often the default solver and solvers that seem to be faster are timed again, alternately.
+#: Number of times that the default solver and apparently faster ones are timed again.
 ROUNDS = 4
 
 #: Compliance operators for Newton's method, with the largest number of asperities for each.
@@ -109,11 +109,7 @@ def run(*, quick: bool) -> Bench:
 
 
 def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]:
-    """The rows of all attempts on one scene.
-
-    The default solver and the solvers that seem to be faster are timed again, alternately. Each
-    keeps its least time, so that a short load on the machine does not change the order.
-    """
+    """The rows of all attempts on one scene; apparently faster ones are timed again."""
     LOGGER.info(f"{family}, about {size:,}: reference")
     each = scene(family, REFINEMENTS[size])
     problem = NormalProblem.assemble(each, approach=APPROACH)

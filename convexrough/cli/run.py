@@ -1,4 +1,4 @@
-"""`run`, and `new`, which writes a scene to run."""
+"""`run`, which computes a scene file, and `new`, which writes one."""
 
 from __future__ import annotations
 
@@ -80,7 +80,6 @@ def run(
 
 
 def _swept(sweep: Path, out: Path | None, force: bool, as_json: bool, *, given: bool) -> int:
-    """Compute the file as `convexrough sweep` does."""
     from convexrough.cli.sweep import sweep as command
 
     if given:

@@ -113,7 +113,7 @@ class Gradient(Table, Plottable):
     holding         : "load" or "approach", the quantity that is kept constant
     heights, tip_radii, positions : (n,), (n,) and (n, 2), in the scene's order; 0 for screened
         asperities, and for open ones unless the number contains their gap
-    sphere_radius   : None unless the base is a sphere
+    sphere_radius   : None for shapes other than a sphere
     contact_modulus : at constant Poisson's ratio;  poisson_ratio : at constant E*
     load, approach  : derivative by the quantity `holding`; the other is None
     friction        : None for a scene without friction
@@ -221,7 +221,7 @@ class Gradient(Table, Plottable):
 
         W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) is proportional to c_t f^2 P^(5/3) E*^(-2/3) R^(-1/3).
         At constant approach the total load P varies. Raises InputError for gradients of other
-        numbers, and for a base without a smooth reference.
+        numbers, and for shapes without a smooth reference.
         """
         if self.maximum is None:
             expected = "the gradient of the loss of a cycle"
@@ -229,7 +229,7 @@ class Gradient(Table, Plottable):
         number, scene = self.number, self.contact.scene
         reference = smooth_reference(scene, self.contact.load)
         if reference is None:
-            expected = "a base with a smooth reference: a sphere or an ellipsoid"
+            expected = "a sphere or an ellipsoid"
             raise InputError("normalised", found=named(scene.sphere_radius), expected=expected)
         R = Ball.exact(scene.mean_radius)
         E = Ball.exact(scene.material.contact_modulus)

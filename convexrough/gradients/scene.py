@@ -222,7 +222,7 @@ class Derivatives:
 
     @property
     def sphere_radius(self) -> Ball | None:
-        """The derivative by the radius of the sphere; None for other bases."""
+        """The derivative by the radius of the sphere; None for other shapes."""
         if named(self.geometry.problem.scene.sphere_radius) != "a sphere":
             return None
         return self.along(self.geometry.by_radius).sum()

@@ -28,11 +28,11 @@ STRAIGHT = 1e-11
 
 @np.errstate(all="ignore")
 def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array) -> Array:
-    """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load; or of rows, with loads (m, 1).
+    """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load;  rows (m, n) have loads (m, 1).
 
-    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is increasing and convex in tau,
-    and nearly straight. From the second step on, Newton's method approaches the root from the
-    right. The shift is relative to the largest delta, to keep the precision of small loads.
+    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is increasing, convex and nearly
+    straight in tau, and Newton's method converges to the root from the right. The shift is
+    computed relative to the largest delta, to keep the precision of small loads.
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, softness = indentation - highest, 1.0 / coefficients
@@ -61,15 +61,14 @@ def approach_bound(
     offsets: Array,
     load: float | Array,
 ) -> Any:
-    """Upper bound on D0 at every solution of total `load` (derived in docs/theory/certificate.md).
+    """Upper bound on the approach at every solution of total load L.
 
-    With q = weights / sum(weights), alpha_i = q_i k_i and c = A q, for every lambda >= max c:
+    It is (2) of docs/theory/certificate.md, with q = weights / sum(weights), alpha = q k, c = A q.
 
-        D0 <= lambda L + (4/27) sum alpha_i^3 / (lambda - c_i)^2 - d'q.
-
-    A number, or (m, 1) for loads (m, 1) of a stack.
-
-    displacement : (n,) no less than A times weights;  offsets : (n,) no more than d
+    weights      : (n,) approximate loads, not negative, not all 0
+    displacement : (n,) A times weights, or more
+    coefficients, offsets : (n,) k, and d or less
+    load         : L, or (m, 1) for m rows; the bound has the same shape
     """
     total = summed(weights)
     q, c = weights / total, displacement / total
@@ -79,8 +78,8 @@ def approach_bound(
         active, cubes = c[cubes > 0], cubes[cubes > 0]  # others do not matter
     else:
         active = np.where(cubes > 0, c, -np.inf)
-    # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L: Newton's method for
-    # S^(-1/3), which is concave and nearly straight, from the left.
+    # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L. Newton's method from the
+    # left is applied to S^(-1/3), which is concave and nearly straight.
     least = largest(active)
     height = largest(active + np.cbrt(cubes / wanted)) * (1 + SAFETY)
     for _ in range(100):
@@ -130,7 +129,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 
 def smooth_loads(scene: Scene, load: float) -> Array:
-    """(n,) [force] loads of this total, if the surface moves as under a smooth sphere."""
+    """(n,) [force] loads of this total if the surface moves as under a smooth sphere."""
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
     sunk = smooth_displacement(scene, scene.asperities.distances, load)
     indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
@@ -154,14 +153,14 @@ def all_that_could_touch(
     farthest: Callable[[float], float],
     load: float,
 ) -> tuple[Scene, float]:
-    """The scene with all asperities that could touch under a load, and a bound on its approach.
+    """The scene with all asperities that could touch under a load, and a bound on the approach.
 
-    scene_within : returns the scene within a distance from the axis [length]; a greater distance
-        only adds asperities
+    scene_within : returns the scene within a distance from the axis [length]
     farthest     : returns the largest distance of asperities that can touch at an approach [length]
 
-    The bound of a wide scene also holds for a smaller one that keeps all trial loads: lambda is at
-    least the displacement c_i at every asperity.
+    The bound of a wide scene also holds for a narrower one with all asperities of the approximate
+    loads, as lambda of (2) of docs/theory/certificate.md is at least the displacement at every
+    asperity.
     """
     axis = scene_within(0.0)
     modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))

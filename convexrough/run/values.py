@@ -1,6 +1,6 @@
 """Types of the values in a scene file, and messages for all mistakes at once.
 
-Only modules that define tables import this one: pydantic takes 0.1 s to import.
+Only modules that define tables import this one, because pydantic takes 0.1 s to import.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from convexrough.checks import PHASE, SIZED, is_phase, is_sized, nearest
 
-#: Symbols that a user may have written as keys, and the keys to suggest for them.
+#: Keys that a user may have written, and the keys to suggest.
 MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
 MEANT |= {"nu": "poisson_ratio", "R": "radius", "rho": "tip_radius", "f": "coefficient"}
 MEANT |= {"mu": "coefficient", "P": "load", "D": "approach"}
@@ -36,7 +36,7 @@ Mistake = tuple[str, str]
 
 
 def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
-    """What a message says after "expected", of a wrong type or where `holds` is false."""
+    """A validator whose messages say "expected", with this phrase; it also requires `holds`."""
 
     def check(value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
         try:
@@ -50,7 +50,7 @@ def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> 
     return WrapValidator(check)
 
 
-#: Where the file has a list, the second; tags in brackets are not said.
+#: Of the types "number" and "list", the one that the file has; messages omit tags in brackets.
 NUMBER_OR_LIST = Discriminator(lambda it: "(list)" if isinstance(it, list) else "(number)")
 
 _SIZED = expected(SIZED, is_sized)
@@ -93,7 +93,7 @@ Force = Annotated[
 
 
 class FileTable(BaseModel):
-    """A table: numbers are finite, no text or truth value stands for one, no other keys."""
+    """A table of a file: numbers are finite and are not texts or truth values; no other keys."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
 
@@ -104,7 +104,7 @@ class FileTable(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _all_mistakes(cls, keys: Any, validated: ModelWrapValidatorHandler[Self]) -> Self:
-        """Those of single values, of keys beside each other, and of a table right in itself."""
+        """All mistakes: in single values, in which keys are given, and between values."""
         if not isinstance(keys, dict):
             raise PydanticCustomError("expected", "a table")
         found: list[InitErrorDetails] = []
@@ -140,7 +140,7 @@ class FileTable(BaseModel):
                 yield needed, f"missing, needed with {key}"
 
     def mistakes_within(self) -> Iterator[Mistake]:
-        """Mistakes that only show between values each right by itself."""
+        """Mistakes in values that are only wrong together."""
         yield from ()
 
 

@@ -65,7 +65,8 @@ class Material:
     def pair(cls, sphere: Material, base: Material) -> Material:
         """The material of two bodies of different materials.
 
-        sphere, base : material of each body, as `from_youngs` returns it
+        sphere, base : materials of the sphere (or another pressed body) and of the body with the
+            asperities, as `from_youngs` returns them
 
         Normal and tangential compliances are those of two equal bodies with
         2 / G = 1 / G_1 + 1 / G_2 and nu = (nu_1 / G_1 + nu_2 / G_2) G / 2, without the coupling by

@@ -1,4 +1,4 @@
-"""Nearest neighbours of points, by a k-d tree."""
+"""Nearest neighbours of points."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from convexrough.arrays import Array
 from convexrough.checks import SIZED, SMALLEST
 from convexrough.errors import InputError
 
-#: Number of asperities per batch in `crowding`; each batch may reduce the pairs of the next. A
-#: heuristic, for speed.
+#: Number of asperities per batch in `crowding`. A heuristic, for speed.
 BATCH = 256
+
+#: Number of points up to which all distances are computed. It affects speed only.
+FEW = 400
 
 
 def separations(points: Array, point_error: float = 0.0) -> Array:
@@ -24,10 +26,7 @@ def separations(points: Array, point_error: float = 0.0) -> Array:
 
 
 def crowding(points: Array, radii: Array) -> float:
-    """The largest (a_i + a_j) / r_ij over all pairs.
-
-    The search takes neighbours j with a_j <= a_i that are near enough to exceed the value so far.
-    """
+    """The largest (a_i + a_j) / r_ij over all pairs, with contact radii a and distances r."""
     from scipy.spatial import cKDTree
 
     if len(points) < 2:
@@ -69,6 +68,10 @@ def refuse_coincident(points: Array) -> None:
 
 def nearest_distances(points: Array) -> Array:
     """(n,) [length] distance of each point to its nearest neighbour."""
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+    if len(points) <= FEW:
+        apart = np.hypot(*(points.T[:, None] - points.T[:, :, None]))
+        np.fill_diagonal(apart, np.inf)
+        return np.asarray(apart.min(axis=0))
+    from scipy.spatial import cKDTree  # takes as long to import as a small scene to compute
 
     return np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]

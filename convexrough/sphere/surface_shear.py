@@ -1,12 +1,12 @@
 """One sphere under a shear force along x: traction and tangential displacement of the surface.
 
-In the theory of Cattaneo and Mindlin, with t = Q / (f P), the contact radius a and the stick radius
-c = a (1 - |t|)^(1/3), the traction is
+In the theory of Cattaneo and Mindlin, with t = Q / (f P), the peak pressure p0, the contact radius
+a and the stick radius c = a (1 - |t|)^(1/3), the traction is
 
     q(r) = f p0 [sqrt(1 - r^2/a^2) - (c/a) sqrt(1 - r^2/c^2)],    the last root 0 for r > c.
 
-Both terms become equal as t -> 0. The functions below do not subtract them, but use
-1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), from `mindlin.deflection`, and so keep their relative accuracy.
+Both terms become equal as t -> 0. The functions use 1 - c^2/a^2 = 1 - (1 - |t|)^(2/3), from
+`mindlin.deflection`, and so keep their relative accuracy.
 Source: Johnson, Contact Mechanics (1985), chapters 3 and 7.
 """
 

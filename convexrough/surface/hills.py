@@ -1,11 +1,6 @@
-"""The hills of a map: the positions and prominences of its maxima.
+"""The hills of a map, with positions and prominences of the maxima.
 
-The *prominence* of a maximum is its height above the highest pass on any way to a taller maximum.
-Wolf pruning (ISO 25178-2, ISO 16610-85) merges the hill with the least height above its highest
-saddle into the hill beyond this saddle, and repeats this until all heights exceed a threshold. The
-hill beyond the saddle is always taller, as the saddle bounds it, too. So a hill is merged exactly
-if its prominence is below the threshold. Prominences do not depend on the threshold, and one sort
-of the passes gives all of them.
+docs/theory/surfaces.md, "Pruning".
 """
 
 from __future__ import annotations
@@ -39,7 +34,7 @@ class Hills(NamedTuple):
 def hills(heights: Array) -> Hills:
     """The pixels that are higher than all eight neighbours, and their prominences.
 
-    Pixels of equal height are ordered by position. So all but one maxima of a plateau have the
+    Pixels of equal height are ordered by position. All but one maxima of a plateau then have the
     prominence 0; these are left out.
     """
     order = np.argsort(heights, axis=None, kind="stable")
@@ -68,9 +63,7 @@ def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]
 def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest.
 
-    A way between two maxima crosses from hill to hill at pairs of neighbours; inside a hill it need
-    not go below the crossing at which it enters. So the graph of hills with the highest crossing of
-    each pair has the same passes, and so has a spanning tree of it (Kruskal).
+    A spanning tree of the graph of hills with the highest crossing of each pair (Kruskal) has them.
     """
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))

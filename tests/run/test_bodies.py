@@ -151,5 +151,5 @@ def test_like_bodies_have_nothing_to_say(command: Any, tmp_path: Path) -> None:
 def test_the_slider_page_is_of_spheres(command: Any, tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(text("inf", normal="load = 1e-7", more=STAGES))
     outcome = command("run", "scene.toml", "--no-figures", "--html")
-    assert "slider page: found a flat base, expected a scene whose base is a sphere" in outcome.err
+    assert "slider page: found a flat, expected a sphere" in outcome.err
     assert outcome.status == 2

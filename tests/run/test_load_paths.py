@@ -52,6 +52,9 @@ def test_a_run(command: Any) -> None:
             assert len(list(csv.DictReader(file))) == 61
 
 
+VECTOR = '[shakedown]\nloads = 1\nkind = "vector"\nforce_amplitudes = '
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [
@@ -63,24 +66,15 @@ def test_a_run(command: Any) -> None:
         ("[shakedown]\nloads = 1e-7\nforce_amplitudes = [0.0]\n", "expected a path that moves"),
         (
             '[shakedown]\nloads = 1\nforce_amplitudes = [1]\nkind = "x"\n',
-            '"exact", "elastic" or "vector"',
+            '"exact", "elastic" or "v',
         ),
         (
-            "[shakedown]\nloads = 1.0\nforce_amplitudes = [[1, 0]]\n",
-            "expected a number with this kind",
+            "[shakedown]\nloads = 1\nforce_amplitudes = [[1, 0]]\n",
+            "expected a number with this kin",
         ),
-        (
-            '[shakedown]\nloads = 1.0\nforce_amplitudes = [1, -1]\nkind = "vector"\n',
-            "force_amplitudes[0]: found 1.0, expected a pair [x, y]",
-        ),
-        (
-            '[shakedown]\nloads = 1\nforces = 0.1\nforce_amplitudes = [[1, 0]]\nkind = "vector"\n',
-            "forces: found 0.1, expected a pair [x, y]",
-        ),
-        (
-            '[shakedown]\nloads = 1.0\nforce_amplitudes = [[1, 0, 0]]\nkind = "vector"\n',
-            "expected a pair [x, y] of finite numbers",
-        ),
+        (f"{VECTOR}[1.0, -1]\n", "force_amplitudes[0]: found 1.0, expected a pair [x, y]"),
+        (f"{VECTOR}[[1, 0]]\nforces = 0.1\n", "forces: found 0.1, expected a pair [x, y]"),
+        (f"{VECTOR}[[1, 0, 0]]\n", "expected a pair [x, y] of finite numbers"),
     ],
 )
 def test_mistakes(command: Any, table: str, message: str) -> None:

@@ -283,7 +283,7 @@ def test_a_map_in_micrometres_called_millimetres(command: Any, surface: cr.surfa
     for unit, wrong in (("mm", True), ("µm", False)):
         options = ("--pixel", "1", "--unit", unit, "--no-figures", "--force")
         said = command("summits", "map.npy", "--scene", "mm.toml", *options).err
-        assert ("the map is 256 mm wide, and the base 20 mm: check the units" in said) == wrong
+        assert ("the map is 256 mm wide, and the sphere 20 mm: check the units" in said) == wrong
         assert ("asperities in contact: 1, fewer than 5" in said) == wrong
 
 

@@ -187,6 +187,7 @@ def test_all_mistakes_are_told_at_once() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.usefixtures("no_processes")
 def test_a_new_scene_takes_a_sweep(command: Any, tmp_path: Path) -> None:
     """It has stages that are not measured: one line names them."""
     command("new", "a.toml")

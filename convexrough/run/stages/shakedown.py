@@ -1,4 +1,4 @@
-"""[shakedown]: the largest factor on the amplitudes of a path up to which sliding ends."""
+"""[shakedown]: the largest factor of the amplitudes of a path for which sliding ends."""
 
 from __future__ import annotations
 
