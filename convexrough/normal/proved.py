@@ -237,9 +237,9 @@ def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, mov
     # k P^(2/3) is concave: its slope at the least load bounds its slope up to P
     slope = problem.stiffness(np.where(least > 0, least, 1.0))
     each = np.where(least > 0, state.gap.size + slope * errors + moved, np.inf)
-    rise = state.gap.upper + exact.coefficients.upper * np.cbrt(errors) ** 2 + moved
-    rise = np.where(box.fixed_open, np.inf, rise)
+    above = state.gap.upper + exact.coefficients.upper * np.cbrt(errors) ** 2 + moved
+    above = np.where(box.fixed_open, np.inf, above)
     across: Any = {"axis": -1, "initial": np.inf, "keepdims": each.ndim > 1}
-    fall = state.approach.upper - (-exact.offsets.upper).min(**across)
-    closest = np.minimum(each.min(**across), np.maximum(rise.min(**across), fall))
+    below = state.approach.upper - (-exact.offsets.upper).min(**across)
+    closest = np.minimum(each.min(**across), np.maximum(above.min(**across), below))
     return closest * (1 + 4 * SAFETY) + state.approach.radius
