@@ -35,7 +35,7 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
             os.replace(temporary, path)
     finally:
-        with suppress(OSError):  # a file system that became read-only has raised already
+        with suppress(OSError):  # an error was raised already
             temporary.unlink(missing_ok=True)
 
 

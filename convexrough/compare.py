@@ -168,10 +168,7 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers; each formulation with a final Newton step is included with and without it.
-
-    The cone program in CVXPY is also solved by SCS and QOCO, where they are installed.
-    """
+    """All solvers, also without their final Newton step; SCS and QOCO where they are installed."""
     return (
         solvers.Newton(),
         solvers.Conic(),
@@ -215,7 +212,7 @@ def _enter(
         if solver == _REFERENCE:
             raise
         return Entry(solver.name, "refused", str(error))
-    except Exception as error:  # of a solver from elsewhere; the others still answer
+    except Exception as error:  # a user's solver may raise anything
         if type(solver).__module__.startswith("convexrough."):
             raise
         return Entry(solver.name, "failed", f"{type(error).__name__}: {error}")
@@ -243,7 +240,7 @@ def _load_code_of(solver: solvers.Solver) -> None:
     """Make a solver import what it needs, so that measured times contain no imports."""
     two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
     small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
-    with suppress(Exception):  # `_enter` meets it again, and records or raises it
+    with suppress(Exception):  # `_enter` handles the same error later
         press(small, approach=1e-2, solver=solver)
 
 

@@ -239,7 +239,7 @@ def levels_of(contact: Contact) -> Levels:
     def pressed(at_load: NormalProblem, start: Array | None) -> Array:
         try:
             return solver.solve(at_load, start).loads
-        except SolverError:  # crowded contacts: start from the known loads
+        except SolverError:  # happens if contacts are crowded
             return solver.solve(at_load, state.loads.high).loads
 
     return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
@@ -305,7 +305,7 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
-    # Pickles keep neither; from a copy `levels_of` proves the loads again.
+    # Pickles contain neither; for an unpickled contact `levels_of` proves the loads again.
     contact.__dict__.update(_by=solver, _known=known)
     return contact
 

@@ -137,7 +137,7 @@ def cell_areas(points: Array) -> Array:
         return unknown
     try:
         mesh = Delaunay(points)
-    except QhullError:  # all on one line
+    except QhullError:  # all points are on one line
         return unknown
     areas: Array = np.zeros(len(points))
     for turn in range(3):

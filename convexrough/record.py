@@ -56,7 +56,7 @@ class Record:
     def __setstate__(self, state: dict[str, Any]) -> None:
         for value in state.values():
             if isinstance(value, np.ndarray):
-                value.flags.writeable = False  # a pickle does not store this
+                value.flags.writeable = False  # pickles do not store this flag
         self.__dict__.update(state)
 
     def _fields(self) -> Any:
@@ -148,10 +148,7 @@ def singular(name: str) -> str:
 
 
 def in_text(value: Any) -> str:
-    """A value in one line: the size and range of an array, the counts of statuses.
-
-    A mapping is shown as its keys, a tuple of records as their number.
-    """
+    """A value in one line: size and range of an array, counts of statuses, keys of a mapping."""
     if isinstance(value, Record):
         return value._headline()
     if isinstance(value, np.ndarray):

@@ -84,7 +84,7 @@ class PressedRows(NamedTuple):
         drop = (half / f).scaled(1.0 / units.force)
         total = high.load - drop
         inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
-        total = where(inside, total, high.load)[:, None]  # others are computed one by one
+        total = where(inside, total, high.load)[:, None]  # rows outside are left out
         rows = replace(self.stack, exact_load=total, exact_approach=None)
         offsets, reach = rows.exact.offsets.value, _reach(problem, total.value)
         found = solved(rows, offsets, self.squares, reach, self.box.closed)
@@ -198,7 +198,7 @@ def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:
     if len(rows) == 1 and rows[0] is scene:
         return problem.exact.offsets[None, :]
     bare = replace(scene, asperities=scene.asperities.with_tips(scene.asperities.tip_radii, 0.0))
-    drops = replace(problem, scene=bare).twofold_offsets()  # below 0
+    drops = replace(problem, scene=bare).twofold_offsets()  # at most 0
     heights = np.array([each.asperities.heights for each in rows]) / length
     offsets = Pair.exact(heights) + Pair(*(part[None, :] for part in drops))
     sizes = np.abs(offsets.high) + 6.0 * (np.abs(heights) + np.abs(drops.high))

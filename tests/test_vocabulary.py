@@ -3,6 +3,7 @@
 import io
 import re
 import tokenize
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
@@ -60,11 +61,15 @@ def prose_of_a_page(path: Path) -> str:
     return re.sub(r"`[^`]*`", "", re.sub(r"^    .*$", "", text, flags=re.M))
 
 
+@cache
+def tokens_of(path: Path) -> list[tokenize.TokenInfo]:
+    return list(tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline))
+
+
 def prose_of_a_module(path: Path) -> str:
     """Docstrings, messages, help texts and comments."""
-    tokens = tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline)
     names = {"STRING", "FSTRING_MIDDLE", "COMMENT"}
-    return "\n".join(t.string for t in tokens if tokenize.tok_name[t.type] in names)
+    return "\n".join(t.string for t in tokens_of(path) if tokenize.tok_name[t.type] in names)
 
 
 def found_in(text: str) -> list[str]:
@@ -78,8 +83,7 @@ def found_in(text: str) -> list[str]:
 
 def names_of_a_module(path: Path) -> set[str]:
     """Names of modules, classes, functions, parameters, attributes and variables."""
-    tokens = tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline)
-    return {path.stem, *(t.string for t in tokens if t.type == tokenize.NAME)}
+    return {path.stem, *(t.string for t in tokens_of(path) if t.type == tokenize.NAME)}
 
 
 def test_former_names_do_not_come_back() -> None:

@@ -92,7 +92,7 @@ def run(*, quick: bool) -> Bench:
     """The measurements of the whole list, or of a quick run."""
     patience = 0.1 if quick else 1.0
     began, machine, rows = time.perf_counter(), describe_machine(), list[Row]()
-    for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # so that imports are not timed
+    for solver in (Newton(), Conic(), ConicCVXPY(), BristleQP()):  # excludes imports from times
         with suppress(InputError, SolverError):  # `_panel` reports such errors
             press(scene("lattice", 1.0), approach=APPROACH, solver=solver)
     for family, size in WORK[:3] if quick else WORK:

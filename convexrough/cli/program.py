@@ -74,12 +74,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 say_aside("error", line)
             stopped = isinstance(error, (SolverError, WorkerError))
             return SOLVER_FAILED if stopped else WRONG_INPUT
-        except OSError as error:  # those of files are FileErrors
+        except OSError as error:  # from standard output, as files raise FileError
             return _unheard(error)
         except Exception:
             if not interrupts:
                 raise
-            say_aside("interrupted")  # in compiled code, which made another error of it
+            say_aside("interrupted")  # compiled code raised another error
             return INTERRUPTED
 
 
@@ -119,6 +119,6 @@ def _unheard(error: OSError) -> int:
     if error.errno != errno.EPIPE:
         say_aside("error", f"standard output: {error.strerror or error}")
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)  # so that what is left is not written when the interpreter ends
+    os.dup2(nowhere, 1)  # unwritten output is dropped at exit
     os.close(nowhere)
     return UNHEARD

@@ -139,7 +139,7 @@ def verify(
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not force:
             raise FileError(f"{each}: exists already; --force replaces it")
-        each.unlink(missing_ok=True)  # so that no earlier proof stands beside a failure
+        each.unlink(missing_ok=True)  # an earlier proof must not remain if this run fails
     with ExitStack() as stack:
         stack.enter_context(_reported(junit))
         file = read_scene(scene)

@@ -1,10 +1,7 @@
 """Powers of a number between 0 and 1 as second-order cones.
 
-For t in [0, 1] a *lift* stands for the powers of t by linear variables
-
-    y2, y3, y4, y5 for t^2, ..., t^5    and    z for t^5 - t^6,
-
-(and y1 for t in the five-cone form), tied to each other by rotated cones x y >= w^2, x, y >= 0:
+A *lift* of t in [0, 1] is a set of variables y2, y3, y4, y5 for t^2, ..., t^5 and z for t^5 - t^6;
+the form with five cones also has y1 for t. Rotated cones x y >= w^2, x, y >= 0 constrain them:
 
     four cones                                     five cones
     1 * y4              >= y2^2                    (1 - y1) * (y2 - y3)  >= (y1 - y2)^2
@@ -12,9 +9,9 @@ For t in [0, 1] a *lift* stands for the powers of t by linear variables
     y3 * y5             >= y4^2                    and the last three of the four
     (y3 - y4) * z       >= (y4 - y5)^2
 
-Over them, min (3/5 - S/3) y5 + (S/3) z at fixed y3 = t^3 is (3/5) t^5 - (S/3) t^6 exactly: for
-0 <= S <= 21/25 with four cones, for 0 <= S <= 1 with five.
-docs/theory/exact-cones.md, "Why it is exact".
+At fixed y3 = t^3, the minimum of (3/5 - S/3) y5 + (S/3) z is exactly (3/5) t^5 - (S/3) t^6. With
+four cones this holds for 0 <= S <= 21/25, with five for 0 <= S <= 1: docs/theory/exact-cones.md,
+"Why it is exact".
 """
 
 from __future__ import annotations
@@ -57,14 +54,14 @@ class ConeRows(NamedTuple):
 
 
 def power_cones(lifts: Sequence[Indices], width: int, ones: Indices | None = None) -> ConeRows:
-    """The cones of n lifts in Clarabel's form  A x + s = b,  s in the cones; all lifts at once.
+    """The cones of n lifts in Clarabel's form  A x + s = b,  s in the cones.
 
-    lifts : columns, (n,) each, of y2, y3, y4, y5, z (four-cone form), or of y1, y2, y3, y4, y5, z
-        (five-cone form), among all variables of the program
-    width : how many variables the program has
+    lifts : the columns of y2, y3, y4, y5 and z, (n,) each, for four cones; those of y1, ..., y5 and
+        z for five cones
+    width : number of variables of the program
     ones  : (n,) columns of variables that replace the constant 1 in the cones of each lift
 
-    Rows are grouped by lift: the cones of the first, three rows each, then those of the second.
+    Rows are grouped by lift, with three rows per cone.
     """
     from scipy.sparse import csc_array  # 0.1 s to import: only when solving
 

@@ -187,7 +187,7 @@ def certificate_of(
     if isinstance(found, Obstacle):
         return _unproved(problem, start, indentation, found)
     given = loads[problem.candidates]
-    if here and np.array_equal(given / force, found.loads.value):  # proved from these loads
+    if here and np.array_equal(given / force, found.loads.value):  # the proof is for these loads
         off = found.loads.error
         moved = off + np.abs(start.loads.low)
         errors, shift = found.indentation.error, float(found.approach.error)

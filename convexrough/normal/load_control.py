@@ -30,13 +30,12 @@ STRAIGHT = 1e-11
 def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array) -> Array:
     """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load;  rows (m, n) have loads (m, 1).
 
-    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is increasing, convex and nearly
-    straight in tau, and Newton's method converges to the root from the right. The shift is
-    computed relative to the largest delta, to keep the precision of small loads.
+    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is convex and nearly straight in
+    tau, and Newton's method converges to the root from the right.
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, softness = indentation - highest, 1.0 / coefficients
-    most = hertz.indentation(load, largest(coefficients))  # if one asperity bears the whole load
+    most = hertz.indentation(load, largest(coefficients))  # of one asperity under the whole load
     shift = np.minimum(most, np.maximum(highest, 1e-9 * most))
     for steps in range(200):
         ratio = np.maximum(indentation + shift, 0.0) * softness
@@ -75,7 +74,7 @@ def approach_bound(
     cubes = (q * coefficients) ** 3
     highest, wanted = largest(c), 27.0 * load / 8.0
     if q.ndim == 1:
-        active, cubes = c[cubes > 0], cubes[cubes > 0]  # others do not matter
+        active, cubes = c[cubes > 0], cubes[cubes > 0]  # only these matter
     else:
         active = np.where(cubes > 0, c, -np.inf)
     # The best lambda solves S = (8/27) sum alpha^3 / (lambda - c)^3 = L. Newton's method from the
@@ -87,7 +86,7 @@ def approach_bound(
         parts = cubes * (nearer * nearer * nearer)
         excess, slope = summed(parts), summed(parts * nearer)
         step = (np.cbrt(excess / wanted) - 1.0) * excess / slope
-        height = height + np.fmax(step, 0.0)  # nan in float64: high enough
+        height = height + np.fmax(step, 0.0)  # a step of nan means that it is high enough
         if not (step > 1e-3 * (height - least)).any():
             break  # any height gives a bound; this one is close to the best
     height = np.maximum(height, highest)
@@ -97,9 +96,9 @@ def approach_bound(
 
 
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
-    """An upper bound on the approach [length] at every solution of total `load` [force].
+    """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `approach_bound` with the trial loads `smooth_loads`.
+    It is `approach_bound` for the loads `smooth_loads`.
     """
     modulus = scene.material.contact_modulus
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
@@ -114,7 +113,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     couplings: list[tuple[Indices | slice, Coupling]]
     if few:
         couplings = [(which, sources)]
-    elif sources.name == "lattice":  # one box for all
+    elif sources.name == "lattice":  # one box of sites for all
         couplings = [(slice(None), sources.onto(scene.contact_points))]
     else:
         couplings = [(touching, sources), (others, sources.onto(scene.contact_points[others]))]

@@ -22,8 +22,8 @@ from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
-#: Radii of shells over t, the cheapest first; the factor for nearly singular pairs; and by how much
-#: a neighbour's radius may be smaller, over its distance. Heuristics: any radii give valid bounds.
+#: Radii of shells over t, the cheapest first; the factor for nearly singular pairs; and the largest
+#: decrease of radii to a neighbour, over its distance. Heuristics: any radii give valid bounds.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
 #: Number of nearest neighbours that set the radii of shells.
@@ -105,7 +105,7 @@ def overlaps(points: Array, lengths: Array, radii: Array) -> Overlaps | None:
 
     tree = cKDTree(points)
     usual = WIDE * float(np.median(radii)) if len(radii) else 0.0
-    wide = np.flatnonzero(radii > usual)  # few: searched one by one
+    wide = np.flatnonzero(radii > usual)  # searched one by one
     reach = radii[wide] + float(radii.max(initial=0.0))
     counts = tree.query_ball_point(points[wide], reach, return_length=True)
     many = tree.count_neighbors(tree, 2.0 * usual) + int(np.sum(counts))

@@ -195,7 +195,7 @@ def completed(problem: Problem, loads: Pair) -> tuple[Pair, Ball]:
         return loads, problem.total
     total = problem.total.mid
     if (np.abs(summed(loads.high) - problem.load) > FITS * problem.load).any():
-        power = -np.frexp(largest(loads.high))[1]  # of two: no factor overflows
+        power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
         loads = Pair(np.ldexp(loads.high, power), np.ldexp(loads.low, power))
         loads = loads * (total / sums(loads))
     missing = total - sums(loads)

@@ -152,9 +152,7 @@ def _pressed(stack: Stack, indentation: Array) -> _Pressed:
 def solved(
     stack: Stack, prescribed: Array, squares: Array, reach: Array, box: Box | None = None
 ) -> Solved:
-    """The solutions of all rows; `good` are those in which all statuses are proved.
-
-    The residual of a good row is at rounding.
+    """The solutions of all rows; `good` are accurate ones with a proved status of all asperities.
 
     prescribed, squares, reach : arguments of `guessed`;  box : default `widest`
     """
@@ -192,7 +190,7 @@ def guessed(stack: Stack, prescribed: Array, squares: Array, reach: Array) -> Ar
     local = (s * stack.coefficients * np.cbrt(s) ** 2).sum(axis=1, keepdims=True)
     coupled = (s * displacement).sum(axis=1, keepdims=True)
     x = np.sqrt(work / local)
-    for _ in range(8):  # from the right of the root of a convex function
+    for _ in range(8):  # Newton's method from the right of the root
         x = x - (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
     return np.asarray(prescribed - x**3 * displacement)
 

@@ -252,7 +252,7 @@ def _draw_mosaic(
     left, right, bottom, top = window.sides
     steps = 2.0 * window.half * (np.arange(PIXELS) + 0.5) / PIXELS
     places = np.stack(np.meshgrid(left + steps, bottom + steps), axis=-1)
-    cell = 2.0 * window.half / np.sqrt(np.count_nonzero(shown))  # no asperity so near: outside
+    cell = 2.0 * window.half / np.sqrt(np.count_nonzero(shown))  # larger distances are outside
     _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
     visible = np.where(shown[:, None], shades, (1.0, 1.0, 1.0, 0.0))
     image = np.vstack((visible, np.zeros(4)))[nearest]

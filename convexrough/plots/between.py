@@ -29,7 +29,7 @@ def between(path: LoadPath) -> LoadPath:
     if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
         return path
     corners = np.column_stack((path.loads, path.forces))
-    part = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, each) / each)  # close together at the ends
+    part = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, each) / each)  # denser at the ends
     pieces = [
         np.vstack((a + part[:, None] * (b - a), b))
         for a, b in pairwise(np.vstack(([path.start, 0.0], corners)))

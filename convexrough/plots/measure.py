@@ -151,7 +151,7 @@ class Scale:
         """[length] X0: X at gross sliding of the smooth contact; without one, of this contact."""
         if self.sphere is not None:
             return float(self.sphere.displacement(self.limit))
-        scene = self.contact.scene  # by Ciavarella and Jaeger, c_t f the approach from first touch
+        scene = self.contact.scene  # X0 = c_t f times the approach from first touch
         c_t = float(mindlin.ratio(scene.material.poisson_ratio))
         first = self.contact.approach + float(scene.offsets.max())
         return checks.friction(scene.friction) * c_t * first

@@ -156,7 +156,7 @@ def _loads_figure(scale: Scale) -> Figure:
     axes = figure.subplots()
     touching = contact.loads > 0
     unsure = contact.status == "undecided"
-    if contact.certificate.scope == "none":  # every asperity is: show those with a load
+    if contact.certificate.scope == "none":  # mark asperities with a load
         unsure &= touching
     r, share = distances(scale), 100.0 * contact.loads / contact.load
     _draw_smooth_share(axes, scale)
@@ -180,7 +180,7 @@ def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
     if len(set(scale.axes)) != 1:
         return
     points = scale.contact.scene.contact_points
-    sample = np.argsort(np.hypot(*points.T))[:5000]  # of very many, those nearest to the axis
+    sample = np.argsort(np.hypot(*points.T))[:5000]  # at most 5000, nearest the axis
     areas = fields.cell_areas(points[sample])
     whole = np.isfinite(areas) & (scale.contact.loads[sample] > 0)
     if whole.sum() < 7:

@@ -260,7 +260,7 @@ def _count(axis: Axis, name: str, unit: str, size: float) -> str:
     length = measure(size, unit)
 
     def said(value: float, _: float) -> str:
-        shown = 0.0 if abs(value) < 1e-9 * size else length.of(value)  # 0 with its rounding
+        shown = 0.0 if abs(value) < 1e-9 * size else length.of(value)  # remove rounding errors of 0
         return f"{shown:.9g}".replace("-", "\N{MINUS SIGN}")
 
     axis.set_major_formatter(said)

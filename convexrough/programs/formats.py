@@ -27,7 +27,7 @@ def qpsolvers_npz(program: QuadraticProgram) -> bytes:
     upper = program.quadratic.toarray()
     rows = program.constraints.toarray()
     equal = program.lower == program.upper
-    none = np.array(None)  # as Problem.save writes what is not there
+    none = np.array(None)  # what Problem.save writes for missing data
     file = io.BytesIO()
     np.savez_compressed(
         file,

@@ -166,7 +166,7 @@ def write_figures(
             with replacing(path) as temporary:
                 save(figure, temporary, kind, dpi)
             written.append(path)
-            figure.set_layout_engine("none")  # laid out once: the second file takes half the time
+            figure.set_layout_engine("none")  # saves the layout of later files
     return written
 
 

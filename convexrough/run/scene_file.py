@@ -306,7 +306,7 @@ def _blamed_on(path: Path, table: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if error.where:  # in another file, already named
+        if error.where:  # the error names another file
             raise
         what = f"[{table}] {error.what}"
         where = str(path)

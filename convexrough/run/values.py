@@ -29,7 +29,7 @@ from convexrough.checks import PHASE, SIZED, is_phase, is_sized, nearest
 MEANT = {"E": "youngs_modulus", "E*": "contact_modulus", "Estar": "contact_modulus"}
 MEANT |= {"nu": "poisson_ratio", "R": "radius", "rho": "tip_radius", "f": "coefficient"}
 MEANT |= {"mu": "coefficient", "P": "load", "D": "approach"}
-MEANT |= {"maximum": "maximum_fraction", "minimum": "minimum_fraction"}  # forces in Python
+MEANT |= {"maximum": "maximum_fraction", "minimum": "minimum_fraction"}  # names in Python
 
 #: A mistake: the key ("" for the whole table) and the message.
 Mistake = tuple[str, str]
@@ -43,7 +43,7 @@ def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> 
             if holds(result := validated(value)):
                 return result
         except ValidationError as error:
-            if error.errors()[0]["type"] == "expected":  # said already, inside
+            if error.errors()[0]["type"] == "expected":  # an inner validator has a message
                 raise
         raise PydanticCustomError("expected", "{phrase}", {"phrase": phrase})
 

@@ -13,7 +13,7 @@ from convexrough.arrays import Array
 from convexrough.cached import Cached
 from convexrough.checks import SMALLEST
 
-Sites = NDArray[Any]  # of whole numbers
+Sites = NDArray[Any]  # whole numbers
 
 #: Largest difference of points from the sites of a lattice, over the largest coordinate: a little
 #: more than the rounding of coordinates.
@@ -67,14 +67,14 @@ class Lattice(Cached):
     def through(cls, points: Array) -> Lattice | None:
         """The lattice on which these points (n, 2) lie, up to rounding, each on a different site.
 
-        The result is None without such a lattice, or if the spacing is too small for float64.
+        None if there is none, or if the spacing is too small for float64.
         """
         anchor = points[np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1))]
         basis, reach = _shortest(points - anchor), float(np.abs(points).max())
         if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):
             return None
         sites = _nearest_sites(points - anchor, basis)
-        # Fit origin and basis to all points, relative to their middle: this decouples both.
+        # Fit origin and basis to all points. Relative to the middle of the points both decouple.
         middle = np.rint(sites.mean(axis=0))
         away = np.column_stack((np.ones(len(points)), sites - middle))
         fitted = np.zeros((3, 2))
@@ -108,7 +108,7 @@ def _shortest(points: Array) -> Array | None:
     squares = (points**2).sum(axis=1)
     few = min(len(points), 64)
     nearby = points[np.argpartition(squares, few - 1)[:few]]
-    unit = 2.0 ** np.floor(np.log2(max(float(np.abs(nearby).max()), 1e-300)))  # squares of squares
+    unit = 2.0 ** np.floor(np.log2(max(float(np.abs(nearby).max()), 1e-300)))  # limits powers
     points = (nearby[:, None] - nearby).reshape(-1, 2) / unit
     squares = (points**2).sum(axis=1)
     near = np.argsort(squares)

@@ -87,7 +87,7 @@ class Material:
         part = G / (G + H)  # (1 / H) / (1 / G + 1 / H)
         coupled = ((1.0 - part) * (1.0 - 2.0 * nu) - part * (1.0 - 2.0 * mu)) / 2.0
         return cls(
-            modulus * (2.0 * other / (modulus + other)),  # exact where both are the same
+            modulus * (2.0 * other / (modulus + other)),  # exact for equal materials
             nu + part * (mu - nu),
             min(softer, default=None),
             mismatch=coupled / ((1.0 - part) * (1.0 - nu) + part * (1.0 - mu)),

@@ -54,7 +54,7 @@ def refuse_coincident(points: Array) -> None:
     if len(points) < 2:
         return
     distances = nearest_distances(points)
-    rounding = 16 * np.finfo(float).eps * np.abs(points).max()  # well beyond the points' rounding
+    rounding = 16 * np.finfo(float).eps * np.abs(points).max()  # far above the rounding of points
     if (worst := float(distances.min())) <= rounding or worst < SMALLEST:
         first = int(np.argmin(distances))
         others = np.hypot(*(points[first + 1 :] - points[first]).T)

@@ -163,7 +163,7 @@ class ConeSolver(ABC):
 def solve_in(solver: ConeSolver, problem: NormalProblem, boxes: ConeBoxes) -> Solution:
     """The checked solution with one form of the cones."""
     most = float(boxes.loads.sum())
-    if problem.load is not None and most <= problem.load:  # no state in the boxes carries as much
+    if problem.load is not None and most <= problem.load:  # the boxes end below the load
         pressed = np.cbrt(problem.load / most) * np.where(boxes.cut, boxes.S, 0.0)
         raise boxes.too_dense(problem, solver.name, pressed)
     return judged(solver, problem, boxes, solver.answer(problem, boxes))
@@ -220,7 +220,7 @@ def _pressed_on(
 def _after_newton_step(
     solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
 ) -> Solution:
-    """The solution after one or two Newton steps from the loads, or from `alone`, the P(D - A P).
+    """The solution after one or two Newton steps from `loads` or from `alone`, the P(D - A P).
 
     An error e of the loads changes an asperity's own indentation by h_i e_i, and D - A P by A e.
     Each asperity starts from the more accurate of the two, also where a load is almost 0.

@@ -97,7 +97,7 @@ class ConicCVXPY(ConeSolver):
             options = dict.fromkeys(names.tolerances, self.tolerance) | {names.limit: steps}
         advice = "try more max_iterations, a larger tolerance, or another solver"
         try:
-            with warnings.catch_warnings():  # whether it is accurate is judged by the contact law
+            with warnings.catch_warnings():  # the contact law shows the accuracy
                 warnings.filterwarnings("ignore", message="Solution may be inaccurate")
                 program.solve(solver=self.solver, verbose=self.verbose, **options)
         except cp.error.SolverError as error:
@@ -111,7 +111,7 @@ class ConicCVXPY(ConeSolver):
 
 def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
     """The reason why CVXPY cannot use this solver, and what to do; None if it can."""
-    from cvxpy.reductions.solvers import defines  # which solver knows which cones
+    from cvxpy.reductions.solvers import defines  # the cones that each solver accepts
 
     conic = defines.SOLVER_MAP_CONIC
     able = [name for name in conic if cp.SOC in conic[name].SUPPORTED_CONSTRAINTS]
@@ -175,7 +175,7 @@ class LiftedModel(Reduction[Any, Any, ProgramAnswer]):
         energy = (
             (e * (3 / 5 - S / 3)) @ y5
             + (e * S / 3) @ z
-            + cp.quad_form(p, cp.psd_wrap(M)) / 2  # its own check is known to fail on valid M
+            + cp.quad_form(p, cp.psd_wrap(M)) / 2  # CVXPY's own check fails on some valid M
             - (D0 + d) @ p
         )
         link = p == cp.multiply(B, y3)

@@ -28,10 +28,7 @@ OWN_SHARE = 1.10
 
 
 def mean_field_indentation(problem: NormalProblem) -> Array:
-    """(n,) indentations of the candidates in scaled units, negative where open.
-
-    If the displacements of the rings are not found, they are those under a smooth sphere.
-    """
+    """(n,) indentations in scaled units, negative where open; `smooth_indentation` if it fails."""
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:
@@ -72,7 +69,7 @@ def _mean_field(problem: NormalProblem) -> Array:
         defect = w - K @ P
         system = np.eye(count) + K * c
         if problem.load is not None:
-            # one more unknown, the change of the approach, and one more equation, the load
+            # The change of the approach is one more unknown, the load one more equation.
             system = np.block([[system, -(K @ c)[:, None]], [-c[None, :], c.sum()]])
             missing = problem.load - float(P.sum())
             step = np.linalg.solve(system, np.append(-defect, missing))

@@ -56,7 +56,7 @@ class Newton:
     ) -> Solution:
         """The loads of the candidates in scaled units, from any start >= 0."""
         loads, approach, iterations = self._found(problem, start)
-        if self._refines(problem):  # the iteration stops early: this step refines
+        if self._refines(problem):  # the iteration has stopped early
             trial = refined_loads(problem, loads).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
@@ -73,7 +73,7 @@ class Newton:
         iterations = 0
         while True:
             begin = indentation[near]
-            del indentation  # to save memory: vectors take half of it
+            del indentation  # saves memory
             state, steps = self._iterate(problem, near, begin)
             iterations += steps
             if len(near) == len(problem):

@@ -50,7 +50,7 @@ class Pressing:
         root = np.sqrt(ratio)
         loads = ratio * root
         displacement = problem.influence.apply(loads)
-        gap = indentation + displacement - problem.offsets  # less D0
+        gap = indentation + displacement - problem.offsets  # D0 is subtracted below
         approach = problem.approach
         if approach is None:
             approach = float(root @ gap / root.sum())
@@ -66,7 +66,7 @@ class Pressing:
         approach: float,
     ) -> PressingState:
         energy = float(loads @ (gap - 0.4 * indentation - 0.5 * displacement))
-        if self.problem.load is not None:  # Phi has the gap less D0
+        if self.problem.load is not None:  # Phi has D0 = 0 under load control
             energy += approach * float(loads.sum())
         # At an open asperity any delta <= 0 gives the same loads: take minus the gap, or 0.
         touching = loads > 0

@@ -42,7 +42,7 @@ def _on_hertz_pressure(problem: NormalProblem) -> Array:
         return prescribed - problem.load / total * displacement
     local, coupled = float(s @ (problem.coefficients * np.cbrt(inside))), float(s @ displacement)
     x = math.sqrt(work / local)
-    for _ in range(8):  # from the right of the root of a convex function
+    for _ in range(8):  # Newton's method from the right of the root
         x -= (x * x * (local + coupled * x) - work) / (x * (2.0 * local + 3.0 * coupled * x))
     return np.asarray(prescribed - x**3 * displacement)
 

@@ -62,7 +62,7 @@ def surface_displacement(
     )  # a^2 - c^2, an area over pi like all areas here
     b_area = np.maximum(slip_area - np.maximum(a_squared - r_squared, 0.0), 0.0)  # b_a^2 - b_c^2
 
-    sine_a = np.sqrt(np.minimum(a_squared, r_squared))  # r sin(phi_a), and so on
+    sine_a = np.sqrt(np.minimum(a_squared, r_squared))  # r sin(phi_a)
     cosine_a = np.sqrt(np.maximum(r_squared - a_squared, 0.0))
     sine_c = np.sqrt(np.maximum(np.square(sine_a) - b_area, 0.0))
     cosine_c = np.sqrt(np.square(cosine_a) + b_area)

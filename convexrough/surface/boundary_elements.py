@@ -47,7 +47,7 @@ class HalfSpace:
         sizes = zip(steps, pixel[::-1], strict=True)
         edges = [(np.arange(each.max() + 2) - 0.5) * size for each, size in sizes]
         y, x = edges[0][:, None], edges[1]
-        corner = x * np.arcsinh(y / abs(x)) + y * np.arcsinh(x / abs(y))  # d2/dxdy of it is 1/r
+        corner = x * np.arcsinh(y / abs(x)) + y * np.arcsinh(x / abs(y))  # its d2/dxdy is 1/r
         influence = np.diff(np.diff(corner, axis=0), axis=1) / (np.pi * contact_modulus)
         # An even kernel has a real transform.
         self.symbol = fft.rfft2(influence[np.ix_(*steps)], workers=1).real.copy()

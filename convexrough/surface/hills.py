@@ -34,8 +34,8 @@ class Hills(NamedTuple):
 def hills(heights: Array) -> Hills:
     """The pixels that are higher than all eight neighbours, and their prominences.
 
-    Pixels of equal height are ordered by position. All but one maxima of a plateau then have the
-    prominence 0; these are left out.
+    Pixels of equal height are ordered by position, and maxima of prominence 0 are left out, so that
+    a plateau has one maximum.
     """
     order = np.argsort(heights, axis=None, kind="stable")
     ranks: Indices = np.empty(heights.shape, dtype=np.intp)
@@ -70,7 +70,7 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     highest_first = np.lexsort((-rank, second, first))
     first, second, rank = first[highest_first], second[highest_first], rank[highest_first]
     new = np.append(True, (np.diff(first) != 0) | (np.diff(second) != 0))[: len(first)]
-    weights = (ranks.size - rank[new]).astype(np.float64)  # at least 1: none counts as missing
+    weights = (ranks.size - rank[new]).astype(np.float64)  # at least 1, as 0 means no edge
     graph = coo_array((weights, (first[new], second[new])), shape=(count, count))
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
 

@@ -128,7 +128,7 @@ def _grid(path: Path, pixel: float | tuple[float, float] | None, unit: str | Non
             return read_grid(path)
         if kind in (".npy", ".npz", ".mat"):
             return _arrays(path)
-        from convexrough.surface.instruments import read_instrument  # heavy: only when asked
+        from convexrough.surface.instruments import read_instrument  # slow to import
 
         return read_instrument(path, pixel, unit)
 

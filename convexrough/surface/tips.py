@@ -37,7 +37,7 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     """
     reach = across // 2
     down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
-    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so that all are about 1
+    u, v = right.astype(np.float64), down.astype(np.float64)  # in pixels, so all are about 1
     terms = np.column_stack((np.ones(len(u)), u, v, u * u / 2, u * v, v * v / 2))
     around = heights[pixels[:, :1] + down, pixels[:, 1:] + right]
     z0, gu, gv, huu, huv, hvv = np.linalg.pinv(terms) @ around.T
@@ -52,7 +52,7 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     middle, half = -(hxx + hyy) / 2, np.hypot((hxx - hyy) / 2, hxy)
     product = np.where(whole, determinant, 1.0) / (dx * dy) ** 2
     larger = np.where(whole, middle + half, 1.0)
-    curvatures = np.stack((larger, product / larger), axis=1)  # no difference of near equals
+    curvatures = np.stack((larger, product / larger), axis=1)  # avoids cancellation
     summits = z0 + (gu * top[0] + gv * top[1]) / 2
     x, y = (right - top[0][:, None]) * dx, (down - top[1][:, None]) * dy
     sphere = summits[:, None] - np.sqrt(product)[:, None] * (x * x + y * y) / 2

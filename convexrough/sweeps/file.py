@@ -133,7 +133,7 @@ def plan_of(
     keys, mistakes = validate_table("sweep", table, Keys)
     mistakes += _nothing_random(_dict(table), tables)
     if keys is None or mistakes:
-        varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # values still missing
+        varied = {key.partition(".")[0] for _, key in _swept(_dict(table))}  # checked later
         others = validate({name: it for name, it in tables.items() if name not in varied})[1]
         rest = [each for each in others if "missing table" not in each]
         raise SceneFileError(str(path), [*mistakes, *rest])

@@ -89,7 +89,7 @@ class Tables:
             values = [each.values[key] for each in points]
             if self.grid.is_number(key):
                 swept[key] = np.array(values, dtype=np.float64)
-            else:  # lists as in the file
+            else:  # text of lists
                 swept[key] = np.array([it if isinstance(it, str) else repr(it) for it in values])
         return swept | {"seed": np.array(seeds, dtype=np.int64)}
 

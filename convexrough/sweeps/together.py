@@ -78,7 +78,7 @@ def measured_together(asked: Mapping[int, Asked], columns: Sequence[Column]) -> 
                 mine = [some[k] for k in rows.places.tolist()]
                 for k, known in _known(rows, mine, columns).items():
                     found[numbers[rows.places[k]]] = known
-        except FAILURES:  # some scene caused it; each is then measured alone
+        except FAILURES:  # one scene failed: each is measured alone
             continue
     return found
 

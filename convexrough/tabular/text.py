@@ -67,7 +67,7 @@ class Style(NamedTuple):
 
     def split(self, line: str) -> list[str]:
         """The cells of a line. Raises csv.Error for unclosed quotes."""
-        if '"' not in line:  # three times as fast
+        if '"' not in line:  # three times as fast as csv
             return _split(line, self.separator)
         if self.separator == " ":
             line = " ".join(line.split())
@@ -150,7 +150,7 @@ def read_text_table(path: Path, known: Sequence[str] = ()) -> TextTable:
     for number, line in sheet_lines(path, known) if separator else lines_of(path):
         text = line.strip("\r\n")
         inner = text.strip()
-        if not lines and not separator and re.fullmatch(r"sep=.", inner):  # Excel
+        if not lines and not separator and re.fullmatch(r"sep=.", inner):  # written by Excel
             separator = inner[-1]
         elif inner.startswith(("#", "%")):
             comment = comment if lines else inner.lstrip("#%")

@@ -80,7 +80,7 @@ class VectorProblem(Loaded):
         squares[np.diag_indices(n)] = 1.0
         kernel = np.empty((n, 2, n, 2))
         A = loaded.influence.matrix
-        turned = bias * A * (dx - dy) * (dx + dy) / squares  # 2 d d' - I = [[cos, sin], [., -cos]]
+        turned = bias * A * (dx - dy) * (dx + dy) / squares  # bias A times the cosine in 2 d d' - I
         kernel[:, 0, :, 0], kernel[:, 1, :, 1] = A + turned, A - turned
         kernel[:, 0, :, 1] = kernel[:, 1, :, 0] = bias * A * 2.0 * dx * dy / squares
         known = {each.name: getattr(loaded, each.name) for each in fields(Loaded)}
@@ -115,10 +115,7 @@ class VectorProblem(Loaded):
         return along(self.deflections(size), increments, size)
 
     def sizes(self, increments: Array) -> Array:
-        """(n,) |q_i|, and exactly P_i where |q_i| is at least P_i up to rounding.
-
-        Near P_i one roundoff of |q_i| would change the deflection by a relative 2e-11.
-        """
+        """(n,) |q_i|, and exactly P_i up to rounding, as deflections are steep near P_i."""
         size, P = np.hypot(*increments.T), self.loads
         full: Array = np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
         return full

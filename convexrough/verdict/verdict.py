@@ -221,4 +221,4 @@ def verify_on(
             return replace(verdict, solution=solve(problem, start=start))
         except SolverError:
             continue
-    return verdict  # with the certificate of the loads alone
+    return verdict  # statuses then follow only from the certificate of the loads

@@ -16,20 +16,6 @@ from convexrough.run import results
 from convexrough.run.scene_file import read_scene
 
 
-def test_new_then_run_then_verify(command: Any, tmp_path: Path) -> None:
-    assert command("new", "first.toml").status == 0
-    ran = command("run", "first.toml", "--no-figures")
-    assert (ran.status, ran.err) == (0, "")
-    assert re.search(r"^ +contact +37$", ran.out, re.M)
-    assert re.search(r"^load +3\.5961\d*e-07$", ran.out, re.M)
-    assert re.search(r"^certificate +global", ran.out, re.M)
-    names = {path.name for path in (tmp_path / "first-results").iterdir()}
-    assert {"summary.json", "asperities.csv"} <= names
-    verified = command("verify", "first.toml", "first-results/asperities.csv")
-    assert (verified.status, verified.err) == (0, "")
-    assert re.search(r"^ +contact +37$", verified.out, re.M)
-
-
 def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("precious")
     outcome = command("new", "mine.toml")

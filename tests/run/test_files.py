@@ -50,56 +50,19 @@ def contact() -> cr.Contact:
 # Scene files
 
 
-def test_every_table_is_read(tmp_path: Path) -> None:
-    more = """
-[friction]
-coefficient = 0.5
-[shear]
-fractions = [0, 0.5, 1]
-[cycle]
-maximum_fraction = [0.1, 0.5]
-[history]
-fractions = [1, -1, 0.25]
-[solver]
-name = "newton"
-[units]
-length = "mm"
-force = "N"
-"""
-    rough = HEXAGONAL.replace("summit", "closest") + "within = 0.01\nheight_std = 1e-6\nseed = 7"
-    file = read(tmp_path, rough, "load = 1", more)
-    expected = cr.Asperities.hexagonal(
-        spacing=0.0025, tip_radius=0.02, within=0.01, height_std=1e-6, seed=7
-    )
-    assert np.array_equal(file.scene.asperities.heights, expected.heights)
-    assert (file.scene.geometry, file.scene.friction) == ("closest", 0.5)
-    assert (file.approach, file.load) == (None, 1.0)
-    assert list(file.stages) == ["normal", "shear", "cycle", "history"]
-    assert file.stages["shear"].fractions == [0.0, 0.5, 1.0]
-    cycle = file.stages["cycle"]
-    assert (cycle.maximum_fraction, cycle.lowest) == ([0.1, 0.5], [-0.1, -0.5])
-    assert file.stages["history"].fractions == [1.0, -1.0, 0.25]
-    assert file.solver == cr.solvers.Newton()
-    assert file.scene.units == ("mm", "N")
-
-
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ("asperities", "expected"),
     [
         ("spacing = -0.1", "spacing: found -0.1, expected a positive number"),
-        ("spacing = 0", "spacing: found 0, expected a positive number"),
         ("spacing = nan", "spacing: found nan, expected a positive number"),
         ("spacing = true", "spacing: found true, expected a positive number"),
-        ('spacing = "1"', "spacing: found '1', expected a positive number"),
         ("spacing = 1e-61", "spacing: found 1e-61, expected a size from 1e-60 to 1e+60"),
         ("spacing = 1\nspaceing = 1", 'spaceing: unknown key, did you mean "spacing"?'),
         ("spacing = 1\nzzz = 1", "zzz: unknown key, valid: pattern, spacing, tip_radius"),
-        ("spacing = 1\ntip_radius = inf", "tip_radius: found inf, expected a positive number"),
         ("spacing = 1\ntip_radius = [1, -2]", "tip_radius[1]: found -2, expected a positive"),
         ("spacing = 1\nheight_std = 1", "seed: missing, needed with height_std"),
-        ("spacing = 1\ntip_radius_cv = 1", "seed: missing, needed with tip_radius_cv"),
         ("spacing = 1\nseed = 1.5", "seed: found 1.5, expected a whole number"),
-        ("spacing = 1\nseed = -1", "seed: found -1, expected a whole number"),
         ("spacing = 1\nwithin = -1", "within: found -1, expected a number that is not negative"),
         ("spacing = 1\ngeometry = 3", 'geometry: found 3, expected "summit" or "closest"'),
         ('spacing = 1\npath = "a.csv"', "path: not used with this pattern"),
@@ -118,6 +81,7 @@ PRESSED = "approach = 1e-5"
 FRICTION = "[friction]\ncoefficient = 1\n"
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ("normal", "more", "expected"),
     [
@@ -197,7 +161,7 @@ def test_no_toml(tmp_path: Path, content: bytes, expected: str) -> None:
 # What `within` is when the file does not say
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 @pytest.mark.parametrize("pattern", ["hexagonal", "square"])
 @pytest.mark.parametrize("normal", ["approach = 2e-5", "load = 2e-7", "load = 1e-9"])

@@ -33,15 +33,6 @@ def on(base: Any, geometry: Any = "summit", friction: float = 0.5) -> cr.Scene:
     return replace(rough(geometry), sphere_radius=base, friction=friction)
 
 
-def test_two_equal_radii_are_a_sphere() -> None:
-    assert (
-        cr.Scene((2.0, 2.0), paper().asperities, MATERIAL, geometry="summit").sphere_radius == 2.0
-    )
-    assert (
-        cr.Scene([INF, INF], paper().asperities, MATERIAL, geometry="summit").sphere_radius == INF
-    )  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("base", [0.9, (0.7, 3.0), (INF, 0.4), INF])
 def test_closest_points_by_minimisation(base: Any) -> None:
     """The contact point and drop of "closest" minimise the gap of the two paraboloids."""

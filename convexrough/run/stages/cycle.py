@@ -121,7 +121,7 @@ class CycleResult(Result):
         stage, contact = self.stage, self.contact
         touching = max(1, int((contact.loads > 0).sum()))
         affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
-        chosen: ArrayLike | None = None  # of all
+        chosen: ArrayLike | None = None  # None means all
         if stage.loop_asperities is None:
             distances = contact.scene.asperities.distances
             chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)

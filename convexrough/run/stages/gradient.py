@@ -147,7 +147,7 @@ class GradientResult(Single):
         held, under = f"at constant {said['holding']}", ""
         if "fraction" in said:
             under, held = f" at Q/(fP) = {said['fraction']:g}", f"{held} and force"
-        rows = [("  value", f"{said['value'] + 0.0:.10g}")]  # no -0
+        rows = [("  value", f"{said['value'] + 0.0:.10g}")]  # 0 in place of -0
         rows += [(f"  by {name}", f"{slope + 0.0:.8g}") for name, slope in said["by"].items()]
         for name, most in said["largest"].items():
             error = bound(said["height_error"])
