@@ -78,9 +78,9 @@ def limit(contact: Contact) -> float:
 
 
 def number(found: Any, name: str) -> Any:
-    """The number of asperities with the status `name`, else the attribute `name` of `found`.
+    """The number of asperities with the status `name`, else this attribute of `found`.
 
-    An attribute that `found` lacks is taken from its certificate.
+    An attribute that `found` lacks is that of `found.certificate`.
     """
     if name in STATUSES:
         return (found.status == name).sum(axis=-1)

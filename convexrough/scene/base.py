@@ -33,11 +33,7 @@ def along(radius: Radius) -> tuple[float, float]:
 
 
 def curved(radius: Radius) -> list[tuple[float, slice]]:
-    """The finite radii R, each with the axes (0 is x, 1 is y) along which the base has it.
-
-    At the point r the base is sum |part of r along these axes|^2 / (2 R) farther away than on the
-    axis.
-    """
+    """The finite radii R, each with the axes (0 is x, 1 is y) along which the base has it."""
     parts = [(R, slice(i, i + 1)) for i, R in enumerate(along(radius))]
     if not isinstance(radius, tuple):
         parts = [(radius, slice(0, 2))]

@@ -220,7 +220,7 @@ def _pressed_on(
 def _after_newton_step(
     solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
 ) -> Solution:
-    """The solution after one or two Newton steps from the loads, or from `alone`, the P(D - A P).
+    """The solution after one or two Newton steps from `loads` or from `alone`, the P(D - A P).
 
     An error e of the loads changes an asperity's own indentation by h_i e_i, and D - A P by A e.
     Each asperity starts from the more accurate of the two, also where a load is almost 0.

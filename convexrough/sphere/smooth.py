@@ -126,8 +126,7 @@ class SmoothSphere(Record):
         """[length] displacement after loading from rest to `turning_force` and back to `force`.
 
         Masing's rule [14]-[15]: X(Q1) - 2 X((Q1 - Q) / 2) for |Q| <= |Q1|, with the turning force
-        Q1 and X of `displacement`. A positive Q1 gives the unloading branch of a cycle, a negative
-        one the reloading branch.
+        Q1 and X of `displacement`.
         """
         turning = checks.finite("turning_force", turning_force)
         first = self.displacement(turning)
