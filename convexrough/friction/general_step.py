@@ -113,7 +113,12 @@ class Stepper:
         """The state after one step, which is halved if Newton's method does not converge."""
         level = self.levels.snapshot(load)
         try:
-            found = self._solve(now, level, float(height)) if load else self.start(MemoryCurve())
+            if not load:
+                found = self.start(MemoryCurve())
+            elif abs(height) == load:
+                found = self._gross(now, level, 1 if height > 0 else -1)
+            else:
+                found = self._solve(now, level, float(height))
         except SolverError:
             if cuts == 0:
                 raise
@@ -121,6 +126,14 @@ class Stepper:
             return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
         mean, run = float(now.height + height) / 2, found.displacement - now.displacement
         return replace(found, load=load, height=height, work=now.work + mean * run)
+
+    def _gross(self, now: Bundle, level: Snapshot, sign: int) -> Bundle:
+        """The state in which all slide, with the least displacement at which they do."""
+        trial, on = _Trial.of(self, now, level), level.indentations > 0
+        coupled = self.A @ (sign * level.loads - now.carried)
+        taken = (sign * level.indentations - trial.deflections)[on] / trial.parts[on]
+        x = sign * float((sign * (taken + coupled[on])).max())
+        return self._reached(now, level, trial.at(x - coupled, x, sign * level.load))
 
     def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
         trial = _Trial.of(self, now, level)
@@ -143,6 +156,9 @@ class Stepper:
         if iterate.residual > 1e3 * ACCURATE * size:
             found = f"a residual of {iterate.residual / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
+        return self._reached(now, level, iterate)
+
+    def _reached(self, now: Bundle, level: Snapshot, iterate: _Iterate) -> Bundle:
         moved = now.positions + iterate.eta
         displacement = now.displacement + iterate.x
         return Bundle(now.load, level, iterate.curves, iterate.carried, moved, displacement)

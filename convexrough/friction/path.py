@@ -5,7 +5,7 @@ docs/theory/paths.md derives the method, the memory curve.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
@@ -29,6 +29,9 @@ from convexrough.scene.scene import Scene
 
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
+
+#: The smallest ratio of two loads of a path; float64 numbers in units of the larger hold it.
+LEAST_PART = 1e-250
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -203,9 +206,12 @@ def walk(
     )
 
 
-def pressed_for(scene: Scene, loads: Iterable[Fraction], influence: Kind | None) -> Contact:
+def pressed_for(scene: Scene, loads: Sequence[Fraction], influence: Kind | None) -> Contact:
     """The contact at the highest of these loads; at the first touch if this load is 0."""
     if highest := float(max(loads)):
+        if (least := float(min(load for load in loads if load))) < LEAST_PART * highest:
+            expected = f"0, or at least {LEAST_PART:g} of the largest load, {highest:g}"
+            raise InputError("loads", found=least, expected=expected)
         return press(scene, load=highest, influence=influence)
     return press(scene, approach=-float(scene.offsets.max()))
 
