@@ -1,17 +1,8 @@
 """Powers of a number between 0 and 1 as second-order cones.
 
 A *lift* of t in [0, 1] is a set of variables y2, y3, y4, y5 for t^2, ..., t^5 and z for t^5 - t^6;
-the form with five cones also has y1 for t. Rotated cones x y >= w^2, x, y >= 0 constrain them:
-
-    four cones                                     five cones
-    1 * y4              >= y2^2                    (1 - y1) * (y2 - y3)  >= (y1 - y2)^2
-    (y2 - y3)(y4 - y5)  >= (y3 - y4)^2             (y1 - y2)(y3 - y4)    >= (y2 - y3)^2
-    y3 * y5             >= y4^2                    and the last three of the four
-    (y3 - y4) * z       >= (y4 - y5)^2
-
-At fixed y3 = t^3, the minimum of (3/5 - S/3) y5 + (S/3) z is exactly (3/5) t^5 - (S/3) t^6. With
-four cones this holds for 0 <= S <= 21/25, with five for 0 <= S <= 1: docs/theory/exact-cones.md,
-"Why it is exact".
+the form with five cones also has y1 for t. docs/theory/exact-cones.md, "The lifted program", gives
+the four cones (1) and the five cones (2), and "Why it is exact" the limits of the number S.
 """
 
 from __future__ import annotations
@@ -26,7 +17,7 @@ from convexrough.arrays import Array, Indices
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-#: The largest S at which the four cones are exact, and the largest at which five are.
+#: The largest S for which four cones are exact, and the largest for which five cones are.
 FOUR_CONES_LIMIT, FIVE_CONES_LIMIT = 21 / 25, 1.0
 
 # Each cone x y >= w^2 as a row for x, y and w, in the columns 1, y1, y2, y3, y4, y5, z.

@@ -1,19 +1,9 @@
 """Tests and proofs that a matrix is positive definite, by Cholesky's factorisation.
 
-The proof (Demmel; Rump, BIT 46 (2006) 433), with the roundoff u:
-
-1. Let the factorisation of a computed (n, n) matrix C with a positive diagonal succeed. The factor
-   R satisfies R'R = C + E with |E_ij| <= g / (1 - g) (C_ii C_jj)^(1/2) and
-   g = (n + 1) u / (1 - (n + 1) u).
-2. These bounds on |E_ij| form a matrix of rank one and norm g / (1 - g) trace C, and R'R >= 0. So
-   C >= -(n + 2) u trace C  if  2 (n + 1) (n + 2) u <= 1, which is true if C fits in memory.
-3. Let C be M off the diagonal and 1 - mu - s on it, so that trace C <= n. Let each computed entry
-   of M have a relative error of at most e. The norm of these errors is at most their largest row
-   sum. So  s >= e max_i sum_j |M_ij| + (n + 2) n u  proves  I + M >= mu I.
-
-The code uses 1.1 s, which covers the rounding errors of the sums, of s and of the diagonal. LAPACK
-need not report overflow or entries that are not finite, but these make the diagonal of the factor
-nan or infinite, so the diagonal is checked.
+docs/theory/certificate.md, "Which box", 2, gives the proof for an (n, n) matrix in float64. It
+needs 2 (n + 1) (n + 2) u <= 1 with the roundoff u, which is true if the matrix fits in memory.
+LAPACK need not report overflow or entries that are not finite. These make the diagonal of the
+factor nan or infinite, so the diagonal is checked.
 """
 
 from __future__ import annotations
@@ -52,7 +42,7 @@ def is_definite(matrix: Array) -> bool:
 def proved_margin(
     couplings: Array, margins: Sequence[float], entry_error: float, spare: float = 0.0
 ) -> float:
-    """The first margin mu for which step 3 proves  I + M >= (mu + spare) I;  else 0.
+    """The first margin mu for which  I + M >= (mu + spare) I  is proved, else 0.
 
     couplings   : (n, n) computed symmetric M, with 0 on the diagonal
     margins     : each from 0 to 1

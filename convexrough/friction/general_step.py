@@ -1,15 +1,10 @@
 """The general step: a friction step for indentations that may fall as the load rises.
 
 Each asperity i keeps its own memory curve, in the plane of its indentation and its deflection over
-c_t f. A straight step to the load P and shear force f T computes the normal solution at P. Then
-Newton's method solves
-
-    eta_i + (A (T_i(eta_i) - T_i before))_i = x,    sum T_i(eta_i) = T.
-
-A is the compliance matrix, f T_i the shear force of asperity i, x the displacement of the bodies in
-the step, and eta_i the part of x that asperity i takes up by deflection and slip. If no indentation
-falls as the load rises, one step per segment is exact. Otherwise the error is of second order in
-the step: docs/theory/without-order.md, "The general step".
+c_t f. A straight step to the load P and the shear force f T computes the normal solution at P. Then
+Newton's method solves (1) of docs/theory/without-order.md, "The general step", for eta_i and x: the
+displacements of the asperities and of the bodies in the step. Shear forces are divided by f, and
+displacements by c_t f.
 """
 
 from __future__ import annotations
@@ -256,8 +251,8 @@ class _Iterate(NamedTuple):
     curves: tuple[MemoryCurve, ...]
     carried: Array
     slopes: Array  # dT_i / deta_i
-    defect: Array  # (n,) of the first equations above
-    excess: float  # sum of T_i less T
+    defect: Array  # (n,) defects of the first equation of (1)
+    excess: float  # sum of T_i minus T
 
     @property
     def residual(self) -> float:

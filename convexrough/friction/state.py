@@ -1,13 +1,8 @@
 """Friction states as sums of normal solutions, weighted with the bends of the memory curve.
 
-With the bends b_k of the curve at the levels s_k (`MemoryCurve.bends`), Mindlin's ratio c_t and the
-coefficient of friction f, the shear forces Q_i and the displacement X of the bodies are
-
-    Q_i = f sum b_k P_i(s_k),   X = c_t f sum b_k D0(s_k),   own + drift = c_t f sum b_k n_i(s_k).
-
-The last equation is for the own deflection of asperity i plus its drift. P_i, D0 and n_i are the
-load, the approach and the indentation (minus the gap where open) of a level. First loading is
-equation (1) of docs/theory/states.md.
+(1) of docs/theory/paths.md gives the shear forces Q_i of the asperities and the displacement X of
+the bodies. The same sum over the indentations n_i (minus gaps where open) is the own deflection of
+an asperity plus its drift. First loading is (1) of docs/theory/states.md.
 """
 
 from __future__ import annotations

@@ -1,15 +1,10 @@
 """Gradients along load paths, from weighted sums of energies V and approaches D0 at load levels.
 
-The levels L and the weights are rational functions of the loads P_k and of T_k = Q_k / f. Where an
-inner loop just closes or a front just meets a bend, these functions have different derivatives on
-both sides. So the path is compared with a path on which one P_k or T_k is moved up or down by
-2^-6000 of the largest load, in exact arithmetic. This is less than any difference of float64
-numbers, so it acts as an infinitely small change. Let l be the level of the original path that
-corresponds to L, and S = dD0/dL. To first order in the shift
+docs/theory/gradients.md, "Along a path", explains the method: the path is compared with a path on
+which one load P_k or one T_k = Q_k / f is shifted by SHIFT, in exact arithmetic. Let l be the level
+of the original path that corresponds to a level L, and S = dD0/dL. To first order in the shift
 
-    V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l)
-
-(docs/theory/gradients.md, "Along a path").
+    V(L) = V(l) + D0(l) (L - l) + S(l) (L - l)^2 / 2,    D0(L) = D0(l) + S(l) (L - l).
 """
 
 from __future__ import annotations
@@ -32,7 +27,7 @@ from convexrough.numbers.balls import Ball
 from convexrough.numbers.pairs import Pair
 
 #: The shift of loads and forces, and the distance below which levels of the two paths correspond,
-#: both divided by the largest load.
+#: both divided by the largest load. SHIFT is less than any difference of float64 numbers.
 SHIFT, NEAR = Fraction(1, 2**6000), Fraction(1, 2**3000)
 
 #: Weights on V, D0 and S at a level.

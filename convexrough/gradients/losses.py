@@ -21,9 +21,8 @@ from convexrough.numbers.balls import Ball
 def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
     """The result of `Cycle.gradient`.
 
-    At constant load P, with T = (maximum - minimum) / (2 f) and L = P - T, the loss is
-    W = 8 c_t f^2 [V(P) - V(L) - T (D0(P) + D0(L)) / 2] (docs/theory/losses.md). Otherwise W is the
-    loss of the second cycle on the path.
+    At constant load the loss W is (1) of docs/theory/losses.md. Otherwise W is the loss of the
+    second cycle on the path.
     """
     contact, sheared = cycle.contact, Frictional.of(cycle)
     holding = control_held(contact, holding)

@@ -2,18 +2,8 @@
 
 A level is the normal solution at a total load L (`normal.level`): loads P, approach D0,
 indentations n (minus the gap where open), and energy V. It depends on the offsets d, the local
-coefficients k and the compliance matrix A. With C = k P^(2/3), c = dP/dC, q = dP/dL and S = dD0/dL,
-
-    dV  = -P'dd + (3/5) (P C)'d log k + P'dA P / 2 + D0 dL,
-    dD0 = -q'dd + (q C)'d log k + q'dA P + S dL.
-
-For weights w of the loads and v of the indentations, the linear system
-lambda / c + A lambda = w - A v + mu, sum lambda = 0 gives lambda and the number mu. Then
-
-    w'dP + v'dn = (lambda + v)'dd - (lambda C)'d log k - (lambda + v)'dA P
-                  + (sum v) dD0 + (w - A v)'q dL.
-
-docs/theory/gradients.md derives these equations.
+coefficients k and the compliance matrix A. (1), (2) and (4) of docs/theory/gradients.md give its
+derivatives; the weights v and w, and lambda, are those of (4).
 """
 
 from __future__ import annotations

@@ -1,14 +1,7 @@
 """An approximate inverse of I + W A W on a lattice, to precondition conjugate gradients.
 
-A is the compliance operator and W a diagonal matrix. The inverse is derived in
-docs/theory/newton.md, "Many asperities". Let G^2 be an average with a Gaussian and d a local mean
-of W^2, so that w = W / d^(1/2) has local averages of w^2 of about 1. Then the inverse is
-
-    M  =  I - w G (1 - (1 + d A)^-1) G w,
-
-restricted to touching asperities, with the median of d in the bracket. Waves that G passes see the
-factor (1 + d A)^-1, computed by Fourier transforms; shorter waves see 1. M is positive definite
-where w G^2 w <= 1. All this is computed on blocks of m x m sites that are smaller than the
+It is the preconditioner M of docs/theory/newton.md, "Many asperities", for the compliance operator
+A and a diagonal W. The code computes it on blocks of m x m sites that are smaller than the
 Gaussian, with the mean of A over pairs of blocks. The constants are heuristics: they change the
 number of steps of conjugate gradients, not the answer.
 """

@@ -1,8 +1,7 @@
 """A lower bound on the eigenvalues of the compliance operator of points on a lattice.
 
-docs/theory/operators-lattice.md, "The symbol", derives it. Loads v on some sites of a lattice have
-sum_{i != j} v_i v_j / r_ij >= min f  sum v_i^2, where the symbol f(k) is a function of the wave
-vector k (sigma(q) on that page). Ewald's method gives, with E(q) = erfc(q/2 alpha) / q, any alpha,
+It is the minimum of the symbol f(k), a function of the wave vector k: sigma(q) of
+docs/theory/operators-lattice.md, "The symbol". With any alpha and E(q) = erfc(q / 2 alpha) / q,
 
     f(k) = sum_d cos(k d) erfc(alpha |d|) / |d| + (2 pi / V) sum_G E(|k + G|) - 2 alpha / sqrt(pi)
 

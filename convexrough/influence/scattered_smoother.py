@@ -19,11 +19,9 @@ COARSE, FEW_TOUCHING = 1000, 200
 
 
 def coarse_inverse(points: Array, scale: float, root: Array) -> Smoother | None:
-    """(I + T K T^t)^-1 in single precision, where T K T^t approximates W A W by a coarse mesh.
+    """(I + T K T^t)^-1 in single precision, where T K T^t approximates W A W; None for few points.
 
-    T = W S, where S interpolates linearly from the nodes to touching points. K is scale / r between
-    nodes, with shells of half the spacing on the diagonal, so that it is positive definite. The
-    inverse is I - T (K^-1 + T^t T)^-1 T^t.
+    root : (n,) diagonal of W
     """
     from scipy.linalg.lapack import dpotrf, dpotri, spotrs
     from scipy.sparse import csr_array

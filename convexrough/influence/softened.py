@@ -66,9 +66,7 @@ class Softened:
     def roundoffs(self) -> float:
         """Relative error of one computed L, in roundoffs.
 
-        Term k of the series has 2 k + 1 by Horner's rule, one of its coefficient c_k and k of the
-        rounding of t; the mean of k is largest at r = 0. (r/a)^2 has at most 7, and L has q / 2
-        times as many, because (k + 1) c_(k+1) = (k + q/2) c_k.
+        docs/theory/operators-mesh.md, "Rounding errors of L".
         """
         mean = self._slope / float(_series(self.order, self.power).sum())
         return 3.0 * mean + 4.0 + 4.5 * self.power
@@ -81,8 +79,7 @@ class Softened:
     def moved(self, shift: float) -> float:
         """Bound on the error of L, divided by 1 / r^q, for distances with the error `shift`.
 
-        The slope of L is at most q / r^(q + 1) and at most 2 D r / a^(q + 2), D = sum k c_k. The
-        smaller of the two, times r^q, is largest where both are equal.
+        docs/theory/operators-mesh.md, "Rounding", for any q.
         """
         if not np.isfinite(self.reach):
             return 0.0

@@ -1,17 +1,9 @@
 """Melan's theorem at constant normal load, for asperities that stick until they slide.
 
-Shear forces are divided by the coefficient of friction: q_i(v) is the one on asperity i at the
-vertex v of the path if all asperities stick, t0 the mean shear force, and r_i are the residual
-ones. With the loads P_i, Melan's program, (2) of docs/theory/shakedown.md, "Melan's program", is
-
-    maximise lambda  with  |r_i + lambda q_i(v)| <= P_i  for all i and v,  sum r_i = t0.
-
-By (3) of that page, for slips s_iv with the same sum x over v at every asperity, lambda is at most
-
-    [sum P_i |s_iv| - x . t0] / sum s_iv . q_i(v).
-
-This module evaluates both bounds for the solver's result, which need not be accurate. The bounds
-include the errors of shares and loads.
+This module evaluates the two bounds of docs/theory/shakedown.md, "Melan's program", for the result
+of a solver, which need not be accurate: the largest lambda for given residual forces r_i, and (3)
+for given slips. The bounds include the errors of shares and loads. As on that page, shear forces
+are divided by the coefficient of friction; t0 is the mean of the path, P_i are the loads.
 """
 
 from __future__ import annotations
