@@ -3,12 +3,14 @@
 This file needs only the standard library and trusts no claim of the proof. Asperity i of a scene
 with n asperities has the contact radius a_i, which is 0 where it is open, and the load
 P_i = 4 E* a_i^3 / (3 R_i). Here E* is the contact modulus, and 1 / R_i the mean curvature of the
-tip plus that of the base. With the distances r_ij, the contact law is
+tip plus that of the *base*: the sphere, or a flat, cylinder or ellipsoid in its place. With the
+distances r_ij between contact points, the contact law is
 
     a_i^2 / R_i + sum_j 4 a_j^3 / (3 pi R_j r_ij)  =  D_i  where a_i > 0,  >=  D_i  where a_i = 0,
 
-without j = i in the sum. D_i = D0 + d_i is the approach D0 of the bodies plus the offset d_i, the
-height of the asperity less the drop of the base there. A_ij = 1 / (pi E* r_ij), A_ii = 0.
+without j = i in the sum. D_i = D0 + d_i is the approach D0 of the bodies plus the offset d_i: the
+height of the asperity minus the distance of the base from its tangent plane on the axis. Below,
+A_ij = 1 / (pi E* r_ij) and A_ii = 0.
 
 A proof file contains a scene, radii near its solution, a box of radii, an argument that the energy
 is convex on this box, and claims. Its numbers are float64 in hexadecimal, so exact rationals. The
@@ -191,7 +193,7 @@ def added(texts: Any) -> Fraction:
 
 
 def digest(scene: Any, prescribed: Any) -> str:
-    """SHA-256 of both as one JSON object with sorted keys and without spaces."""
+    """SHA-256 of scene and prescribed quantity, as JSON with sorted keys and without spaces."""
     given = {"prescribed": prescribed, "scene": scene}
     text = json.dumps(given, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

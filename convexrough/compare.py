@@ -168,10 +168,7 @@ def compare(
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
-    """All solvers; each formulation with a final Newton step is included with and without it.
-
-    The cone program in CVXPY is also solved by SCS and QOCO, where they are installed.
-    """
+    """All solvers, also without their final Newton step; SCS and QOCO where they are installed."""
     return (
         solvers.Newton(),
         solvers.Conic(),

@@ -10,8 +10,7 @@ from pathlib import Path
 class MemoryRise:
     """The increase of this process's resident memory since the object was made.
 
-    Linux records the peak of all memory of a process. Memory that an allocator reuses is not
-    counted.
+    Memory that an allocator reuses is not counted.
     """
 
     def __init__(self) -> None:

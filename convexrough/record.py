@@ -148,10 +148,7 @@ def singular(name: str) -> str:
 
 
 def in_text(value: Any) -> str:
-    """A value in one line: the size and range of an array, the counts of statuses.
-
-    A mapping is shown as its keys, a tuple of records as their number.
-    """
+    """A value in one line: size and range of an array, counts of statuses, keys of a mapping."""
     if isinstance(value, Record):
         return value._headline()
     if isinstance(value, np.ndarray):

@@ -212,8 +212,8 @@ def least(
 def plain_product(scene: Scene) -> float:
     """[s] the time of the Fourier transforms of one product with the lattice operator.
 
-    They are scipy's, in float64 on all cores, on the box of sites padded to twice its size: the
-    least of `PRODUCTS` times. nan without a lattice.
+    It is the least of `PRODUCTS` times of scipy's transforms in float64 on all cores, on the box of
+    sites padded to twice its size; nan without a lattice.
     """
     from scipy import fft
 

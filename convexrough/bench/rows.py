@@ -136,10 +136,7 @@ def frontier(rows: Iterable[Row]) -> list[Row]:
 
 
 def better_than_default(rows: Iterable[Row]) -> list[Row]:
-    """Points at least as accurate as the default, and faster by more than `NOISE`.
-
-    If the default has no answer, all points.
-    """
+    """Points as accurate as the default and faster by more than `NOISE`; all without it."""
     points = [row for row in rows if row.known]
     default = next((row for row in points if row.default), None)
     if default is None:

@@ -2,17 +2,9 @@
 
 P is the total load, Q the shear force, f the coefficient of friction, and T = Q / f. The state
 after any path of (P, T) is a polygon: heights Th(s) over load levels 0 <= s <= P, from (0, 0) to
-the present point (P, T), with slopes from -1 to 1. A contact loaded along this polygon would reach
-the same state without slip. A straight segment of the path changes the polygon by one of three
-rules:
-
-- If P rises and T changes no faster than P, everything sticks: the segment is appended.
-- If the path runs back along the curve, nothing slips: the curve gets shorter.
-- Otherwise the contact slips in the direction c = 1 or -1, at all levels above the *slip front* L:
-  the curve is kept below L, and a straight line of slope c joins it to the new point.
-
-docs/theory/paths.md, "The rules", derives them; they do not depend on elasticity. All numbers are
-rational, as float64 numbers are, and every rule is exact.
+the present point (P, T), with slopes from -1 to 1. A straight segment of the path changes it by one
+of the three rules of docs/theory/paths.md, "The rules". The rules do not depend on elasticity. All
+numbers are rational, as float64 numbers are, and every rule is exact.
 """
 
 from __future__ import annotations

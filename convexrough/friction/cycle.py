@@ -74,7 +74,7 @@ class Cycle(Table, Plottable):
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H) at the highest load P:
         Poisson's ratio nu, shear modulus G, contact radius a_H of the smooth sphere
     smooth_normalised : loss / W0 of the smooth sphere; nan if P varies. Both are nan if no asperity
-        is loaded, or no smooth solution is known for the base
+        is loaded, or no smooth solution is known for the shape
     displacement_amplitude : [length] half the range of the displacement at the points
     displacement_error : [length] proved bound on the error of the displacement amplitude
     order            : "proved": no indentation falls as the load rises from L* to the highest P, so

@@ -1,15 +1,10 @@
 """The general step: a friction step for indentations that may fall as the load rises.
 
 Each asperity i keeps its own memory curve, in the plane of its indentation and its deflection over
-c_t f. A straight step to the load P and shear force f T computes the normal solution at P. Then
-Newton's method solves
-
-    eta_i + (A (T_i(eta_i) - T_i before))_i = x,    sum T_i(eta_i) = T.
-
-A is the compliance matrix, f T_i the shear force of asperity i, x the displacement of the bodies in
-the step, and eta_i the part of x that asperity i takes up by deflection and slip. If no indentation
-falls as the load rises, one step per segment is exact. Otherwise the error is of second order in
-the step: docs/theory/without-order.md, "The general step".
+c_t f. A straight step to the load P and the shear force f T computes the normal solution at P. Then
+Newton's method solves (1) of docs/theory/without-order.md, "The general step", for eta_i and x: the
+displacements of the asperities and of the bodies in the step. Shear forces are divided by f, and
+displacements by c_t f.
 """
 
 from __future__ import annotations
@@ -113,7 +108,12 @@ class Stepper:
         """The state after one step, which is halved if Newton's method does not converge."""
         level = self.levels.snapshot(load)
         try:
-            found = self._solve(now, level, float(height)) if load else self.start(MemoryCurve())
+            if not load:
+                found = self.start(MemoryCurve())
+            elif abs(height) == load:
+                found = self._gross(now, level, 1 if height > 0 else -1)
+            else:
+                found = self._solve(now, level, float(height))
         except SolverError:
             if cuts == 0:
                 raise
@@ -121,6 +121,14 @@ class Stepper:
             return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
         mean, run = float(now.height + height) / 2, found.displacement - now.displacement
         return replace(found, load=load, height=height, work=now.work + mean * run)
+
+    def _gross(self, now: Bundle, level: Snapshot, sign: int) -> Bundle:
+        """The state in which all slide, with the least displacement at which they do."""
+        trial, on = _Trial.of(self, now, level), level.indentations > 0
+        coupled = self.A @ (sign * level.loads - now.carried)
+        taken = (sign * level.indentations - trial.deflections)[on] / trial.parts[on]
+        x = sign * float((sign * (taken + coupled[on])).max())
+        return self._reached(now, level, trial.at(x - coupled, x, sign * level.load))
 
     def _solve(self, now: Bundle, level: Snapshot, total: float) -> Bundle:
         trial = _Trial.of(self, now, level)
@@ -143,6 +151,9 @@ class Stepper:
         if iterate.residual > 1e3 * ACCURATE * size:
             found = f"a residual of {iterate.residual / size:.1e} of the indentation"
             raise SolverError(f"{found} is left", solver="general step", advice="use more steps")
+        return self._reached(now, level, iterate)
+
+    def _reached(self, now: Bundle, level: Snapshot, iterate: _Iterate) -> Bundle:
         moved = now.positions + iterate.eta
         displacement = now.displacement + iterate.x
         return Bundle(now.load, level, iterate.curves, iterate.carried, moved, displacement)
@@ -240,8 +251,8 @@ class _Iterate(NamedTuple):
     curves: tuple[MemoryCurve, ...]
     carried: Array
     slopes: Array  # dT_i / deta_i
-    defect: Array  # (n,) of the first equations above
-    excess: float  # sum of T_i less T
+    defect: Array  # (n,) defects of the first equation of (1)
+    excess: float  # sum of T_i minus T
 
     @property
     def residual(self) -> float:

@@ -1,15 +1,9 @@
 """The energy loss by slip: of each asperity, of the whole contact, and along a path.
 
-Losses are in units of c_t f^2, with the coefficient of friction f and Mindlin's ratio c_t. While
-the total load is P and the slip front falls through the level L, the loss per unit of L is
-(1 - c th) (-dB/dL). Here th is the slope of the memory curve at L, c the direction of the slip, and
-
-    B = sum_i (6/5) P_i delta_i e(1 - P_i(L) / P_i) + P_i g_i(L)
-      = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)],
-
-with the energy V and the approach D0 of the normal solution, the loads P_i and indentations delta_i
-at P, the gaps g_i, and the function e of `sphere.annulus`. This holds if no indentation falls as
-the load rises (docs/theory/losses.md).
+docs/theory/losses.md derives the formulas. The unit of losses is c_t f^2. While the total load is P
+and the slip front falls through the level L, the loss per unit of L is (1 - c th) (-dB/dL). Here th
+is the slope of the memory curve at L, c the direction of slip, and B the sum of B_i(P, L) in (2) of
+that page, or by (1) B = 2 [V(P) - V(L)] - (P - L) [D0(P) + D0(L)]. This needs order.
 """
 
 from __future__ import annotations
@@ -95,16 +89,9 @@ def _of_pairs(levels: FrictionLevels, pairs: Sequence[Pair]) -> tuple[Ball, Ball
 
 
 def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
-    """(k,) integrals I of -dB/dL, for fronts from L0 down to L1 while the load goes from P0 to P1.
+    """(k,) integrals I of -dB/dL over pieces on which the load changes.
 
-    Let run = L0 - L1 and h(s) = D0(s) - D0(L1), with the mean m on [L1, L0] and the mean M on
-    [P1, P0]. Then
-
-        I = (P0 - L0) h(L0) - (P0 - P1) m + run (2 m - M).
-
-    As D0 rises and is concave, D = h(L0) lies in [0, run / (2 E* a(L1))], with the largest contact
-    radius a; m in [D/2, D]; and M between the mean and the larger of h(P0) and h(P1). If the front
-    hardly moves, these intervals are smaller than those of the computed values, and replace them.
+    (4) of docs/theory/losses.md, with the intervals for D, m and M that follow it.
     """
     if not pieces:
         return Ball.exact(np.zeros(0))
@@ -160,14 +147,9 @@ def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple
 
     cells : number of cells into which the pieces on which the load varies are cut, in all
 
-    With n = n_i(L), N = n_i(P) and the local law P_i = p(n), the rates of the two losses as the
-    front moves are
-
-        p(N) - p(n) - p'(n) (N - n)  and, where asperity i is open at L,  p(N),    times  dn/dL.
-
-    Neither rate falls as P rises, if no indentation does. So the loss of a cell lies between its
-    values for the loads at the two ends of the cell. The returned means have relative errors of
-    about cells^-2; their bounds are about 1 / cells.
+    The loss in a cell lies between the losses for the loads at the two ends of the cell
+    (docs/theory/losses.md, "A front while the load changes"). The returned means have relative
+    errors of about cells^-2; their proved bounds are about 1 / cells.
     """
     run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
     parts = list[tuple[Fraction, Pair, Pair]]()  # weight; loads at both ends; fronts at both ends

@@ -25,11 +25,7 @@ About = dict[str, Any]
 
 
 def packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
-    """The entry of a case in the index, and its files by name.
-
-    A program is left out, with the reason, where the answer lies beyond the boxes in which it is
-    exact.
-    """
+    """The entry of a case in the index, with reasons for missing programs, and the files."""
     problem = NormalProblem.assemble(case.scene, **case.control, influence="dense")
     loads = np.array([float(digits) for digits in case.loads])
     own = loads[problem.candidates] / problem.units.force

@@ -258,7 +258,7 @@ class LatticeInfluence(LatticeCoupling):
         return even(nearest, len(self))
 
     def crowding(self, radii: Array) -> float:
-        """The largest (a_i + a_j) / r_ij of contact radii a; pairs too far apart are skipped."""
+        """The largest (a_i + a_j) / r_ij, for contact radii a; pairs too far apart are skipped."""
         if not self._filled:
             return crowding(self.points, radii)
         field = np.full(self.box.shape, -np.inf)
@@ -276,7 +276,7 @@ class LatticeInfluence(LatticeCoupling):
             yield self.spacing * (on_sites - self.site_error) * (1.0 - 8 * ROUNDOFF), i, j
 
     def semidefinite_with(self, radius: float) -> bool:
-        """True if the least symbol, less the effect of deviations from sites, proves it."""
+        """True if A + (scale / radius) I is proved positive semidefinite, by the least symbol."""
         if radius * LEAST_NEGATIVE > self.spacing:
             return False
         least = self.lattice.cached(_least_symbol) - self._displaced

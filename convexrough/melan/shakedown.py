@@ -1,6 +1,6 @@
 """`shakedown`: the largest factor of a load path at which asperities stop sliding.
 
-The exact limit and the programs of Melan's theorem are derived in docs/theory/shakedown.md.
+docs/theory/shakedown.md derives the exact limit and the programs of Melan's theorem.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from convexrough.roundoff import ROUNDOFF
 
 Scope = Literal["global", "local", "none"]
 
-#: Largest convexity number of the loads to which shells are fitted. A heuristic: any value is safe.
+#: Convexity number of the loads above which shells are fitted to them. A heuristic.
 FIT_FROM = 0.8
 
 #: Margins mu with which a Cholesky factorisation is tried, the largest first. A heuristic.
@@ -161,10 +161,7 @@ def _shells(influence: Influence, stiffness: Array, which: Indices) -> Array:
 
 
 def convex_margin(influence: Influence, stiffness: Array, margins: Sequence[float]) -> float:
-    """The first of `margins` with  I + H^(-1/2) A H^(-1/2) >= mu I  proved, else 0: "Which box", 2.
-
-    Without a stored matrix it is 0, because a factorisation would take too long.
-    """
+    """The first mu with  I + H^(-1/2) A H^(-1/2) >= mu I  proved by a stored matrix, else 0."""
     if not influence.stored:
         return 0.0
     error = influence.entry_error + 8 * ROUNDOFF

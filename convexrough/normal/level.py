@@ -174,9 +174,9 @@ class Level:
     def response(self, right: Ball, total: Ball) -> Response:
         """x and beta:  x / c + A x = right + beta  where touching, x = 0 elsewhere, sum x = total.
 
-        The solution is refined in pairs of float64 numbers until the residual no longer halves. The
-        theorem of docs/theory/one-theorem.md then bounds the error: first the total x of doubtful
-        asperities, then the error of the others, which includes the effect of these.
+        The solution is refined in pairs of float64 numbers until the residual no longer halves.
+        Bounds on its error follow from docs/theory/one-theorem.md. They include the x of doubtful
+        asperities.
 
         right : (n,);  total : ()
 
@@ -295,7 +295,7 @@ class Levels:
         return self.at(self.top.load - drop)
 
     def at(self, load: Ball) -> Level:
-        """The level at a total load. Raises ProofError if the ball of the load contains 0."""
+        """The level at a total load. Raises ProofError if an inexact load may be 0 or less."""
         key = _key(load)
         if key not in self._known:
             self._known[key] = self._level(load)

@@ -30,9 +30,8 @@ STRAIGHT = 1e-11
 def shifted_to_load(indentation: Array, coefficients: Array, load: float | Array) -> Array:
     """delta + tau with  sum ((delta_i + tau)+ / k_i)^(3/2) = load;  rows (m, n) have loads (m, 1).
 
-    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is increasing, convex and nearly
-    straight in tau, and Newton's method converges to the root from the right. The shift is
-    computed relative to the largest delta, to keep the precision of small loads.
+    The sum to the power 2/3 is a norm of (delta + tau)+ / k, so it is convex and nearly straight in
+    tau, and Newton's method converges to the root from the right.
     """
     highest = indentation.max(axis=-1, keepdims=indentation.ndim > 1)
     indentation, softness = indentation - highest, 1.0 / coefficients
@@ -97,9 +96,9 @@ def approach_bound(
 
 
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
-    """An upper bound on the approach [length] at every solution of total `load` [force].
+    """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `approach_bound` with the trial loads `smooth_loads`.
+    It is `approach_bound` for the loads `smooth_loads`.
     """
     modulus = scene.material.contact_modulus
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
@@ -139,7 +138,7 @@ def smooth_loads(scene: Scene, load: float) -> Array:
 def smooth_displacement(scene: Scene, distances: Array, load: float) -> Array:
     """[length] surface displacement under a loaded smooth sphere, at distances from the axis.
 
-    Other bases are replaced by a sphere of mean curvature; flat bases have displacement 0.
+    Other shapes are replaced by a sphere of mean curvature; under a flat it is 0.
     """
     if not scene.curved:
         return np.zeros_like(distances)

@@ -22,8 +22,8 @@ from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
-#: Radii of shells over t, the cheapest first; the factor for nearly singular pairs; and by how much
-#: a neighbour's radius may be smaller, over its distance. Heuristics: any radii give valid bounds.
+#: Radii of shells over t, the cheapest first; the factor for nearly singular pairs; and the largest
+#: decrease of radii to a neighbour, over its distance. Heuristics: any radii give valid bounds.
 WIDTHS, WIDENED, LESS = (4.0, 8.0), 3.0, 0.5
 
 #: Number of nearest neighbours that set the radii of shells.

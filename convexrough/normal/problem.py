@@ -337,11 +337,7 @@ class NormalProblem:
         return shifted_to_load(indentation, self.coefficients, load)
 
     def convexity_number(self, loads: Array) -> float:
-        """theta = max 2 a_i / (pi s_i) at these loads; Phi is convex up to them if theta < 1.
-
-        The smallest eigenvalue of the Hessian, relative to the local part, is at least 1 - theta:
-        (3) of docs/theory/convexity.md.
-        """
+        """theta of (3), docs/theory/convexity.md: below 1 Phi is convex up to these loads."""
         return float(self.convexity_at(self.stiffness(loads)))
 
     def convexity_at(self, stiffness: Array) -> Any:
@@ -364,9 +360,7 @@ class NormalProblem:
         return offsets
 
     def overhang(self, weights: Array, displacement: Array) -> float:
-        """Upper bound on D0 at every solution under load control.
-
-        Equation (2) of docs/theory/certificate.md.
+        """Upper bound on D0 at every solution under load control, as `load_control.approach_bound`.
 
         weights      : (n,) approximate loads, not negative, not all 0
         displacement : (n,) A times weights
@@ -383,7 +377,7 @@ class NormalProblem:
 
 @lru_cache
 def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
-    """Mean curvature of the base, k^3 of a tip of curvature 1, and 1 / (pi E*), in scaled units."""
+    """Mean curvature of the sphere, k^3 of a tip of curvature 1, 1 / (pi E*), in scaled units."""
     curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
     cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
     scale = INVERSE_PI / Fraction(modulus) * Fraction(unit)

@@ -164,7 +164,7 @@ def solution_in(problem: Problem, box: Box, state: Trial, at_first: Array) -> Kn
     # Bound A (P - P*) by Cauchy's inequality.
     softest = h.min(axis=-1, initial=np.inf, keepdims=h.ndim > 1)
     moved = (within / np.sqrt(softest) * problem.row_norm + missing.coupled) * (1 + SAFETY)
-    shift = _approach_error(problem, state, errors, moved)
+    shift = _approach_error(problem, box, state, errors, moved)
     approach = Ball.around(state.approach.mid, shift)
     known = state.indentation
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
@@ -226,13 +226,20 @@ def _sharpened(problem: Problem, loads: Ball, indentation: Ball) -> Ball:
     return Ball(Pair(parts[0], parts[1]), parts[2])
 
 
-def _approach_error(problem: Problem, state: Trial, errors: Array, moved: Any) -> Any:
-    """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch."""
+def _approach_error(problem: Problem, box: Box, state: Trial, errors: Array, moved: Any) -> Any:
+    """Bound on |D0 - D0*|, by D0* = k P*^(2/3) + (A P*) - d at every asperity proved to touch.
+
+    If none is: D0* is at most this where gaps are not negative, and touching begins at -max d.
+    """
     if problem.load is None:
         return state.approach.radius
-    least = state.loads.high - errors
+    least, exact = state.loads.high - errors, problem.exact
     # k P^(2/3) is concave: its slope at the least load bounds its slope up to P
     slope = problem.stiffness(np.where(least > 0, least, 1.0))
     each = np.where(least > 0, state.gap.size + slope * errors + moved, np.inf)
-    closest = each.min(axis=-1, initial=np.inf, keepdims=each.ndim > 1)
+    above = state.gap.upper + exact.coefficients.upper * np.cbrt(errors) ** 2 + moved
+    above = np.where(box.fixed_open, np.inf, above)
+    across: Any = {"axis": -1, "initial": np.inf, "keepdims": each.ndim > 1}
+    below = state.approach.upper - (-exact.offsets.upper).min(**across)
+    closest = np.minimum(each.min(**across), np.maximum(above.min(**across), below))
     return closest * (1 + 4 * SAFETY) + state.approach.radius

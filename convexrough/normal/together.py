@@ -152,9 +152,7 @@ def _pressed(stack: Stack, indentation: Array) -> _Pressed:
 def solved(
     stack: Stack, prescribed: Array, squares: Array, reach: Array, box: Box | None = None
 ) -> Solved:
-    """The solutions of all rows; `good` are those in which all statuses are proved.
-
-    The residual of a good row is at rounding.
+    """The solutions of all rows; `good` are accurate ones with a proved status of all asperities.
 
     prescribed, squares, reach : arguments of `guessed`;  box : default `widest`
     """

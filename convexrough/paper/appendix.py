@@ -48,10 +48,7 @@ def slips(state: ShearState) -> Array:
 
 
 def scatter(state: ShearState) -> float:
-    """Standard deviation over mean of the displacements of adhered asperities, in theory 0.
-
-    It is nan if nothing is displaced or no asperity adheres.
-    """
+    """Standard deviation over mean of u at adhered asperities, in theory 0; nan if undefined."""
     u = displacements(state)[_adhered(state)]
     return float(u.std() / abs(u.mean())) if u.any() else float("nan")
 

@@ -128,10 +128,7 @@ def shades_of(count: int, low: float = 0.3) -> Array:
 
 
 def mark_points(axes: Axes, x: Array, y: Array) -> None:
-    """Draw dots; if there are few, number them. Dots at one place share a label.
-
-    Each number is on the first of eight sides, from the top, without dots and labels.
-    """
+    """Draw dots; if they are few, number them next to the dots. Dots at one place share a label."""
     if len(x) <= MOST_DOTS:
         axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
     if len(x) > MOST_NUMBERS:

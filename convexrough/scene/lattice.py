@@ -67,7 +67,7 @@ class Lattice(Cached):
     def through(cls, points: Array) -> Lattice | None:
         """The lattice on which these points (n, 2) lie, up to rounding, each on a different site.
 
-        The result is None without such a lattice, or if the spacing is too small for float64.
+        None if there is none, or if the spacing is too small for float64.
         """
         anchor = points[np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1))]
         basis, reach = _shortest(points - anchor), float(np.abs(points).max())

@@ -28,10 +28,7 @@ OWN_SHARE = 1.10
 
 
 def mean_field_indentation(problem: NormalProblem) -> Array:
-    """(n,) indentations of the candidates in scaled units, negative where open.
-
-    If the displacements of the rings are not found, they are those under a smooth sphere.
-    """
+    """(n,) indentations in scaled units, negative where open; `smooth_indentation` if it fails."""
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:

@@ -67,8 +67,8 @@ class ConeProgram(NamedTuple):
 
         The variables are v, one for each variable with an entry in P, then z. Entries of z at
         equalities are free. At any feasible point minus the objective is a lower bound on the
-        minimum of the program, and the largest such bound equals it. The multipliers of the
-        equations are then -x.
+        minimum of the program. At the solution it equals the minimum, and the multipliers of the
+        equations are -x.
         """
         from scipy import sparse  # takes 0.1 s to import
 

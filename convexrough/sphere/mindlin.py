@@ -39,6 +39,6 @@ def loss(t: Number) -> Number:
     """The loss e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)], of third order in t.
 
     A cycle between Q and -Q loses (9 (2 - nu) f^2 P^2 / (5 G a)) e(Q / (f P)) in both bodies, with
-    the shear modulus G and the contact radius a. This equals (24/5) c_t f^2 P threshold e.
+    the shear modulus G and the contact radius a.
     """
     return annulus.loss(annulus.width_under(t))

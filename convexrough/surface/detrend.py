@@ -46,7 +46,7 @@ class Removed:
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
     """The best least-squares plane or sphere, and its height at each pixel.
 
-    docs/theory/surfaces.md, "Trends". Lengths are over half the map's size.
+    docs/theory/surfaces.md, "Removing the form". Lengths are over half the map's size.
 
     Raises InputError if no sphere fits.
     """

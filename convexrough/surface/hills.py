@@ -34,8 +34,8 @@ class Hills(NamedTuple):
 def hills(heights: Array) -> Hills:
     """The pixels that are higher than all eight neighbours, and their prominences.
 
-    Pixels of equal height are ordered by position. All but one maxima of a plateau then have the
-    prominence 0; these are left out.
+    Pixels of equal height are ordered by position, and maxima of prominence 0 are left out, so that
+    a plateau has one maximum.
     """
     order = np.argsort(heights, axis=None, kind="stable")
     ranks: Indices = np.empty(heights.shape, dtype=np.intp)

@@ -32,10 +32,10 @@ def spikes(heights: Array) -> Indices:
 
 
 def clipped(heights: Array) -> int:
-    """The number of pixels with exactly the largest height if they are surprisingly many, else 0.
+    """The number of pixels with the largest height if they are surprisingly many, else 0.
 
-    They are if they are at least ten, and more than those in the next 1 % of the range of heights,
-    or at the second largest height.
+    Many means at least ten, and more than in the next 1 % of the range of heights or at the second
+    largest height.
     """
     top = heights.max()
     highest = int(np.count_nonzero(heights == top))
@@ -45,10 +45,9 @@ def clipped(heights: Array) -> int:
 
 
 def filled(heights: Array) -> Array:
-    """The map with each hole (nan) replaced so that it is the mean of its neighbours.
+    """The map with each hole (nan) filled by the mean of its neighbours.
 
-    Such a harmonic function has no maximum inside, so no filled pixel becomes a summit. At least
-    one pixel must not be a hole.
+    No filled pixel becomes a summit. At least one pixel must not be a hole.
     """
     holes = np.isnan(heights)
     number = np.full(heights.shape, -1)

@@ -15,8 +15,7 @@ from convexrough.sweeps.scenes import Source, Tables
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
-#: Largest number of scenes in a batch, about the largest number of asperities in it, and the least
-#: number of batches.
+#: Largest numbers of scenes and (about) of asperities in a batch; number of batches to aim at.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
 
 #: Largest number of scenes that are computed to find out which numbers can be measured.
@@ -53,10 +52,7 @@ class Plan:
         return Batch(self.source.part(part), self.columns, part)
 
     def manifest(self) -> dict[str, Any]:
-        """The contents of manifest.json.
-
-        The entry "each" is the number of scenes that differ only in the seed.
-        """
+        """The contents of manifest.json; "each" counts scenes that differ only in the seed."""
         grid = self.source.grid if isinstance(self.source, Tables) else None
         labels = list(self.source.labels(range(0)))
         numbers = {key: key for key in labels} | {it.name: it.number for it in self.columns}

@@ -89,10 +89,7 @@ def _lost() -> tuple[type[BaseException], ...]:
 
 
 class Processes(Executor):
-    """Processes on this machine; those that die are replaced.
-
-    Each process is a new interpreter, which inherits no locks or threads.
-    """
+    """Processes on this machine, each a new interpreter; those that die are replaced."""
 
     def __init__(self, workers: int | None = None) -> None:
         self.workers = workers or cores()

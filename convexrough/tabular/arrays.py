@@ -46,9 +46,8 @@ def reading(path: Path) -> Iterator[None]:
 def foreign() -> Iterator[None]:
     """Raise a ValueError for any error that another package raises on a corrupted file.
 
-    No documentation lists these errors: numpy, scipy, pyarrow and openpyxl raise SyntaxError,
-    KeyError, TypeError, AttributeError, MemoryError, struct.error, TokenError and BadZipFile on
-    truncated or changed files. The body should only call readers.
+    numpy, scipy, pyarrow and openpyxl raise errors of many kinds that they do not document. The
+    body should only call readers.
     """
     try:
         yield

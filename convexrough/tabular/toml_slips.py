@@ -77,10 +77,7 @@ _SLIPS = [
 
 
 def explained(path: object, text: str, error: Exception) -> str:
-    """A line for each mistake: place, text and correction, if it is known.
-
-    Each mistake is corrected to find the next one.
-    """
+    """A line for each mistake: place, text and correction, if it is known."""
     lines = text.split("\n")
     found: list[str] = []
     while len(found) < MOST_SLIPS:

@@ -135,8 +135,7 @@ class FrictionConic:
 class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
     """The cone program, scaled so that its numbers are about 1.
 
-    The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., and then those of the cones,
-    asperity by asperity.
+    The variables are q / (epsilon P) (x_1, y_1, x_2, ...), then those of the cones by asperity.
 
     total  : (2,) T;  lift : the cones;  small : (n,) epsilon;  energy : the unit of energy
     """
@@ -170,7 +169,7 @@ class FrictionProgram(Reduction[ConeProgram, RawAnswer, VectorState]):
         return ConeProgram(*self._objective(), self._constraints(rows), constant, equalities=2)
 
     def _objective(self) -> tuple[csc_matrix, Array]:
-        """The quadratic and linear parts of (1/2) q'Mq plus the local energies."""
+        """The quadratic and linear parts: (1/2) q'(B + shift)q, and the local energies."""
         from scipy import sparse  # 0.1 s to import: only when solving
 
         problem, lift, small = self.problem, self.lift, self.small[:, None]
